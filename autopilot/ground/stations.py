@@ -11,7 +11,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import MODES, custom_mode, mode_of_custom
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.ground.fault_injection import Failures
-from colibri.autopilot.ground.log_link import LOGS, LogLink, without_log
+from colibri.autopilot.ground.onboard_log import LOGS, OnboardLog
 from colibri.autopilot.ground.setpoint_sources import SetpointSources
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
@@ -42,7 +42,7 @@ from colibri.mavlink.services.identity import IDENTITIES
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.shell import Shell
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
-from colibri.mavlink.services.statustext import INFO, WARNING, StatusText
+from colibri.mavlink.services.statustext import INFO, WARNING, Line, StatusText
 from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.setpoints.follow_target import Follow
 from colibri.mavlink.setpoints.manual_control import Manual
@@ -51,10 +51,12 @@ from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.telemetry.table import telemetry
+from colibri.mavlink.ulog.recorder import Recorder
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
 
 PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
+MAX_SAID = 20
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
@@ -99,7 +101,7 @@ class Stations:
         needs: Which needs of modes are met.
         system: Obeys commands to the autopilot as a system.
         failures: Injected failures.
-        log: The flight log.
+        log: The log that they download.
     """
 
     def __init__(
@@ -110,6 +112,7 @@ class Stations:
         fence: Fence,
         lines: StatusQueue,
         parameters: Parameters,
+        recorder: Recorder,
         *,
         takes_attitude: bool,
         caught: Caught | None = None,
@@ -123,12 +126,14 @@ class Stations:
             fence: Rules out places.
             lines: Status texts of these parts.
             parameters: All numbers that can be changed.
+            recorder: Makes the log that is downloaded.
             takes_attitude: Whether the control law takes attitude setpoints.
             caught: Is told of exceptions of a service; None: they are raised.
         """
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._caught = lines, pilot, caught
         self._text = StatusText()
+        self._said: list[Line] = []
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.setpoints = sources = SetpointSources(Offboard(), Manual(settings.system_id), Follow())
         self.missions, self.fence = missions, fence
@@ -177,7 +182,7 @@ class Stations:
             caught=caught,
         )
         self.snapshot: Snapshot | None = None
-        self.log = LogLink(self.hub, self._streams, files, settings.boot_unix_us)
+        self.log = OnboardLog(recorder, files)
 
     def use(self, channel: int, kind: str) -> None:
         """Stream to `channel` what its kind gets by default."""
@@ -198,7 +203,6 @@ class Stations:
         self._heartbeat.update(snapshot)
         self._streams.update(snapshot)
         self.setpoints.update(snapshot, self._pilot.context().state.euler[2])
-        self.log.update(armed=snapshot.armed)
 
     def go_on(self) -> None:
         """Send the mode at least, where the vehicle's state could not be taken in."""
@@ -225,12 +229,13 @@ class Stations:
             self.hub.poll(now_us)
         except Exception as error:
             self._left_out("hub", error, "not polled in this frame")
-        outbox = self.hub.take_outbox()
+        said = self._text.take()
+        self._said = [*self._said, *said][-MAX_SAID:]
         try:
-            return self.log.record(outbox, now_us, armed=self._pilot.state.armed)
+            self.log.update(self.snapshot, said, now_us, armed=self._pilot.state.armed)
         except Exception as error:
             self._left_out("flight log", error, "not recorded")
-            return without_log(outbox)
+        return self.take_outbox()
 
     def _tell(self, now_us: int) -> None:
         """Report the progress of the mission, and of commands to the system."""
@@ -250,8 +255,8 @@ class Stations:
         self._obeys.close(reason)
 
     def take_outbox(self) -> list[Outgoing]:
-        """Return what to send while there is no state of the vehicle to send or log."""
-        return without_log(self.hub.take_outbox())
+        """Return what to send now."""
+        return self.hub.take_outbox()
 
     def warn(self, text: str) -> None:
         """Send a warning to everybody."""
@@ -261,9 +266,10 @@ class Stations:
         """Send a status text to everybody."""
         self.hub.send(self._text.say(severity, text))
 
-    def take_texts(self) -> list[str]:
-        """Return the status texts since the last time, for whoever watches the process."""
-        return self._text.take()
+    def take_texts(self) -> list[Line]:
+        """Return the status texts since the last time, the last of many, for whoever watches the process."""
+        said, self._said = self._said, []
+        return said
 
     def _provide(self, modes: StandardModes, metadata: Metadata) -> None:
         """Have the streams answer requests for messages that are not streamed."""

@@ -1,6 +1,7 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what is reported on the terminal."""
 
 import argparse
+from collections import deque
 from collections.abc import Iterable, Iterator
 from math import hypot
 from time import perf_counter, thread_time, time
@@ -11,7 +12,7 @@ from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.defence import errors
 from colibri.autopilot.core.step import Received
-from colibri.autopilot.ground.stations import StationSettings
+from colibri.autopilot.ground.stations import MAX_SAID, StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.parameters.definitions import ImpossibleError
@@ -83,6 +84,7 @@ class Ground:
         self.errors = ErrorLog(args.out or args.state, status)
         self._log: AutopilotLog | None = None
         self._recorded_snapshot: Snapshot | None = None
+        self._texts: deque[str] = deque(maxlen=MAX_SAID)
         self.copter = self._new_copter(self._state.history())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
@@ -119,8 +121,7 @@ class Ground:
         if self._log:
             received = self._recorded(self._log, received)
         outbox = self.copter.serve(received)
-        if self._log:
-            self._record_snapshot(self._log)
+        self._record_told()
         if stations.system.restart:
             self._restart(stations.system.restart)
         try:
@@ -133,14 +134,19 @@ class Ground:
             self.errors.write(records)
         return self.copter
 
-    def _record_snapshot(self, log: "AutopilotLog") -> None:
-        """Record what ground stations are told, where it is new."""
-        snapshot = self.copter.stations.snapshot
-        if snapshot is None or snapshot is self._recorded_snapshot:
+    def _record_told(self) -> None:
+        """Record what ground stations are told, where it is new; keep the texts for the terminal."""
+        stations = self.copter.stations
+        snapshot, said = stations.snapshot, stations.take_texts()
+        self._texts.extend(map(str, said))
+        if self._log is None:
             return
-        self._recorded_snapshot = snapshot
         try:
-            log.write_snapshot(snapshot)
+            for line in said:
+                self._log.say(self.copter.pilot.context().now_us, *line)
+            if snapshot is not None and snapshot is not self._recorded_snapshot:
+                self._recorded_snapshot = snapshot
+                self._log.write_snapshot(snapshot)
         except LogError as error:
             self._status.say("said", f"{error}; flying on")
 
@@ -258,8 +264,9 @@ class Ground:
             self._state.save_signing()
 
     def _report_texts(self) -> None:
-        for text in (*self.copter.stations.take_texts(), *self._links.take_notes()):
+        for text in (*self._texts, *self._links.take_notes()):
             self._status.say("said", text)
+        self._texts.clear()
 
     def _facts(self, now_s: float) -> dict[str, Any]:
         pilot = self.copter.pilot

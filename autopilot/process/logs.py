@@ -109,6 +109,15 @@ class AutopilotLog:
         if self.topics:
             self.topics.write_snapshot(snapshot)
 
+    def say(self, time_us: int, severity: int, text: str) -> None:
+        """Append a line that ground stations are told.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        if self.topics:
+            self.topics.say(time_us, severity, text)
+
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)

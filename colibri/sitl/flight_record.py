@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.commander.rules.modes import mode_of_custom
-from colibri.mavlink.files.flight_log import SUFFIX
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
 from colibri.sitl.backends.lockstep import Instant
@@ -20,8 +19,7 @@ COLUMNS = (
 )
 """Truth in SI, ENU and FLU; controls are parts of the largest rotor speed; the mode is HEARTBEAT's number."""
 PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT = (
-    *(f"plant{SUFFIX}", f"ground{SUFFIX}"),
-    *("flight.csv", "flight.png", "flight.json"),
+    *("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json"),
 )
 """The files that are kept of a flight."""
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.common.types import Array, FourRotors, Quaternion, Vector
-from colibri.view.snapshot import Airframe, Zone
+from colibri.view.snapshot import Airframe, Mark, Surroundings, Zone
 
 Colour: TypeAlias = tuple[int, int, int]
 
@@ -112,6 +112,13 @@ def bounds(points: Sequence[Array]) -> tuple[Vector, float]:
     high = np.max([each.max(axis=0) for each in filled], axis=0)
     x, y, z = ((low + high) / 2.0).tolist()
     return (x, y, z), max(2.0, float((high - low).max()) / 2.0)
+
+
+def outline(around: Surroundings) -> list[Array]:
+    """Return what has to be in sight of what stands still, points (n, 3) each."""
+    marks = [*around.mission, *around.rally, Mark(around.home_enu_m, "home")]
+    zones = [np.column_stack([zone.corners_m, np.full(len(zone.corners_m), around.ground_m)]) for zone in around.fence]
+    return [around.path, around.reference_path, np.array([mark.place_enu_m for mark in marks]), *zones]
 
 
 def vehicle_scale(extent_m: float, airframe: Airframe) -> float:

@@ -4,6 +4,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from math import inf
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter, sleep
@@ -18,6 +19,7 @@ from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES
 from colibri.view.observer import Observer
 from colibri.view.page.page import Page
+from colibri.view.page.server import PageServer, serve
 from colibri.view.playback import Playback, speed_of
 from colibri.view.recorded import RecordedFlight
 from colibri.view.snapshot import Source, ViewError
@@ -26,7 +28,11 @@ FRAMES_HZ = 30.0
 EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
 """Of a page that is written to a file; of a long flight fewer a second."""
 WORDS_HZ = 5.0
-"""How often words, time line and plots change: an eye reads no faster."""
+"""How often words and time line change: an eye reads no faster."""
+PLOTS_HZ = 2.0
+"""How often plots change, which are sent whole, and drawn anew: their mark moves by a pixel or two."""
+DRAWN_AFTER_S = 1.0
+"""A browser that has come draws words and plots first: a scene that moves meanwhile would hold it up."""
 
 
 class Show:
@@ -45,14 +51,19 @@ class Show:
         self._sources = sources
         self._order = order
         self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
-        self._words_at_s = now_s
+        self._words_at_s = self._plots_at_s = now_s
+        self._plays_at_s: float | None = None
         self._shown: object = None
-        self._is_told = self._was_watched = False
+        self._is_told = self._is_plotted = False
 
     def turn(self, now_s: float) -> None:
         """Do what was asked for, and show what is now."""
-        if self._page.watched and not self._was_watched:
-            self._was_watched = True
+        if self._plays_at_s is None and self._page.watched:
+            self._plays_at_s = now_s + DRAWN_AFTER_S
+        if self._plays_at_s is not None and now_s >= self._plays_at_s:
+            self._plays_at_s = inf
+            self._page.reveal([source.at(now_s) for source in self._sources])
+            self._shown = None
             self.playback = self.playback.play(now_s)
         for done in self._page.done():
             self._shown = None
@@ -70,24 +81,28 @@ class Show:
         if time_s != self._shown:
             self._shown = time_s
             self._page.show([source.at(time_s) for source in self._sources])
-            self._is_told = False
+            self._is_told = self._is_plotted = False
         if not self._is_told and now_s >= self._words_at_s:
             self._words_at_s = now_s + 1.0 / WORDS_HZ
             self._is_told = True
             plays = self.playback.plays and not self.playback.is_over(now_s)
             self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
+        if not self._is_plotted and now_s >= self._plots_at_s:
+            self._plots_at_s = now_s + 1.0 / PLOTS_HZ
+            self._is_plotted = True
             self._page.plot(time_s, anew=live)
 
 
-def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+def play(folders: Sequence[Path], server: PageServer) -> None:
     """Show flights that were flown, until interrupted.
 
     Raises:
-        ViewError: One cannot be read, or the port is taken.
+        ViewError: One cannot be read.
     """
     with ExitStack() as held:
         flights = read_flights(folders, held)
-        serve_until_stopped(flights, port, browser=browser, say=say)
+        page = Page(flights, server)
+        _keep_showing(Show(page, flights, perf_counter()), Stop().__bool__)
 
 
 def export(folders: Sequence[Path], path: Path) -> None:
@@ -101,7 +116,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
         begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
         first_s, last_s = min(begin_s), max(end_s)
         count = min(max(2, round(EXPORT_HZ * (last_s - first_s))), EXPORT_FRAMES)
-        page = Page(flights, 0)
+        page = Page(flights, serve(0, "Colibri"))
         held.callback(page.close)
         html = page.recorded_html(np.linspace(first_s, last_s, count).tolist())
     try:
@@ -135,7 +150,11 @@ def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None])
     """
     vehicle = LiveVehicle(url)
     try:
-        serve_until_stopped([vehicle], port, browser=browser, say=say)
+        page, show = _begin(vehicle, port, browser=browser, say=say)
+        try:
+            _keep_showing(show, Stop().__bool__)
+        finally:
+            page.close()
     finally:
         vehicle.close()
 
@@ -166,7 +185,7 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
     vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
     ends = Event()
     try:
-        page, show = _begin([vehicle], 0, browser=True, say=say)
+        page, show = _begin(vehicle, 0, browser=True, say=say)
         thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)
         thread.start()
         try:
@@ -179,30 +198,13 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
         vehicle.close()
 
 
-def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Serve the page of some sources; say its address first, and for a live vehicle the token of its commands.
-
-    Raises:
-        ViewError: The port is taken.
-    """
-    page, show = _begin(sources, port, browser=browser, say=say)
-    stop = Stop()
-    try:
-        _keep_showing(show, stop.__bool__)
-    finally:
-        page.close()
-
-
-def _begin(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
-    page = Page(sources, port)
+def _begin(live: LiveVehicle, port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
+    page = Page([live], serve(port, "Colibri"))
     say(page.url)
-    show = Show(page, sources, perf_counter())
-    live = sources[0]
-    if isinstance(live, LiveVehicle):
-        token = Token.new()
-        say(f"token for commands: {token.text}")
-        page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
-        show = Show(page, sources, perf_counter(), partial(pass_on, live))
+    token = Token.new()
+    say(f"token for commands: {token.text}")
+    page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
+    show = Show(page, [live], perf_counter(), partial(pass_on, live))
     if browser:
         webbrowser.open(page.url)
     return page, show

@@ -24,10 +24,12 @@ _STALE_S = 3.0
 """What has not been said for that long is no longer shown: a predicted horizon, a reference."""
 _PULSE_US = (1000.0, 2000.0)
 _E7 = 1e7
+_ROTORS = "rotors, % of the largest"
+_ROTOR_LIMITS = {"(stopped)": 0.0, "(largest)": 100.0}
 _CHARTS = (
     ("position error, m", ("error",)),
     ("tilt, deg", ("tilt",)),
-    ("rotors, % of the largest", ("1", "2", "3", "4")),
+    (_ROTORS, ("1", "2", "3", "4")),
     ("active constraints", ("rotors", "increments", "angles", "rates")),
     ("QP time, ms", ("QP",)),
     ("estimated accuracy, m", ("horizontal", "vertical")),
@@ -121,7 +123,10 @@ class Telemetry:
             known = np.isfinite(values).all(axis=1)
             if known.sum() > 1:
                 shown = values[known]
-                charts.append(Chart(title, names, rows[known, 0] - self._began_s, shown.T, shown.max(axis=1)))
+                limits = _ROTOR_LIMITS if title == _ROTORS else {}
+                lines = np.broadcast_to([*limits.values()], (len(shown), len(limits)))
+                drawn = np.hstack([shown, lines]).T
+                charts.append(Chart(title, (*names, *limits), rows[known, 0] - self._began_s, drawn, shown.max(axis=1)))
         return tuple(charts)
 
     def place_of(self, latitude_deg: float, longitude_deg: float, up_m: float, *, above_sea: bool) -> Vector:

@@ -1,19 +1,11 @@
-"""The log of each flight: a numbered file that begins when the vehicle is armed, of all frames sent and received.
-
-The format is that of ground stations' telemetry logs: each frame behind its time, µs, as a big-endian integer.
-"""
-
-from collections.abc import Iterable
-from struct import Struct
+"""The log of each flight: a numbered file, from arming to disarming, of whatever is recorded then."""
 
 from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names
 
-SUFFIX = ".tlog"
+SUFFIX = ".ulg"
 KEPT = 50
 WRITE_BYTES = 4096
 WRITE_EVERY_US = 1_000_000
-
-_STAMP = Struct(">Q")
 
 
 class FlightLog:
@@ -36,13 +28,10 @@ class FlightLog:
         self._size = 0
         self._write_at_us = 0
 
-    def record(self, time_us: int, frames: Iterable[bytes]) -> None:
-        """Append frames, all of time `time_us`, if a flight is being logged."""
-        if self.name is None:
-            return
-        stamp = _STAMP.pack(time_us)
-        for frame in frames:
-            self._waiting += stamp + frame
+    def record(self, data: bytes) -> None:
+        """Append bytes, if a flight is being logged."""
+        if self.name is not None:
+            self._waiting += data
 
     def update(self, armed: bool, now_us: int) -> None:
         """Begin and end logs; write what waits. Called once a frame of the plant."""

@@ -5,6 +5,7 @@ that is not zero, counted by chunk_seq; a chunk that is not full ends it.
 """
 
 from collections import deque
+from typing import NamedTuple
 
 from colibri.mavlink.node.service import Send, to_all
 from colibri.mavlink.wire.dialect import mav
@@ -25,17 +26,28 @@ _WORDS = ("emergency", "alert", "critical", "error", "warning")
 """Of severities from 0 on; those behind them are no cause for alarm."""
 
 
+class Line(NamedTuple):
+    """A status text and its MAV_SEVERITY."""
+
+    severity: int
+    text: str
+
+    def __str__(self) -> str:
+        """Return the text, of a warning or worse with a word that says so."""
+        return self.text if self.severity > WARNING else f"{_WORDS[self.severity]}: {self.text}"
+
+
 class StatusText:
     """Numbers the texts that need more than one message, and remembers the last until they are taken."""
 
     def __init__(self) -> None:
         """Begin with id 1: 0 means a text of one chunk."""
         self._next = 1
-        self._said: deque[str] = deque(maxlen=_REMEMBERED)
+        self._said: deque[Line] = deque(maxlen=_REMEMBERED)
 
     def say(self, severity: int, text: str) -> list[Send]:
         """Return the STATUSTEXT messages of `text`, to all channels."""
-        self._said.append(text if severity > WARNING else f"{_WORDS[severity]}: {text}")
+        self._said.append(Line(severity, text))
         data = text.encode()[:MAX_TEXT_BYTES]
         if len(data) <= CHUNK_BYTES:
             return [to_all("STATUSTEXT", severity, data, 0, 0)]
@@ -46,8 +58,8 @@ class StatusText:
             for chunk, start in enumerate(starts)
         ]
 
-    def take(self) -> list[str]:
-        """Return all texts since the last time, those of a warning or worse with a word that says so."""
+    def take(self) -> list[Line]:
+        """Return all texts since the last time."""
         said = list(self._said)
         self._said.clear()
         return said

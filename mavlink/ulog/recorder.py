@@ -21,7 +21,9 @@ _NO_REFERENCE = (nan,) * 3
 class Recorder:
     """Turns snapshots into messages of a ULog: what each call returns is to be appended to the file."""
 
-    def __init__(self, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool) -> None:
+    def __init__(
+        self, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool, sample_every_us: int = 0
+    ) -> None:
         """Record `vehicle`.
 
         Args:
@@ -29,23 +31,29 @@ class Recorder:
             system_id: Its system id.
             parameters: Its parameters.
             with_battery: Whether its battery is recorded; not where the plant writes of it to the same file.
+            sample_every_us: Of the snapshots that come sooner after one only changes are recorded.
         """
         self._vehicle, self._system_id, self._parameters = vehicle, system_id, parameters
-        self._with_battery = with_battery
+        self._with_battery, self._sample_every_us = with_battery, sample_every_us
         self._samples, self._sensings = SampleBlocks(), SensingBlocks()
         self._revision, self._values = parameters.revision, dict(parameters.values)
         self._status: Status | None = None
         self._status_us = 0
+        self._sampled_us: int | None = None
 
     def begin(self) -> bytes:
         """Return the beginning of a file."""
-        self._status = None
+        self._status = self._sampled_us = None
         self._revision, self._values = self._parameters.revision, dict(self._parameters.values)
         return beginning(self._vehicle, self._values)
 
     def update(self, snapshot: Snapshot) -> bytes:
         """Record a snapshot."""
         recorded = self._changed_parameters() + self._changed_status(snapshot)
+        now_us = snapshot.time_us
+        if self._sampled_us is not None and 0 <= now_us - self._sampled_us < self._sample_every_us:
+            return recorded
+        self._sampled_us = now_us
         recorded += self._samples.add(sample_row(snapshot))
         row = sensing_row(snapshot)
         return recorded if row is None else recorded + self._sensings.add(row)
@@ -67,12 +75,12 @@ class Recorder:
         return messages.SYNC + messages.parameters(changed)
 
     def _changed_status(self, snapshot: Snapshot) -> bytes:
-        """Return the status where it has changed, and every second; with it the battery."""
+        """Return the status where it has changed, and every second; with it the battery, and what waits."""
         now_us, status = snapshot.time_us, status_of(snapshot)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
             return b""
         self._status, self._status_us = status, now_us
-        recorded = status_message(now_us, status, self._system_id)
+        recorded = self.take() + status_message(now_us, status, self._system_id)
         if snapshot.battery is not None and self._with_battery:
             recorded += battery_message(now_us, snapshot.battery)
         return recorded

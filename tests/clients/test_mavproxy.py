@@ -83,7 +83,7 @@ def test_a_flight(tmp_path: Path) -> None:
         assert seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.RETURN]
 
         proxy.type("log list", r"Log 0 .*size \d+")
-        (log,) = (flown.state / "0" / "logs").glob("*.tlog")
+        (log,) = (flown.state / "0" / "logs").glob("*.ulg")
         proxy.type(f"log download 0 {tmp_path / 'log.bin'}", r"Finished downloading .*log\.bin")
         assert (tmp_path / "log.bin").read_bytes() == log.read_bytes()
 

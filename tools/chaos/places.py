@@ -49,7 +49,7 @@ PLACES: tuple[str, ...] = (
     "autopilot.ground.stations:Stations.update",
     "autopilot.ground.stations:Stations.receive_status",
     "autopilot.ground.stations:Stations._tell",
-    "autopilot.ground.log_link:LogLink.record",
+    "autopilot.ground.onboard_log:OnboardLog.update",
     "autopilot.ground.fault_injection:Failures.take",
     "mavlink.node.hub:Hub.receive",
     "mavlink.node.hub:Hub.poll",

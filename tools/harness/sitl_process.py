@@ -27,12 +27,14 @@ class Vehicle:
         state: The folder of its parameters, logs and files.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path) -> None:
-        """Wrap what runs; `said` takes its standard error."""
+    def __init__(
+        self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path, printed: Path
+    ) -> None:
+        """Wrap what runs; `said` takes its standard error, `printed` its output."""
         self.process = process
         self.seen = seen
         self.state = state
-        self._said = said
+        self._said, self._printed = said, printed
 
     @property
     def ports(self) -> list[int]:
@@ -54,6 +56,11 @@ class Vehicle:
         """What it has written to standard error."""
         return self._said.read_text(encoding="utf-8")
 
+    @property
+    def printed(self) -> list[str]:
+        """The lines that it has written to standard output."""
+        return self._printed.read_text(encoding="utf-8").splitlines()
+
     def end(self) -> int:
         """Ask it to end, as Ctrl-C does; return its exit code."""
         if self.process.poll() is None:
@@ -72,16 +79,16 @@ def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), sp
 
     Its state and output are in `folder`. It serves `links` beside the observer's; by default it waits on any free port.
     """
-    said, state = folder / "sitl.err", folder / "state"
-    with Observer() as seen, said.open("wb") as errors:
+    said, printed, state = folder / "sitl.err", folder / "sitl.out", folder / "state"
+    with Observer() as seen, said.open("wb") as errors, printed.open("wb") as output:
         command = [
             *(sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--speed", repr(speed)),
             *("--state", str(state)),
             *(f"--gcs={url}" for url in (*links, seen.url)),
             *options,
         ]
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=errors)
-        flown = Vehicle(process, seen, state, said)
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=errors)
+        flown = Vehicle(process, seen, state, said, printed)
         try:
             wait_for(lambda: seen.sights or process.poll() is not None, "the vehicle's first word", _COMPILES_HOURS)
             assert process.poll() is None, flown.said

@@ -1,6 +1,8 @@
 """`colibri completion`: its options, and its call."""
 
-from argparse import Namespace
+import re
+from argparse import Action, Namespace, _SubParsersAction
+from collections.abc import Callable, Sequence
 
 from colibri.common.process.arguments import ArgumentParser
 
@@ -16,8 +18,55 @@ def run(args: Namespace) -> int:
     """Print the script by which a shell completes every command; return the exit code."""
     from shtab import complete
 
+    print(complete(completed_parser(), args.shell))  # noqa: T201
+    return 0
+
+
+def completed_parser() -> ArgumentParser:
+    """Return a parser to complete by, not to parse with: of each argument what it may be, as far as that is known."""
+    from colibri.autopilot.__main__ import command_line as autopilot
     from colibri.cli.shared.commands import COMMANDS
     from colibri.cli.shared.parser import parser_of
+    from colibri.plant.__main__ import command_line as plant
 
-    print(complete(parser_of(*COMMANDS), args.shell))  # noqa: T201
-    return 0
+    parser = parser_of(*COMMANDS)
+    (commands,) = (action for action in parser._actions if isinstance(action, _SubParsersAction))  # noqa: SLF001
+    commands.choices.update(plant=plant(), autopilot=autopilot())
+    names = _names()
+    for command, options in commands.choices.items():
+        for action in options._actions:  # noqa: SLF001
+            _complete(action, command, names)
+    return parser
+
+
+def _names() -> dict[str, Callable[[], Sequence[str]]]:
+    """Return the names that there are of what an argument, or the first one of a command, names."""
+    from colibri.autopilot.control.profile import profile_names
+    from colibri.autopilot.control.registry import controller_names
+    from colibri.autopilot.guidance.trajectories.registry import track_names
+    from colibri.plant.vehicle.description import vehicle_names
+
+    return {
+        **dict.fromkeys(("track", "tracks"), track_names),
+        "profile": profile_names,
+        **dict.fromkeys(("controller", "check-controller"), controller_names),
+        **dict.fromkeys(("vehicle", "plant_vehicle", "model"), vehicle_names),
+        "show": lambda: [*profile_names(), *vehicle_names()],
+    }
+
+
+def _complete(action: Action, command: str, names: dict[str, Callable[[], Sequence[str]]]) -> None:
+    from shtab import DIRECTORY, FILE
+
+    metavar = action.metavar if isinstance(action.metavar, str) else ""
+    named = command if action.dest == "name" and not action.option_strings else action.dest
+    if action.nargs == 0 or action.choices is not None:
+        return
+    if metavar in ("NAME", "TRACK", "PROFILE") and named in names:
+        action.choices = names[named]()
+    elif re.fullmatch(r"[a-z]+(\|[a-z]+)+", metavar):
+        action.choices = metavar.split("|")
+    elif metavar in ("DIR", "FOLDER"):
+        action.complete = DIRECTORY  # type: ignore[attr-defined]
+    elif re.search("FILE|FOLDER|TLOG", metavar):
+        action.complete = FILE  # type: ignore[attr-defined]

@@ -51,6 +51,14 @@ GROUPS: dict[str, dict[str, Command]] = {
             "",
             "colibri plot out/spiral",
         ),
+        "export": Command(
+            "write the topics of a flight's ULog as MCAP, CSV or Parquet",
+            "",
+            """
+            colibri export out/spiral --mcap           # for Foxglove
+            colibri export out/spiral --csv            # a table of each topic
+            """,
+        ),
         "replay": Command(
             "feed a recorded flight to the autopilot: are its answers the same?", "", "colibri replay out/spiral"
         ),

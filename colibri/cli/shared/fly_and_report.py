@@ -128,8 +128,8 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
             bar.start()  # not before something flies: an error of the start stands alone
             bar.start_task(task)
             first_s.append(sim_time_s)
-        elapsed_s = bar.tasks[task].elapsed or 0.0
-        speed = f"{(sim_time_s - first_s[0]) / elapsed_s:.0f} × real time" if elapsed_s else ""
+        elapsed_s, flown_s = bar.tasks[task].elapsed or 0.0, sim_time_s - first_s[0]
+        speed = f"{flown_s / elapsed_s:.0f} × real time" if elapsed_s and flown_s else ""
         bar.update(task, completed=sim_time_s, speed=speed)
 
     def say(text: str) -> None:

@@ -36,20 +36,24 @@ def run(args: Namespace) -> int:
         fail("--export writes flights that are over: give their folders")
     if args.port > 65535:
         fail(f"--port: must be from 0 to 65535, not {args.port}")
+    recorded = not links and not args.export
     try:
         with loading():
-            from colibri.view.run import export, show_live, show_recorded
+            if recorded:
+                from colibri.view.opening import show_recorded
+            else:
+                from colibri.view.run import export, show_live
     except ModuleNotFoundError as error:
         if error.name not in ("viser", "websockets"):
             raise
         fail(NEEDS_VISER)
     try:
-        if args.export:
-            export([Path(what) for what in args.what], args.export)
-        elif links:
-            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
-        else:
+        if recorded:
             show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
+        elif args.export:
+            export([Path(what) for what in args.what], args.export)
+        else:
+            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
     except Error as error:
         fail(str(error))
     return 0

@@ -6,18 +6,18 @@ from queue import Empty
 import numpy as np
 
 from colibri.common.types import Vector
-from colibri.view.access import HOST, Token
-from colibri.view.geometry import bounds, ground_point, vehicle_scale
+from colibri.view.access import Token
+from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
 from colibri.view.page.commands import Commands
 from colibri.view.page.controls import Controls, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
-from colibri.view.page.server import serve, stop
+from colibri.view.page.server import PageServer, address, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
-_LIVE_EXTENT_M = 8.0
-"""Half of the side of what is looked at of a vehicle whose way is not known yet."""
+_LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
+"""Half of the side of what is looked at of a vehicle whose way is not known yet; how much more than its plans is."""
 
 
 class Page:
@@ -29,33 +29,28 @@ class Page:
         controls: What it was told.
     """
 
-    def __init__(self, sources: Sequence[Source], port: int) -> None:
-        """Serve it on a port of loopback, 0 for one that is free.
-
-        Raises:
-            ViewError: The port is taken.
-        """
+    def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
+        """Put it on a server."""
         self._sources = sources
         self._names = [source.name for source in sources]
-        self.server = serve(port, "Colibri")
-        self.url = f"http://{HOST}:{self.server.get_port()}"
+        self.server = server
+        self.url = address(server)
         self._set_up()
 
     def _set_up(self) -> None:
         gui, scene = self.server.gui, self.server.scene
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         around = [source.surroundings for source in self._sources]
-        middle, extent_m = bounds([path for each in around for path in (each.path, each.reference_path)])
+        middle, extent_m = bounds([points for each in around for points in outline(each)])
         live = self._sources[0].is_live
-        extent_m = _LIVE_EXTENT_M if live else extent_m
+        self._extent_m = max(extent_m, _LIVE_EXTENT_M if live else 0.0)
         self._ground_m = min(each.ground_m for each in around)
         self._world = scene.add_frame("/world", show_axes=False)
-        add_ground(scene, self._ground_m, extent_m)
-        self._scale = vehicle_scale(extent_m, self._sources[0].airframe)
-        self._vehicles = self._built()
-        self._around = [SurroundingsScene(scene, number) for number in range(len(self._sources))]
+        self._scale = vehicle_scale(self._extent_m, self._sources[0].airframe)
+        self._vehicles: list[VehicleScene] = []
+        self._around: list[SurroundingsScene] = []
         self._follows = False
-        self._look(middle, extent_m)
+        self._look(middle, self._extent_m)
         begin_s, end_s = zip(*(source.span_s for source in self._sources), strict=True)
         self.controls = Controls(gui, None if live else (min(begin_s), max(end_s)), self._scale)
         gui.main_panel.dock_left()
@@ -71,6 +66,21 @@ class Page:
         """Whether a browser shows it."""
         return bool(self.server.get_clients())
 
+    def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
+        """Begin the scene, of which browsers have nothing before; whatever is known of a live vehicle is in sight."""
+        if self._vehicles:
+            return
+        if snapshots and self._sources[0].is_live:
+            known = [points for source in self._sources for points in outline(source.surroundings)]
+            middle, extent_m = bounds([*known, *(now.trail for now in snapshots)])
+            self._look(middle, max(_LIVE_MARGIN * extent_m, _LIVE_EXTENT_M))
+        for client in self.server.get_clients().values():  # they may have come before it was known where to look
+            client.camera.position = self.server.initial_camera.position
+            client.camera.look_at = self.server.initial_camera.look_at
+        add_ground(self.server.scene, self._ground_m, self._extent_m)
+        self._around = [SurroundingsScene(self.server.scene, number) for number in range(len(self._sources))]
+        self._vehicles = self._built()
+
     def done(self) -> Iterator[Done]:
         """Yield what was done since last asked; what concerns only the picture is taken care of."""
         while True:
@@ -82,14 +92,16 @@ class Page:
                 self._scale = float(done.value)
                 for vehicle in self._vehicles:
                     vehicle.remove()
-                self._vehicles = self._built()
+                self._vehicles = self._built() if self._vehicles else []
             elif done.what == "follow":
                 self._follows = bool(done.value)
                 self._world.position = (0.0, 0.0, 0.0)
             yield done
 
     def show(self, snapshots: Sequence[Snapshot]) -> None:
-        """Show each vehicle as it is now."""
+        """Show each vehicle as it is now, once the scene has begun."""
+        if not self._vehicles:
+            return
         layers = self.controls.layers
         with self.server.atomic():
             for vehicle, around, source, now in zip(
@@ -122,6 +134,7 @@ class Page:
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
         """Return the scene at some times, one after the other at their pace, as a page that needs no server."""
+        self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]
         for time_s in times_s:

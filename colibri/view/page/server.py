@@ -42,6 +42,11 @@ def serve(port: int, label: str) -> PageServer:
     return server
 
 
+def address(server: PageServer) -> str:
+    """Return where a browser finds the page."""
+    return f"http://{HOST}:{server.get_port()}"
+
+
 def stop(server: PageServer) -> None:
     """End a server; it would say so where the page's address stands."""
     with redirect_stdout(StringIO()):

@@ -4,9 +4,11 @@ import json
 import os
 import resource
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from errno import ENOSPC
 from importlib.metadata import version
 from pathlib import Path
@@ -80,6 +82,52 @@ def test_shells_complete_commands_and_their_options(shell: str, capsys: pytest.C
     script = capsys.readouterr().out
     assert "check-controller" in script
     assert "turbulence" in script
+
+
+COMPLETE = r"""
+source "$1"
+shift
+COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMP_LINE="$*" COMP_POINT=${#COMP_LINE}
+_shtab_colibri colibri "${COMP_WORDS[-1]}" "${COMP_WORDS[-2]}"
+printf '%s\n' "${COMPREPLY[@]}"
+"""
+"""What bash does when somebody presses tab behind some words."""
+
+
+@pytest.fixture(scope="module")
+def bash_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    script = tmp_path_factory.mktemp("completion") / "colibri"
+    with script.open("w", encoding="utf-8") as file, redirect_stdout(file):
+        assert exit_code(["completion", "bash"]) == 0
+    return script
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("che", {"check-controller"}),
+        ("fly sp", {"spiral"}),
+        ("fly --profile th", {"thesis", "thesis-euler"}),
+        ("fly --feedback s", {"state", "sensors"}),
+        ("sitl --vehicle hummingbird-t", {"hummingbird-thesis"}),
+        ("check-controller geo", {"geometric-se3"}),
+        ("show profile se", {"se3"}),
+        ("plant --realt", {"--realtime"}),
+        ("plot flown", {"flown"}),
+        ("export flown.u", {"flown.ulg"}),
+        ("view flown", {"flown", "flown.ulg"}),
+        ("fly --out flown", {"flown"}),
+    ],
+)
+def test_bash_completes_names_files_and_folders(
+    words: str, completed: set[str], bash_script: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "flown").mkdir()
+    (tmp_path / "flown.ulg").touch()
+    command = ["bash", "-c", COMPLETE, "bash", str(bash_script), "colibri", *words.split()]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == completed
 
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])

@@ -33,3 +33,16 @@ def test_a_view_beside_needs_a_link_to_call(capsys: pytest.CaptureFixture[str]) 
     with pytest.raises(SystemExit):
         main(["fly", "spiral", "--view", "--link", "memory"])
     assert "--view needs --link udp" in capsys.readouterr().err
+
+
+def test_a_folder_that_only_looks_like_a_flight_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("provenance.json", "plant.csv", "autopilot.csv"):
+        (tmp_path / name).touch()
+    with pytest.raises(SystemExit) as ended:
+        main(["view", str(tmp_path), "--no-browser"])
+    said = capsys.readouterr()
+    assert ended.value.code == 2
+    assert said.out.startswith("http://127.0.0.1:")
+    assert said.err == f"colibri: error: {tmp_path / 'provenance.json'}: Input data was truncated\n"

@@ -12,13 +12,14 @@ from colibri.view.geometry import (
     bounds,
     circle,
     ground_point,
+    outline,
     rotor_colour,
     segments,
     thinned,
     thrust_arrows,
     zone_segments,
 )
-from colibri.view.snapshot import Airframe, Zone
+from colibri.view.snapshot import Airframe, Mark, Surroundings, Zone
 
 
 def test_a_faster_rotor_is_redder_and_an_unknown_one_is_grey() -> None:
@@ -84,3 +85,17 @@ def test_calm_air_has_no_arrow() -> None:
     blown = arrow((0.0, 0.0, 1.0), (3.0, 0.0, 0.0), 1.0)
     assert blown is not None
     assert blown.shape == (1, 2, 3)
+
+
+def test_plans_home_and_paths_have_to_be_in_sight() -> None:
+    corners = np.array([[-6.0, -6.0], [12.0, -6.0], [12.0, 10.0]])
+    around = Surroundings(
+        ground_m=1.0,
+        path=np.array([[0.0, 0.0, 9.0]]),
+        home_enu_m=(0.0, 0.0, 1.0),
+        mission=(Mark((20.0, 0.0, 3.0), "1"),),
+        rally=(Mark((0.0, -30.0, 3.0), "rally 1"),),
+        fence=(Zone(corners, keeps_in=True),),
+    )
+    assert bounds(outline(around)) == ((7.0, -10.0, 5.0), 20.0)
+    assert bounds(outline(Surroundings())) == ((0.0, 0.0, 1.0), 2.0)

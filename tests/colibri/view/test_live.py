@@ -43,8 +43,12 @@ def test_orders_fly_the_vehicle_and_the_page_sees_it(sitl: Sitl) -> None:
     assert len(seen.horizon) == 6
     assert len(seen.trail) > 10
     assert any("accepted" in text for text in seen.texts)
-    titles = [chart.title for chart in observer.telemetry.charts()]
-    assert {"position error, m", "active constraints", "QP time, ms"} <= set(titles)
+    charts = {chart.title: chart for chart in observer.telemetry.charts()}
+    assert {"position error, m", "active constraints", "QP time, ms"} <= charts.keys()
+    rotors = charts["rotors, % of the largest"]
+    assert rotors.names[4:] == ("(stopped)", "(largest)")
+    assert {(low, high) for low, high in rotors.values[4:].T} == {(0.0, 100.0)}
+    assert rotors.headline.max() < 100.0
     observer.set_mode("Land")
     sitl.wait_until(lambda: now().mode == "Land", within=5.0, what="the mode")
 

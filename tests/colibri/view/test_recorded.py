@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from colibri.experiments.flight import Flight, fly
-from colibri.view.horizons import Horizons, predicted
+from colibri.view.horizons import Horizons
+from colibri.view.prediction import predicted
 from colibri.view.recorded import RecordedFlight
-from colibri.view.run import Show, export, read_flights
+from colibri.view.run import DRAWN_AFTER_S, Show, export, read_flights
 from colibri.view.snapshot import ViewError
 
 
@@ -82,9 +83,14 @@ class Recorder:
 
     def __init__(self) -> None:
         self.watched = True
+        self.revealed = False
         self.shown: list[float] = []
         self.plays: list[bool] = []
         self.waiting: list[object] = []
+        self.plotted: list[float] = []
+
+    def reveal(self, _snapshots: object) -> None:
+        self.revealed = True
 
     def done(self) -> list[object]:
         done, self.waiting = self.waiting, []
@@ -96,16 +102,20 @@ class Recorder:
     def tell(self, _snapshots: object, _time_s: float, plays: bool) -> None:
         self.plays.append(plays)
 
-    def plot(self, _time_s: float, *, anew: bool) -> None:
+    def plot(self, time_s: float, *, anew: bool) -> None:
         assert not anew
+        self.plotted.append(time_s)
 
 
 def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) -> None:
     from colibri.view.page.controls import Done
 
     page = Recorder()
-    show = Show(page, [recorded], 10.0)  # type: ignore[arg-type]
-    show.turn(10.0)
+    show = Show(page, [recorded], 9.0)  # type: ignore[arg-type]
+    show.turn(9.0)
+    assert not page.revealed  # a browser that has come draws the rest first
+    show.turn(9.0 + DRAWN_AFTER_S)
+    assert page.revealed
     show.turn(10.5)
     page.waiting = [Done("speed", "0.5x")]
     show.turn(11.0)
@@ -114,8 +124,9 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     show.turn(11.6)
     page.waiting = [Done("seek", 0.3)]
     show.turn(12.0)
-    assert page.shown == pytest.approx([0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
-    assert page.plays == [True, True, True, False, False]
+    assert page.shown == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
+    assert page.plays == [False, True, True, True, False, False]
+    assert page.plotted == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
 
 
 def test_an_export_needs_nothing_else(flight: Flight, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Logs of flights: one each, numbered, of everything; the oldest go."""
 
-import struct
-
 import pytest
 
 from colibri.mavlink.files.flight_log import WRITE_BYTES, WRITE_EVERY_US, FlightLog
@@ -26,30 +24,26 @@ def content(memory: Memory, name: str) -> bytes:
     return bytes(reading.read(0, reading.size))  # type: ignore[arg-type]
 
 
-def stamped(*frames: tuple[int, bytes]) -> bytes:
-    return b"".join(struct.pack(">Q", time_us) + frame for time_us, frame in frames)
-
-
-def fly(log: FlightLog, *frames: bytes) -> None:
+def fly(log: FlightLog, data: bytes = b"") -> None:
     log.update(True, 0)
-    log.record(1, frames)
+    log.record(data)
     log.update(False, 2)
 
 
 def test_a_log_holds_what_is_recorded_while_armed(memory: Memory) -> None:
     log = FlightLog(memory, ("logs",))
     log.update(False, 0)
-    log.record(0, [b"before"])
+    log.record(b"before")
     assert (log.name, names(memory)) == (None, [])
     log.update(True, 4000)
-    assert log.name == "00001.tlog"
-    log.record(4000, [b"one", b"two"])
+    assert log.name == "00001.ulg"
+    log.record(b"one, ")
     log.update(True, 8000)
-    log.record(8000, [b"three"])
+    log.record(b"two")
     log.update(False, 12000)
-    log.record(12000, [b"after"])
+    log.record(b"after")
     assert log.name is None
-    assert content(memory, "00001.tlog") == stamped((4000, b"one"), (4000, b"two"), (8000, b"three"))
+    assert content(memory, "00001.ulg") == b"one, two"
 
 
 def test_each_flight_has_its_own(memory: Memory) -> None:
@@ -57,21 +51,21 @@ def test_each_flight_has_its_own(memory: Memory) -> None:
     fly(log, b"one")
     fly(log, b"two")
     fly(FlightLog(memory, ("logs",)), b"three")  # after a restart
-    assert names(memory) == ["00001.tlog", "00002.tlog", "00003.tlog"]
-    assert content(memory, "00003.tlog") == stamped((1, b"three"))
+    assert names(memory) == ["00001.ulg", "00002.ulg", "00003.ulg"]
+    assert content(memory, "00003.ulg") == b"three"
 
 
 def test_it_is_written_every_second_and_when_much_waits(memory: Memory) -> None:
     log = FlightLog(memory, ("logs",))
     log.update(True, 0)
-    log.record(0, [b"x"])
+    log.record(b"x")
     log.update(True, WRITE_EVERY_US - 1)
-    assert content(memory, "00001.tlog") == b""
+    assert content(memory, "00001.ulg") == b""
     log.update(True, WRITE_EVERY_US)
-    assert content(memory, "00001.tlog") == stamped((0, b"x"))
-    log.record(5, [b"y" * WRITE_BYTES])
+    assert content(memory, "00001.ulg") == b"x"
+    log.record(b"y" * WRITE_BYTES)
     log.update(True, WRITE_EVERY_US + 1)
-    assert content(memory, "00001.tlog") == stamped((0, b"x"), (5, b"y" * WRITE_BYTES))
+    assert content(memory, "00001.ulg") == b"x" + b"y" * WRITE_BYTES
 
 
 def test_the_oldest_logs_go(memory: Memory) -> None:
@@ -79,7 +73,7 @@ def test_the_oldest_logs_go(memory: Memory) -> None:
     memory.create(("logs", "notes.txt"))
     for _ in range(5):
         fly(log)
-    assert names(memory) == ["00003.tlog", "00004.tlog", "00005.tlog", "notes.txt"]
+    assert names(memory) == ["00003.ulg", "00004.ulg", "00005.ulg", "notes.txt"]
 
 
 def test_the_oldest_logs_give_their_space() -> None:
@@ -87,26 +81,26 @@ def test_the_oldest_logs_give_their_space() -> None:
     memory.make_folder(("logs",))
     log = FlightLog(memory, ("logs",))
     for _ in range(3):
-        fly(log, b"x" * 292)
-    fly(log, b"y" * 392)
-    assert names(memory) == ["00002.tlog", "00003.tlog", "00004.tlog"]
+        fly(log, b"x" * 300)
+    fly(log, b"y" * 400)
+    assert names(memory) == ["00002.ulg", "00003.ulg", "00004.ulg"]
     refusals = [log.refusal]
     fly(log, b"z" * 2000)
-    assert names(memory) == ["00005.tlog"]
+    assert names(memory) == ["00005.ulg"]
     assert [*refusals, log.refusal] == [None, FileRefusal.NO_SPACE]
 
 
 def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: Memory) -> None:
     log = FlightLog(memory, ("logs",))
     log.update(True, 0)
-    log.record(0, [b"x"])
-    memory.remove(("logs", "00001.tlog"))
+    log.record(b"x")
+    memory.remove(("logs", "00001.ulg"))
     memory.remove_folder(("logs",))
     log.update(False, 1)
     assert (log.name, log.refusal) == (None, FileRefusal.NOT_FOUND)
     fly(log, b"again")
     assert log.refusal is None
-    assert content(memory, "00001.tlog") == stamped((1, b"again"))
+    assert content(memory, "00001.ulg") == b"again"
 
 
 def test_without_a_place_nothing_is_logged(memory: Memory) -> None:
@@ -116,8 +110,8 @@ def test_without_a_place_nothing_is_logged(memory: Memory) -> None:
     assert (log.name, log.refusal) == (None, FileRefusal.NOT_A_FOLDER)
 
 
-@pytest.mark.parametrize("name", ["", "x.tlog", "-1.tlog", "².tlog", "00000.tlog", "7.txt", "12"])
+@pytest.mark.parametrize("name", ["", "x.ulg", "-1.ulg", "².ulg", "00000.ulg", "7.txt", "12"])
 def test_other_files_are_no_logs(memory: Memory, name: str) -> None:
     memory.create(("logs", name))
     fly(FlightLog(memory, ("logs",), kept=1))
-    assert set(names(memory)) == {"00001.tlog", name} - {""}
+    assert set(names(memory)) == {"00001.ulg", name} - {""}

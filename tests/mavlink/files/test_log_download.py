@@ -18,7 +18,7 @@ CHUNK = 128 * BLOCK_BYTES
 """What MAVSDK asks for at once."""
 ALL = 0xFFFFFFFF
 BIG = random.Random(1).randbytes(30_001)
-CONTENT = {"00001.tlog": BIG, "00002.tlog": b"", "00003.tlog": bytes(range(180))}
+CONTENT = {"00001.ulg": BIG, "00002.ulg": b"", "00003.ulg": bytes(range(180))}
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_without_logs_one_entry_says_so(folder: tuple[str, ...]) -> None:
 
 def test_a_list_is_paced(memory: Memory, logs: Logs) -> None:
     for number in range(100):
-        memory.create(("logs", f"1{number:04}.tlog"))
+        memory.create(("logs", f"1{number:04}.ulg"))
     ask(logs, "LOG_REQUEST_LIST", 0, 0xFFFF)
     assert len(list(logs.poll(0))) == MESSAGES_A_POLL
     assert [entry[0] for entry in entries(logs)] == list(range(103))
@@ -151,13 +151,13 @@ def test_another_log_or_the_end_stops_a_download(logs: Logs) -> None:
 
 def test_a_log_can_be_read_while_it_is_written(memory: Memory, logs: Logs) -> None:
     entries(logs)
-    memory.write(("logs", "00003.tlog"), 180, b"more")
+    memory.write(("logs", "00003.ulg"), 180, b"more")
     assert data(logs, 2, 180, 90) == [(2, 180, b"more")]
 
 
 def test_ids_are_those_of_the_last_list(memory: Memory, logs: Logs) -> None:
     entries(logs)
-    memory.remove(("logs", "00001.tlog"))
+    memory.remove(("logs", "00001.ulg"))
     assert data(logs, 2, 0, 90) == [(2, 0, bytes(range(90)))]
     assert data(logs, 0, 0, 90) == [(0, 0, b"")]
     assert entries(logs) == [(0, 2, 1, 0, 0), (1, 2, 1, 0, 180)]
@@ -167,17 +167,17 @@ def test_ids_are_those_of_the_last_list(memory: Memory, logs: Logs) -> None:
 def test_a_log_that_vanishes_ends(memory: Memory, logs: Logs) -> None:
     ask(logs, "LOG_REQUEST_DATA", 0, 0, CHUNK)
     list(logs.poll(0))
-    memory.remove(("logs", "00001.tlog"))
+    memory.remove(("logs", "00001.ulg"))
     assert blocks(drain(logs, [])) == [(0, MESSAGES_A_POLL * BLOCK_BYTES, b"")]
 
 
 def test_logs_are_erased_but_for_the_one_being_written(memory: Memory) -> None:
-    logs = Logs(memory, ("logs",), lambda: "00003.tlog")
+    logs = Logs(memory, ("logs",), lambda: "00003.ulg")
     ask(logs, "LOG_REQUEST_DATA", 0, 0, ALL)
     ask(logs, "LOG_ERASE")
     assert drain(logs, []) == []
     assert entries(logs) == [(0, 1, 0, 0, 180)]
-    assert [entry.name for entry in memory.list(("logs",))] == ["00003.tlog", "no log"]  # type: ignore[union-attr]
+    assert [entry.name for entry in memory.list(("logs",))] == ["00003.ulg", "no log"]  # type: ignore[union-attr]
 
 
 def test_memory_is_bounded(logs: Logs) -> None:

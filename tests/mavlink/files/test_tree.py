@@ -270,8 +270,8 @@ class TestTree:
     @pytest.fixture
     def logs(self) -> Memory:
         logs = Memory()
-        logs.create(("1.tlog",))
-        logs.write(("1.tlog",), 0, b"log")
+        logs.create(("1.ulg",))
+        logs.write(("1.ulg",), 0, b"log")
         return logs
 
     @pytest.fixture
@@ -296,14 +296,14 @@ class TestTree:
             Entry("mine", False, 0),
         ]
         assert tree.list(("@PARAM",)) == [Entry("param.pck", False, 2)]
-        assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.tlog", False, 3)]
+        assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.ulg", False, 3)]
         assert tree.list(("general.json",)) is FileRefusal.NOT_A_FOLDER
         assert tree.list(("nope",)) is FileRefusal.NOT_FOUND
 
     def test_it_opens_everything(self, tree: Tree) -> None:
         assert content(tree, ("general.json",)) == b"{}"
         assert content(tree, ("@PARAM", "param.pck?withdefaults=1")) == b"<withdefaults=1>"
-        assert content(tree, ("logs", "1.tlog")) == content(tree, ("@MAV_LOG", "1.tlog")) == b"log"
+        assert content(tree, ("logs", "1.ulg")) == content(tree, ("@MAV_LOG", "1.ulg")) == b"log"
         assert tree.open(("@PARAM",)) is FileRefusal.IS_FOLDER
         assert tree.open(("logs",)) is FileRefusal.IS_FOLDER
         assert tree.open(("logs", "hidden")) is FileRefusal.NOT_FOUND
@@ -335,7 +335,7 @@ class TestTree:
         assert tree.list(()) == before
 
     def test_mounts_can_be_written_to(self, tree: Tree, root: Memory, logs: Memory) -> None:
-        assert tree.remove(("@MAV_LOG", "1.tlog")) is None
+        assert tree.remove(("@MAV_LOG", "1.ulg")) is None
         assert logs.list(()) == []
         assert tree.make_folder(("d",)) is None
         assert tree.rename(("mine",), ("d", "mine")) is None

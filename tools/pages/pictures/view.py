@@ -1,13 +1,19 @@
 """`view-*.png`: the page of `colibri view` as Chromium shows it, of flights in memory, live and recorded."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from io import BytesIO
+from math import dist
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, sleep
 
 from PIL import Image
 
+from colibri.common.types import Vector
 from colibri.experiments.flight import fly
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.backends.setting import setting_of
@@ -15,17 +21,22 @@ from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, way
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 from colibri.view.access import Token
+from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES, PX4
+from colibri.view.observer import Observer
 from colibri.view.page.page import Page
-from colibri.view.run import Show, read_flights
+from colibri.view.page.server import serve
+from colibri.view.run import DRAWN_AFTER_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
 from tools.pages.pictures.watched import Watched
 
-FRAME_S = 0.1
+FRAME_S, PLOTTED_AGAIN = 0.1, 8
 DRAWN_AFTER_MS = 15000
 """Without a GPU a picture takes a second, and what is sent last has to be in it."""
 COLOURS = 160
+KNOWN_AFTER_S, ON_ITS_WAY_S, PATIENCE_S, NEAR_M = 10.0, 3.0, 60.0, 0.5
+PLACES_M = ((0.0, 0.0, 4.0), (8.0, 0.0, 4.0), (8.0, 6.0, 5.0), (0.0, 6.0, 5.0))
 TOKEN = Token("docs")
 
 
@@ -35,6 +46,7 @@ def write(folder: Path) -> None:
     compared(folder / "view-two.png")
     live(folder / "view-live.png")
     mission(folder / "view-mission.png")
+    real(folder / "view-real.png")
 
 
 def recorded(path: Path) -> None:
@@ -47,14 +59,14 @@ def recorded(path: Path) -> None:
 
 
 def compared(path: Path) -> None:
-    """Show two control laws on one track."""
-    begun = partial(fly, "lemniscate:lap=6", duration=12.0, wind="8@270", turbulence="moderate", link="memory")
+    """Show two control laws on one track that is too fast for one of them."""
+    begun = partial(fly, "lemniscate:lap=5", duration=6.0, wind="8@270", turbulence="moderate", link="memory")
     both = [begun(), begun(controller="geometric-se3")]
     with ExitStack() as held:
         flights = read_flights([flight.plan.out for flight in both], held, wait=True)
         for flight, name in zip(flights, ("whole-lpv-mpc", "geometric-se3"), strict=True):
             flight.name = name
-        keep(path, flights, 9.3)
+        keep(path, flights, 4.2)
 
 
 def live(path: Path) -> None:
@@ -91,13 +103,59 @@ def begun(**setting: str) -> Iterator[Sitl]:
         yield flights.begin()
 
 
-def keep(path: Path, sources: Sequence[Source], time_s: float, *, commands: bool = False) -> None:
-    """Write what the page shows at a time."""
-    page = Page(sources, 0)
+def real(path: Path) -> None:
+    """Show a vehicle of `colibri sitl` on sensors over UDP, as any that speaks as PX4 does, and as the page orders."""
+    vehicle = LiveVehicle("udpin:127.0.0.1:0")
+    with TemporaryDirectory() as folder, closing(vehicle):
+        link = ["--gcs", vehicle.url.replace("udpin", "udpout"), "--plant-port", "0", "--state", folder]
+        world = ["--feedback", "sensors", "--wind", "5@300", "--turbulence", "light", "--seed", "3"]
+        command = [sys.executable, "-m", "colibri", "sitl", "--quiet", *link, *world]
+        with subprocess.Popen(command, stdin=subprocess.DEVNULL) as sitl:
+            try:
+                fly_by_orders(vehicle)
+                keep(path, [vehicle], partial(on_its_way, vehicle), commands=True)
+            finally:
+                sitl.terminate()
+
+
+def fly_by_orders(vehicle: LiveVehicle) -> None:
+    """Arm, take off and go round a square, as buttons do."""
+    wait(lambda: vehicle.at(perf_counter()).mode == "Hold")
+    sleep(KNOWN_AFTER_S)
+    vehicle.order(lambda observer: observer.arm(True))
+    wait(lambda: vehicle.at(perf_counter()).armed)
+    vehicle.order(lambda observer: observer.take_off(PLACES_M[0][2]))
+    wait(lambda: vehicle.at(perf_counter()).position_enu_m[2] > PLACES_M[0][2] - NEAR_M)
+    for place in PLACES_M:
+        vehicle.order(partial(Observer.go_to, place_enu_m=place))
+        wait(partial(is_near, vehicle, place))
+
+
+def is_near(vehicle: LiveVehicle, place: Vector) -> bool:
+    """Return whether a vehicle is at a place, ENU."""
+    return dist(vehicle.at(perf_counter()).position_enu_m, place) < NEAR_M
+
+
+def on_its_way(vehicle: LiveVehicle) -> float:
+    """Have it go on; return the time when it has got somewhere."""
+    vehicle.order(partial(Observer.go_to, place_enu_m=PLACES_M[1]))
+    sleep(ON_ITS_WAY_S)
+    return perf_counter()
+
+
+def wait(until: Callable[[], object]) -> None:
+    """Wait until something is so."""
+    give_up_s = perf_counter() + PATIENCE_S
+    while not until():
+        assert perf_counter() < give_up_s, "the vehicle does not do as it is told"
+        sleep(0.02)
+
+
+def keep(path: Path, sources: Sequence[Source], time_s: float | Callable[[], float], *, commands: bool = False) -> None:
+    """Write what the page shows at a time, which may be asked for once a browser is there."""
+    page = Page(sources, serve(0, "Colibri"))
     if commands:
         page.offer_commands(TOKEN, lambda: CHOICES[PX4])
-    begin_s = time_s if sources[0].is_live else 0.0
-    show = Show(page, sources, begin_s)
     try:
         with chromium() as tab:
             Tab(tab, page.url)
@@ -106,9 +164,13 @@ def keep(path: Path, sources: Sequence[Source], time_s: float, *, commands: bool
             if commands:
                 tab.locator("input.mantine-TextInput-input").last.fill(TOKEN.text)
                 tab.get_by_role("button", name="Unlock").click()
+            shown_s = time_s() if callable(time_s) else time_s
+            begin_s = shown_s if sources[0].is_live else 0.0
+            show = Show(page, sources, begin_s - DRAWN_AFTER_S)
+            show.turn(begin_s - DRAWN_AFTER_S)
             show.turn(begin_s)
-            show.playback = show.playback.seek(time_s, begin_s).pause(begin_s)
-            for frame in range(5):
+            show.playback = show.playback.seek(shown_s, begin_s).pause(begin_s)
+            for frame in range(PLOTTED_AGAIN):
                 show.turn(begin_s + frame * FRAME_S)
             tab.wait_for_timeout(DRAWN_AFTER_MS)
             png = tab.screenshot()

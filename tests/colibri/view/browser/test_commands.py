@@ -8,6 +8,7 @@ from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES, PX4
 from colibri.view.page.page import Page
+from colibri.view.page.server import serve
 from colibri.view.run import Show
 
 pytestmark = pytest.mark.view
@@ -24,7 +25,7 @@ def vehicle() -> Iterator[LiveVehicle]:
 
 @pytest.fixture
 def page(vehicle: LiveVehicle) -> Iterator[Page]:
-    begun = Page([vehicle], 0)
+    begun = Page([vehicle], serve(0, "Colibri"))
     begun.offer_commands(TOKEN, lambda: CHOICES[PX4])
     yield begun
     begun.close()

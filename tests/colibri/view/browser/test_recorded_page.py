@@ -9,6 +9,7 @@ from PIL import Image
 
 from colibri.experiments.flight import fly
 from colibri.view.page.page import Page
+from colibri.view.page.server import serve
 from colibri.view.recorded import RecordedFlight
 from colibri.view.run import Show
 
@@ -26,7 +27,7 @@ def recorded() -> Iterator[RecordedFlight]:
 
 @pytest.fixture
 def page(recorded: RecordedFlight) -> Iterator[Page]:
-    begun = Page([recorded], 0)
+    begun = Page([recorded], serve(0, "Colibri"))
     yield begun
     begun.close()
 
@@ -40,8 +41,9 @@ def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: Recorde
         tab = Tab(tab_page, page.url)
         tab_page.get_by_text("spiral flight").wait_for()
         tab_page.get_by_text("position error, m").wait_for()
-        show.turn(1.0)
+        show.turn(0.5)
         show.turn(1.5)
+        show.turn(1.9)
         tab_page.locator(".mantine-Notification-closeButton").click()
         assert show.playback.plays
         tab_page.get_by_role("button", name="Pause").click()

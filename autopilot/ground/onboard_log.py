@@ -1,0 +1,52 @@
+"""The log that ground stations list and download: a ULog of each flight, from arming to disarming."""
+
+from collections.abc import Iterable
+
+from colibri.mavlink.files.flight_log import FlightLog
+from colibri.mavlink.files.tree import Files
+from colibri.mavlink.services.statustext import Line
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.ulog.recorder import Recorder
+
+LOGS = "logs"
+SAMPLE_EVERY_US = 40_000
+"""A log must come over a radio, and several fit into memory: PX4's, too, have fewer samples than the control loop."""
+
+
+class OnboardLog:
+    """Records snapshots and status texts while the rotors are armed."""
+
+    def __init__(self, recorder: Recorder, files: Files) -> None:
+        """Write what `recorder` makes of them into folder `logs` of `files`."""
+        self._recorder = recorder
+        self._log = FlightLog(files, (LOGS,))
+        self._snapshot: Snapshot | None = None
+        self._armed = False
+
+    @property
+    def name(self) -> str | None:
+        """Name of the log that is being written."""
+        return self._log.name
+
+    def update(self, snapshot: Snapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
+        """Record a snapshot, if it is new, and what was said since the last time; begin and end logs."""
+        begins, ends = armed and not self._armed, self._armed and not armed
+        self._armed = armed
+        if begins:
+            self._log.update(armed, now_us)
+            self._log.record(self._recorder.begin())
+        if self._log.name is None:
+            return
+        for line in said:
+            self._log.record(self._recorder.say(now_us, *line))
+        if snapshot is not None and snapshot is not self._snapshot:
+            self._log.record(self._recorder.update(snapshot))
+        self._snapshot = snapshot
+        if ends:
+            self._log.record(self._recorder.take())
+        self._log.update(armed, now_us)
+
+    def close(self) -> None:
+        """Close the log."""
+        self._log.record(self._recorder.take())
+        self._log.close()

@@ -1,0 +1,175 @@
+"""The topics of a ULog for other tools: MCAP, which Foxglove plays; a table of each topic as CSV or Parquet."""
+
+import csv
+import re
+from collections.abc import Callable, Iterator
+from heapq import merge
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import numpy as np
+
+from colibri.common.errors import Error
+
+if TYPE_CHECKING:
+    from pyulog import ULog
+
+LOG = "flight.ulg"
+"""In the folder of a flight."""
+_NS_PER_US = 1000
+_LOG_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "timestamp": {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}},
+        **{name: {"type": "integer"} for name in ("level", "line")},
+        **{name: {"type": "string"} for name in ("message", "name", "file")},
+    },
+}
+"""Of `foxglove.Log`, which Foxglove has a panel for."""
+_LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)
+"""Foxglove's level of each severity of a status text."""
+
+
+class ExportError(Error):
+    """A log cannot be exported; the message is the one line that a user needs."""
+
+
+def read_log(path: Path) -> tuple[Path, "ULog"]:
+    """Return the ULog at a path, or of the flight in that folder, and its own path.
+
+    Raises:
+        ExportError: There is none, or what reads it is not installed.
+    """
+    try:
+        from pyulog import ULog
+    except ModuleNotFoundError as error:
+        raise _missing("pyulog", "export") from error
+    log = path / LOG if path.is_dir() else path
+    try:
+        with log.open("rb") as file:
+            return log, ULog(file)
+    except OSError as error:
+        raise ExportError(f"{log}: {error.strerror}") from error
+    except Exception as error:  # whatever pyulog stumbles over in what is none
+        raise ExportError(f"{log} is no ULog") from error
+
+
+def write_mcap(log: "ULog", path: Path) -> Path:
+    """Write all topics as messages of JSON with their schemas, status texts as `foxglove.Log`; return the path.
+
+    Raises:
+        ExportError: What writes it is not installed.
+    """
+    try:
+        from mcap.writer import Writer
+    except ModuleNotFoundError as error:
+        raise _missing("mcap", "export") from error
+    with path.open("wb") as file:
+        writer: Any = Writer(file)  # parts of it have no types
+        writer.start(library="colibri")
+        streams = [_messages(topic, _channel(writer, name, name, schema)) for name, topic, schema in _topics(log)]
+        streams.append(_texts(log, _channel(writer, "logged_messages", "foxglove.Log", _LOG_SCHEMA)))
+        for time_us, channel, message in merge(*streams, key=lambda each: each[0]):
+            writer.add_message(channel, time_us * _NS_PER_US, msgspec.json.encode(message), time_us * _NS_PER_US)
+        writer.add_metadata("parameters", {name: str(value) for name, value in log.initial_parameters.items()})
+        writer.finish()
+    return path
+
+
+def write_csv(log: "ULog", folder: Path) -> Path:
+    """Write a table of each topic, `vehicle_attitude.csv` and so on; return the folder."""
+    for name, topic, _ in _topics(log):
+        with _table(folder, f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(topic.data)
+            table.writerows(zip(*(column.tolist() for column in topic.data.values()), strict=True))
+    return folder
+
+
+def write_parquet(log: "ULog", folder: Path) -> Path:
+    """Write a table of each topic, `vehicle_attitude.parquet` and so on; return the folder.
+
+    Raises:
+        ExportError: What writes it is not installed.
+    """
+    try:
+        from pyarrow import table
+        from pyarrow.parquet import write_table
+    except ModuleNotFoundError as error:
+        raise _missing("pyarrow", "parquet") from error
+    for name, topic, _ in _topics(log):
+        write_table(table(topic.data), _table(folder, f"{name}.parquet"))
+    return folder
+
+
+def _missing(module: str, extra: str) -> ExportError:
+    return ExportError(f"this needs {module}: pip install 'colibri-sitl[{extra}]'")
+
+
+def _table(folder: Path, name: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    return folder / name
+
+
+def _topics(log: "ULog") -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    """Yield name, data and JSON schema of each topic; a second one of the same name has its number behind it."""
+    for topic in log.data_list:
+        name = f"{topic.name}_{topic.multi_id}" if topic.multi_id else topic.name
+        yield name, topic, _schema(_tree(topic.data), [column.dtype for column in topic.data.values()])
+
+
+def _channel(writer: Any, topic: str, name: str, schema: dict[str, Any]) -> int:
+    number = writer.register_schema(name, "jsonschema", msgspec.json.encode(schema))
+    channel: int = writer.register_channel(topic, "json", number)
+    return channel
+
+
+def _messages(topic: Any, channel: int) -> Iterator[tuple[int, int, Any]]:
+    filled = _filled(_tree(topic.data))
+    rows = zip(*(column.tolist() for column in topic.data.values()), strict=True)
+    for time_us, row in zip(topic.data["timestamp"].tolist(), rows, strict=True):
+        yield time_us, channel, filled(row)
+
+
+def _texts(log: "ULog", channel: int) -> Iterator[tuple[int, int, Any]]:
+    for said in sorted(log.logged_messages, key=lambda each: each.timestamp):
+        seconds, rest_us = divmod(said.timestamp, 1_000_000)
+        time = {"sec": seconds, "nsec": rest_us * _NS_PER_US}
+        level = _LEVELS[min(max(said.log_level - ord("0"), 0), len(_LEVELS) - 1)]
+        yield (
+            said.timestamp,
+            channel,
+            {"timestamp": time, "level": level, "message": said.message, "name": "vehicle", "file": "", "line": 0},
+        )
+
+
+def _tree(names: dict[str, Any]) -> dict[str, Any]:
+    """Return the places of columns such as `esc[0].esc_rpm` as they are nested: `{"esc": {"0": {"esc_rpm": 3}}}`."""
+    tree: dict[str, Any] = {}
+    for place, name in enumerate(names):
+        *above, last = re.findall(r"[^.\[\]]+", name)
+        inner = tree
+        for part in above:
+            inner = inner.setdefault(part, {})
+        inner[last] = place
+    return tree
+
+
+def _filled(tree: Any) -> Callable[[tuple[Any, ...]], Any]:
+    """Return what makes a message of a row: objects, and lists where names are numbers."""
+    if isinstance(tree, int):
+        return lambda row: row[tree]
+    parts = {name: _filled(part) for name, part in tree.items()}
+    if "0" in parts:
+        elements = list(parts.values())
+        return lambda row: [part(row) for part in elements]
+    return lambda row: {name: part(row) for name, part in parts.items()}
+
+
+def _schema(tree: Any, types: list[np.dtype[Any]]) -> dict[str, Any]:
+    if isinstance(tree, int):
+        return {"type": "integer" if np.issubdtype(types[tree], np.integer) else "number"}
+    if "0" in tree:
+        return {"type": "array", "items": _schema(tree["0"], types)}
+    return {"type": "object", "properties": {name: _schema(part, types) for name, part in tree.items()}}

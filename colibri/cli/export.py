@@ -1,0 +1,43 @@
+"""`colibri export`: its options, and its call."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import fail
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri export`."""
+    add = parser.add_argument
+    add("log", type=Path, metavar="DIR|FILE.ulg", help="a flight by its folder, or any ULog, PX4's too")
+    add("--mcap", action="store_true", help="write flight.mcap beside it, for Foxglove")
+    add("--csv", action="store_true", help="write flight-topics/*.csv beside it, a table of each topic")
+    add("--parquet", action="store_true", help="write flight-topics/*.parquet beside it, a table of each topic")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def run(args: Namespace) -> int:
+    """Write the topics of a ULog in other formats; return the exit code."""
+    from colibri.analysis.export import read_log, write_csv, write_mcap, write_parquet
+    from colibri.common.errors import Error
+
+    if not (args.mcap or args.csv or args.parquet):
+        fail("export to what? --mcap, --csv, --parquet, or several of them")
+    written = []
+    try:
+        path, log = read_log(args.log)
+        tables = path.with_name(f"{path.stem}-topics")
+        if args.mcap:
+            written.append(write_mcap(log, path.with_suffix(".mcap")))
+        if args.csv:
+            written.append(write_csv(log, tables))
+        if args.parquet:
+            written.append(write_parquet(log, tables))
+    except Error as error:
+        fail(str(error))
+    except OSError as error:
+        fail(f"cannot write {error.filename or args.log}: {error.strerror}")
+    if not args.quiet:
+        print(*dict.fromkeys(written), sep="\n")  # noqa: T201
+    return 0

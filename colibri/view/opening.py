@@ -1,0 +1,32 @@
+"""The page of recorded flights: served before what reads them is loaded, as a browser loads the page meanwhile."""
+
+import webbrowser
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from colibri.common.process.lifecycle import loading
+from colibri.view.page.server import address, serve, stop
+
+_NEEDED = ("provenance.json", "plant.csv", "autopilot.csv")
+
+
+def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Show flights that were flown, until interrupted.
+
+    Raises:
+        ViewError: One cannot be read, or the port is taken.
+    """
+    with ExitStack() as held:
+        if not all((folder / name).is_file() for folder in folders for name in _NEEDED):
+            from colibri.view.run import read_flights
+
+            read_flights(folders, held)  # raises, before a browser is opened in vain
+        server = serve(port, "Colibri")
+        held.callback(stop, server)
+        say(address(server))
+        if browser:
+            webbrowser.open(address(server))
+        with loading():
+            from colibri.view.run import play
+        play(folders, server)

@@ -1,0 +1,61 @@
+"""The process that predicts the horizons of a recorded flight: what it imports takes long, and the page needs none."""
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.ground.forecast import Forecaster
+from colibri.common.errors import Error
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import plan_of
+from colibri.flights.replay import TLOG, answers_of
+
+EVERY = 5
+"""Control samples between two horizons that are kept: 25 a second at 125 Hz."""
+_NICE = 10
+
+
+def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
+    """Yield time and points of each horizon of a flight, (k, 3), the first where the vehicle took itself to be.
+
+    Raises:
+        Error: The flight cannot be replayed, or its control law does not plan ahead.
+    """
+    plan = plan_of(folder)
+    loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.law)
+    forecaster = _forecaster(plan, loop)
+    decisions = 0
+    for answer in answers_of(folder / TLOG):
+        if answer.step.decision is None or answer.known is None:
+            continue
+        decisions += 1
+        if decisions % EVERY == 1:
+            points = forecaster.forecast(loop.state(answer.known), None, answer.step.decision.diagnostics)
+            if points:
+                here = answer.known.position_enu_m
+                yield answer.time_us / 1e6, np.array([here, *(point.position_enu_m for point in points)])
+
+
+def _forecaster(plan: FlightPlan, loop: ControlLoop) -> Forecaster:
+    return Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)
+
+
+def main() -> int:
+    """Print the horizons of the flight of a folder; return the exit code."""
+    os.nice(_NICE)
+    try:
+        for time_s, points in predicted(Path(sys.argv[1])):
+            print(time_s, *points.ravel().round(4).tolist())  # noqa: T201
+    except (Error, OSError) as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,126 @@
+"""The log that ground stations download: what is recorded, and that it is whole at every instant."""
+
+from io import BytesIO
+
+import pytest
+from pyulog import ULog
+
+from colibri.autopilot.ground.onboard_log import SAMPLE_EVERY_US, OnboardLog
+from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.tree import Quota, Reading
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.services.statustext import INFO, Line
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.ulog.recorder import Recorder
+
+SAMPLE_US = 8_000
+
+
+class Flight:
+    """A vehicle whose log is kept in memory.
+
+    Attributes:
+        log: Of the vehicle.
+        memory: What it is kept in.
+        parameters: Of the vehicle.
+    """
+
+    def __init__(self, memory: Memory | None = None) -> None:
+        self.memory = memory or Memory()
+        self.memory.make_folder(("logs",))
+        self.parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
+        self.log = self.begun()
+        self.now_us = 0
+
+    def begun(self) -> OnboardLog:
+        recorder = Recorder("Test", 1, self.parameters, with_battery=True, sample_every_us=SAMPLE_EVERY_US)
+        return OnboardLog(recorder, self.memory)
+
+    def run(self, samples: int, *said: str, armed: bool = True) -> None:
+        for number in range(samples):
+            self.now_us += SAMPLE_US
+            snapshot = Snapshot(time_us=self.now_us, armed=armed)
+            lines = [Line(INFO, text) for text in said] if number == 0 else []
+            self.log.update(snapshot, lines, self.now_us, armed=armed)
+            self.log.update(snapshot, [], self.now_us + SAMPLE_US // 2, armed=armed)  # a frame between two samples
+
+    def content(self, name: str) -> bytes:
+        reading = self.memory.open(("logs", name))
+        assert isinstance(reading, Reading)
+        return bytes(reading.read(0, reading.size))  # type: ignore[arg-type]
+
+    def read(self, name: str = "00001.ulg") -> ULog:
+        log = ULog(BytesIO(self.content(name)))
+        assert not log.file_corruption
+        return log
+
+
+@pytest.fixture
+def flight() -> Flight:
+    return Flight()
+
+
+def times_us(log: ULog, topic: str = "vehicle_local_position") -> list[int]:
+    found: list[int] = log.get_dataset(topic).data["timestamp"].tolist()
+    return found
+
+
+def names(flight: Flight) -> list[str]:
+    return [entry.name for entry in flight.memory.list(("logs",))]  # type: ignore[union-attr]
+
+
+def test_there_is_one_from_arming_to_disarming(flight: Flight) -> None:
+    flight.run(10, "ready", armed=False)
+    assert names(flight) == []
+    flight.run(101, "rotors armed")
+    flight.run(1, "landed, rotors stopped", armed=False)
+    flight.run(10, "ready again", armed=False)
+    log = flight.read()
+    assert [said.message for said in log.logged_messages] == ["rotors armed", "landed, rotors stopped"]
+    assert times_us(log) == list(range(11 * SAMPLE_US, 112 * SAMPLE_US, SAMPLE_EVERY_US))
+    assert log.get_dataset("vehicle_status").data["arming_state"].tolist() == [2, 1]
+    flight.run(5)
+    assert names(flight) == ["00001.ulg", "00002.ulg"]
+
+
+def test_it_is_whole_at_every_instant_and_at_most_a_second_behind(flight: Flight) -> None:
+    for _ in range(60):
+        flight.run(10)
+        if flight.content("00001.ulg"):
+            log = flight.read()
+            assert log.initial_parameters == {"A": 1.0}
+            newest_us = times_us(log)[-1] if log.data_list else 0
+            assert newest_us > flight.now_us - 1_100_000
+        else:
+            assert flight.now_us <= 1_100_000
+
+
+def test_changes_are_recorded_when_they_happen(flight: Flight) -> None:
+    flight.run(3)
+    flight.parameters.set("A", 2.0)
+    flight.run(200, armed=True)
+    flight.run(1, armed=False)
+    assert [change[1:] for change in flight.read().changed_parameters] == [("A", 2.0)]
+    flight.run(1)
+    flight.run(1, armed=False)
+    assert flight.read("00002.ulg").initial_parameters == {"A": 2.0}
+
+
+def test_who_was_killed_in_flight_begins_another_one(flight: Flight) -> None:
+    flight.run(300)
+    flight.log = flight.begun()
+    flight.run(300)
+    flight.log.close()
+    assert names(flight) == ["00001.ulg", "00002.ulg"]
+    assert flight.log.name is None
+    first, second = (times_us(flight.read(name)) for name in names(flight))
+    assert first[0] < second[0]
+    assert second[-1] > flight.now_us - SAMPLE_EVERY_US
+
+
+def test_without_room_the_flight_goes_on() -> None:
+    flight = Flight(Memory(Quota(20_000, 10)))
+    flight.run(2000)
+    assert flight.log.name is None
+    assert len(flight.content("00001.ulg")) <= 20_000
+    assert times_us(flight.read())

@@ -1,0 +1,124 @@
+"""`colibri export`: what is written has each number of the ULog, by the readers of its formats."""
+
+import csv
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from pyarrow.parquet import read_table
+from pyulog import ULog
+
+from colibri.cli.main import main
+
+FLIGHT = ["fly", "spiral", "--quiet", "--no-figures", "--duration", "2", "--feedback", "sensors", "--link", "memory"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("flight")
+    assert main([*FLIGHT, "--out", str(out)]) == 0
+    assert main(["export", str(out), "--mcap", "--csv", "--parquet", "--quiet"]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def log(folder: Path) -> ULog:
+    return ULog(str(folder / "flight.ulg"))
+
+
+def flat(value: Any, name: str) -> dict[str, Any]:
+    """Return a message by the names that a ULog has for its fields."""
+    if isinstance(value, dict):
+        inner = [flat(part, f"{name}.{key}" if name else key) for key, part in value.items()]
+    elif isinstance(value, list):
+        inner = [flat(part, f"{name}[{place}]") for place, part in enumerate(value)]
+    else:
+        return {name: value}
+    return {key: part for each in inner for key, part in each.items()}
+
+
+def known(number: float) -> float | None:
+    """Return what JSON has of a number: none of what is no number."""
+    return number if number == number else None
+
+
+def test_each_message_of_the_mcap_is_a_row_of_its_topic(folder: Path, log: ULog) -> None:
+    found: dict[str, list[dict[str, Any]]] = {}
+    times_us = []
+    with (folder / "flight.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            assert schema is not None
+            content = json.loads(message.data)
+            assert content.keys() == json.loads(schema.data)["properties"].keys()
+            if channel.topic == "logged_messages":
+                assert (schema.name, content["message"]) == ("foxglove.Log", "spiral, profile flight, whole-lpv-mpc")
+                continue
+            assert message.log_time == 1000 * content["timestamp"]
+            found.setdefault(channel.topic, []).append(flat(content, ""))
+            times_us.append(message.log_time)
+    assert times_us == sorted(times_us)
+    assert found.keys() == {topic.name for topic in log.data_list}
+    for topic in log.data_list:
+        rows = zip(*(map(known, column.tolist()) for column in topic.data.values()), strict=True)
+        assert found[topic.name] == [dict(zip(topic.data, row, strict=True)) for row in rows]
+
+
+def test_the_mcap_has_the_parameters(folder: Path, log: ULog) -> None:
+    with (folder / "flight.mcap").open("rb") as file:
+        (metadata,) = make_reader(file).iter_metadata()
+    assert metadata.metadata == {name: str(value) for name, value in log.initial_parameters.items()}
+
+
+def test_each_topic_is_a_table(folder: Path, log: ULog) -> None:
+    tables = folder / "flight-topics"
+    assert len(list(tables.iterdir())) == 2 * len(log.data_list)
+    for topic in log.data_list:
+        with (tables / f"{topic.name}.csv").open(encoding="utf-8") as file:
+            names, *rows = csv.reader(file)
+        assert names == list(topic.data)
+        parquet = read_table(tables / f"{topic.name}.parquet")
+        for place, (name, column) in enumerate(topic.data.items()):
+            assert [row[place] for row in rows] == list(map(str, column.tolist()))
+            assert str(parquet[name].to_pylist()) == str(column.tolist())
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "said"),
+    [
+        (b"", [], "export to what? --mcap, --csv, --parquet, or several of them"),
+        (b"no log", ["--csv"], "is no ULog"),
+        (None, ["--csv"], "No such file or directory"),
+    ],
+)
+def test_what_cannot_be_exported_is_said_in_a_line(
+    content: bytes | None, options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        (tmp_path / "flight.ulg").write_bytes(content)
+    with pytest.raises(SystemExit) as ended:
+        main(["export", str(tmp_path), *options])
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "option", "extra"),
+    [("pyulog", "--csv", "export"), ("mcap.writer", "--mcap", "export"), ("pyarrow", "--parquet", "parquet")],
+)
+def test_where_a_library_is_missing_it_is_said_how_to_get_it(
+    module: str,
+    option: str,
+    extra: str,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(SystemExit):
+        main(["export", str(folder), option])
+    assert f"pip install 'colibri-sitl[{extra}]'" in capsys.readouterr().err

@@ -1,0 +1,122 @@
+"""The log that a ground station downloads from `colibri sitl`: the ULog of the flight, byte for byte."""
+
+from io import BytesIO
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyulog import ULog
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.wire.dialect import mav
+from tests.flights.processes.log_client import LogClient
+from tools.harness.observer import Observer
+from tools.harness.processes import rows
+from tools.harness.sitl_process import Vehicle, vehicle
+
+HEIGHT_M = 2.0
+ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+
+
+class Flown:
+    """A flight of `colibri sitl`, over: what was downloaded of it, and what is on disk.
+
+    Attributes:
+        content: The log as it was downloaded.
+        lost: How many datagrams of the download were.
+    """
+
+    def __init__(self, flown: Vehicle, out: Path) -> None:
+        with LogClient(flown.port, seed=1) as client:
+            (size,) = client.sizes()
+            self.content, self.lost = client.download(0, size), client.lost
+        self.texts = flown.seen.texts
+        self.logs = flown.state / "0" / "logs"
+        self.log, self.out = ULog(BytesIO(self.content)), out / "0"
+
+    def __getitem__(self, topic: str) -> dict[str, Any]:
+        found: dict[str, Any] = self.log.get_dataset(topic).data
+        return found
+
+
+def fly(seen: Observer) -> None:
+    """Take off, stay, land."""
+    for number, params in (
+        (mav.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, nan, nan, nan, HEIGHT_M)),
+        (mav.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, *[0.0] * 6)),
+    ):
+        assert seen.request("COMMAND_ACK", "COMMAND_LONG", number, 0, *params).result == ACCEPTED
+    seen.wait(lambda sight: sight.armed and sight.mode is Mode.HOLD, "the height")
+    assert seen.request("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7).result == ACCEPTED
+    seen.wait_until_disarmed()
+
+
+@pytest.fixture(scope="module", params=["state", "sensors"])
+def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    folder = tmp_path_factory.mktemp("flown")
+    out = folder / "out"
+    with vehicle(folder, "--out", str(out), "--feedback", request.param, speed=4.0) as flying:
+        if request.param == "sensors":
+            flying.seen.wait(lambda sight: sight.time_s > 8.0, "an estimate")
+        fly(flying.seen)
+        return Flown(flying, out)
+
+
+def test_what_is_downloaded_over_a_link_that_loses_is_the_file_on_disk(flown: Flown) -> None:
+    (log,) = flown.logs.iterdir()
+    assert log.name == "00001.ulg"
+    assert flown.content == log.read_bytes()
+    assert flown.lost > 50
+    assert not flown.log.file_corruption
+
+
+def test_its_numbers_are_those_of_the_flight(flown: Flown) -> None:
+    """On sensors the state is the estimate, and off the truth as its sensors are."""
+    on_sensors = "sensor_combined" in {topic.name for topic in flown.log.data_list}
+    near = 1.0 if on_sensors else 2e-6
+    position, truth = flown["vehicle_local_position"], rows(flown.out / "plant.csv")
+    places = np.searchsorted(np.rint(1e6 * truth["t"]), position["timestamp"])
+    assert np.array_equal(np.rint(1e6 * truth["t"])[places], position["timestamp"])
+    assert set(np.diff(position["timestamp"])) == {40_000}
+    assert -position["z"].min() == pytest.approx(HEIGHT_M, abs=max(near, 0.3))
+    for name, column in {"x": "y", "y": "x"}.items():
+        assert position[name] == pytest.approx(truth[column][places], abs=near, rel=1e-6), name
+    assert -position["z"] == pytest.approx(truth["z"][places], abs=near, rel=1e-6)
+    rates = flown["vehicle_angular_velocity"]
+    for name, column, sign in (("xyz[0]", "p", 1.0), ("xyz[1]", "q", -1.0), ("xyz[2]", "r", -1.0)):
+        assert sign * rates[name] == pytest.approx(truth[column][places], abs=near, rel=1e-6), name
+
+
+def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None:
+    beside = ULog(str(flown.out / "flight.ulg"))
+    for topic, names in {
+        "vehicle_attitude": "q[0] q[1] q[2] q[3]",
+        "vehicle_local_position": "x y z vx vy vz",
+        "actuator_motors": "control[0] control[3]",
+        "trajectory_setpoint": "position[2] velocity[2]",
+        "mpc_status": "cost iterations solve_time_us qp_status",
+    }.items():
+        few, all_of_them = flown[topic], beside.get_dataset(topic).data
+        at = np.searchsorted(all_of_them["timestamp"], few["timestamp"])
+        for name in names.split():
+            assert np.array_equal(few[name], all_of_them[name][at], equal_nan=True), (topic, name)
+
+
+def test_both_logs_have_the_status_texts(flown: Flown) -> None:
+    said = [line.message for line in flown.log.logged_messages]
+    assert "landed, rotors stopped" in said
+    assert set(said) <= set(flown.texts)
+    beside = [line.message for line in ULog(str(flown.out / "flight.ulg")).logged_messages]
+    assert [text for text in beside if text in said] == said
+    assert set(flown.texts) <= set(beside)
+
+
+def test_it_has_the_battery_the_status_and_the_parameters(flown: Flown) -> None:
+    battery = flown["battery_status"]
+    assert 10.0 < battery["voltage_v"][-1] < 13.0
+    assert 0.9 < battery["remaining"][-1] < battery["remaining"][0] <= 1.0
+    arming = flown["vehicle_status"]["arming_state"].tolist()
+    assert arming == [1, *[2] * (len(arming) - 2), 1]
+    assert flown.log.initial_parameters["MPC_XY_CRUISE"] > 0.0
