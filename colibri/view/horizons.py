@@ -1,9 +1,10 @@
 """Predicted horizons of a recorded flight: its logs hold none, so the autopilot answers the same frames once more.
 
-That happens in a process of its own, meanwhile the flight can be watched already. `python -m colibri.view.prediction
-DIR` prints a horizon a line, its time and then the coordinates of its points.
+That happens in a process of its own, meanwhile the flight can be watched already: `python -m colibri.view.horizons DIR`
+prints a horizon a line, its time and then the coordinates of its points.
 """
 
+import os
 import subprocess
 import sys
 from bisect import bisect_right
@@ -12,11 +13,14 @@ from threading import Thread
 
 import numpy as np
 
+from colibri.common.errors import Error
 from colibri.common.types import Array
 from colibri.view.snapshot import NO_POINTS
 
 _STALE_S = 0.3
 """A horizon that old is not shown: the controller's QP was not solved since."""
+_NICE = 15
+"""The page comes first, and the browser that draws it."""
 
 
 class Horizons:
@@ -44,7 +48,7 @@ class HorizonProcess:
 
     def __init__(self, folder: Path, horizons: Horizons) -> None:
         """Begin."""
-        command = [sys.executable, "-m", "colibri.view.prediction", str(folder)]
+        command = [sys.executable, "-m", "colibri.view.horizons", str(folder)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self._thread = Thread(target=self._read, args=(horizons,), daemon=True)
         self._thread.start()
@@ -63,5 +67,25 @@ class HorizonProcess:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
+                if not line.endswith("\n"):  # it was ended in the middle of it
+                    return
                 time_s, *points = map(float, line.split())
                 horizons.add(time_s, np.reshape(points, (-1, 3)))
+
+
+def main() -> int:
+    """Print the horizons of the flight of a folder; return the exit code."""
+    os.nice(_NICE)
+    from colibri.view.prediction import predicted  # takes a second of a core, which the page does not have to wait for
+
+    try:
+        for time_s, points in predicted(Path(sys.argv[1])):
+            print(time_s, *points.ravel().round(4).tolist())  # noqa: T201
+    except (Error, OSError) as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

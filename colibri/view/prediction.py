@@ -1,7 +1,5 @@
-"""The process that predicts the horizons of a recorded flight: what it imports takes long, and the page needs none."""
+"""The horizons that the autopilot predicted in a recorded flight: it answers the same frames once more."""
 
-import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,7 +7,6 @@ import numpy as np
 
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.ground.forecast import Forecaster
-from colibri.common.errors import Error
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
@@ -17,7 +14,6 @@ from colibri.flights.replay import TLOG, answers_of
 
 EVERY = 5
 """Control samples between two horizons that are kept: 25 a second at 125 Hz."""
-_NICE = 10
 
 
 def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
@@ -43,19 +39,3 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
 
 def _forecaster(plan: FlightPlan, loop: ControlLoop) -> Forecaster:
     return Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)
-
-
-def main() -> int:
-    """Print the horizons of the flight of a folder; return the exit code."""
-    os.nice(_NICE)
-    try:
-        for time_s, points in predicted(Path(sys.argv[1])):
-            print(time_s, *points.ravel().round(4).tolist())  # noqa: T201
-    except (Error, OSError) as error:
-        print(error, file=sys.stderr)  # noqa: T201
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -31,8 +31,9 @@ WORDS_HZ = 5.0
 """How often words and time line change: an eye reads no faster."""
 PLOTS_HZ = 2.0
 """How often plots change, which are sent whole, and drawn anew: their mark moves by a pixel or two."""
-DRAWN_AFTER_S = 1.0
-"""A browser that has come draws words and plots first: a scene that moves meanwhile would hold it up."""
+PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
+"""How long a browser is left alone with words and plots once it has laid out the page, and for that at most: a scene
+that moves meanwhile would hold it up."""
 
 
 class Show:
@@ -52,16 +53,17 @@ class Show:
         self._order = order
         self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
         self._words_at_s = self._plots_at_s = now_s
-        self._plays_at_s: float | None = None
+        self._begins_at_s = inf
+        self._has_begun = False
         self._shown: object = None
         self._is_told = self._is_plotted = False
 
     def turn(self, now_s: float) -> None:
         """Do what was asked for, and show what is now."""
-        if self._plays_at_s is None and self._page.watched:
-            self._plays_at_s = now_s + DRAWN_AFTER_S
-        if self._plays_at_s is not None and now_s >= self._plays_at_s:
-            self._plays_at_s = inf
+        if not self._has_begun and self._page.watched:
+            self._begins_at_s = min(self._begins_at_s, now_s + (PLOTTED_AFTER_S if self._page.laid_out else WAITS_S))
+        if not self._has_begun and now_s >= self._begins_at_s:
+            self._has_begun = True
             self._page.reveal([source.at(now_s) for source in self._sources])
             self._shown = None
             self.playback = self.playback.play(now_s)

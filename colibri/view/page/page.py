@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from queue import Empty
 
 import numpy as np
+import viser
 
 from colibri.common.types import Vector
 from colibri.view.access import Token
@@ -27,6 +28,7 @@ class Page:
         server: viser's.
         url: Its address.
         controls: What it was told.
+        laid_out: Whether some browser has put the panels in their places: its camera has another aspect from then on.
     """
 
     def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
@@ -35,6 +37,7 @@ class Page:
         self._names = [source.name for source in sources]
         self.server = server
         self.url = address(server)
+        self.laid_out = False
         self._set_up()
 
     def _set_up(self) -> None:
@@ -60,6 +63,7 @@ class Page:
         self._plots.show([source.charts() for source in self._sources])
         panel.dock_right()
         panel.set_width(_RIGHT_PX)
+        self.server.on_client_connect(self._await_layout)
 
     @property
     def watched(self) -> bool:
@@ -80,6 +84,12 @@ class Page:
         add_ground(self.server.scene, self._ground_m, self._extent_m)
         self._around = [SurroundingsScene(self.server.scene, number) for number in range(len(self._sources))]
         self._vehicles = self._built()
+
+    def _await_layout(self, client: viser.ClientHandle) -> None:
+        def note(_: viser.CameraHandle) -> None:
+            self.laid_out = True
+
+        client.camera.on_update(note)
 
     def done(self) -> Iterator[Done]:
         """Yield what was done since last asked; what concerns only the picture is taken care of."""

@@ -10,7 +10,7 @@ from colibri.experiments.flight import Flight, fly
 from colibri.view.horizons import Horizons
 from colibri.view.prediction import predicted
 from colibri.view.recorded import RecordedFlight
-from colibri.view.run import DRAWN_AFTER_S, Show, export, read_flights
+from colibri.view.run import PLOTTED_AFTER_S, WAITS_S, Show, export, read_flights
 from colibri.view.snapshot import ViewError
 
 
@@ -82,7 +82,7 @@ class Recorder:
     """A page that nobody sees: what was shown on it, and what shall have been done on it."""
 
     def __init__(self) -> None:
-        self.watched = True
+        self.watched, self.laid_out = True, False
         self.revealed = False
         self.shown: list[float] = []
         self.plays: list[bool] = []
@@ -113,8 +113,10 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     page = Recorder()
     show = Show(page, [recorded], 9.0)  # type: ignore[arg-type]
     show.turn(9.0)
+    page.laid_out = True
+    show.turn(10.0 - PLOTTED_AFTER_S)
     assert not page.revealed  # a browser that has come draws the rest first
-    show.turn(9.0 + DRAWN_AFTER_S)
+    show.turn(10.0)
     assert page.revealed
     show.turn(10.5)
     page.waiting = [Done("speed", "0.5x")]
@@ -127,6 +129,16 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     assert page.shown == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
     assert page.plays == [False, True, True, True, False, False]
     assert page.plotted == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
+
+
+def test_a_browser_that_lays_nothing_out_is_not_waited_for_longer(recorded: RecordedFlight) -> None:
+    page = Recorder()
+    show = Show(page, [recorded], 10.0)  # type: ignore[arg-type]
+    show.turn(10.0)
+    show.turn(9.9 + WAITS_S)
+    assert not page.revealed
+    show.turn(10.0 + WAITS_S)
+    assert page.revealed
 
 
 def test_an_export_needs_nothing_else(flight: Flight, tmp_path: Path) -> None:

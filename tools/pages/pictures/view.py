@@ -26,7 +26,7 @@ from colibri.view.modes import CHOICES, PX4
 from colibri.view.observer import Observer
 from colibri.view.page.page import Page
 from colibri.view.page.server import serve
-from colibri.view.run import DRAWN_AFTER_S, Show, read_flights
+from colibri.view.run import WAITS_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
 from tools.pages.pictures.watched import Watched
@@ -166,8 +166,8 @@ def keep(path: Path, sources: Sequence[Source], time_s: float | Callable[[], flo
                 tab.get_by_role("button", name="Unlock").click()
             shown_s = time_s() if callable(time_s) else time_s
             begin_s = shown_s if sources[0].is_live else 0.0
-            show = Show(page, sources, begin_s - DRAWN_AFTER_S)
-            show.turn(begin_s - DRAWN_AFTER_S)
+            show = Show(page, sources, begin_s - WAITS_S)
+            show.turn(begin_s - WAITS_S)
             show.turn(begin_s)
             show.playback = show.playback.seek(shown_s, begin_s).pause(begin_s)
             for frame in range(PLOTTED_AGAIN):

@@ -42,8 +42,8 @@ def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: Recorde
         tab_page.get_by_text("spiral flight").wait_for()
         tab_page.get_by_text("position error, m").wait_for()
         show.turn(0.5)
+        show.turn(1.0)
         show.turn(1.5)
-        show.turn(1.9)
         tab_page.locator(".mantine-Notification-closeButton").click()
         assert show.playback.plays
         tab_page.get_by_role("button", name="Pause").click()
