@@ -9,9 +9,6 @@ from colibri.companion.identification.fit import Fit, RateLog, fit
 from colibri.companion.response_file import response_text
 from colibri.companion.stacks.stack import Response
 
-_PART_OF_THE_MOST = 0.5
-"""So much a law may use of the acceleration that a rate loop of known time constant asks for at the largest command."""
-
 
 class Identified(NamedTuple):
     """A response, the text of its file, and the fit that it comes from."""
@@ -44,10 +41,13 @@ def identified(companion: Companion) -> Identified:
 
 
 def _of_second_order(response: Response, found: Fit) -> Response:
-    """Return a response with the lags of its accelerations, and with as much of them as that rate loop gives."""
+    """Return a response with the lags of its accelerations, and with as much of them as its rate loop asks for at most.
+
+    A law that was built for less of it than there is would brake late where it is thrown off its track, and swing.
+    """
     p, q, r = found.acceleration_lag_s.tolist()
     most = (
-        max(assumed, _PART_OF_THE_MOST * rate / lag_s)
+        max(assumed, rate / lag_s)
         for assumed, rate, lag_s in zip(
             response.max_acceleration_rad_s2, response.max_rate_rad_s, response.time_constant_s, strict=True
         )

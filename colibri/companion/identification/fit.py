@@ -19,6 +19,8 @@ _NEAR = 6
 _TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 36)
 _ACCELERATION_LAGS_S = np.geomspace(0.008, 0.15, 10)
 _FIRST_ORDER = np.zeros(1)
+_LEAST_LAG_S = 0.004
+"""A shorter one of the acceleration is none."""
 _CLEARLY_LESS = 0.9
 """Of what a first order leaves unexplained, a second one must leave less than this."""
 _LEAST_SAMPLES = 200
@@ -89,7 +91,7 @@ def fit(log: RateLog) -> Fit:
             f"identification: a lag explains {100.0 * max(explained.min(), 0.0):.0f} % of the rate {axis}, "
             f"less than {100 * MIN_EXPLAINED:.0f}: fly it again, in less wind"
         )
-    lags, compared = found.lags_s, measured[_LATENCIES:]
+    lags, compared = np.where(found.lags_s < _LEAST_LAG_S, 0.0, found.lags_s), measured[_LATENCIES:]
     modelled = np.stack([_late(_lagged(commands[:, axis], *lags[axis]), found.late) for axis in range(3)], axis=1)
     modelled += (compared - modelled).mean(axis=0)
     latency_s = found.late * _GRID_S
@@ -152,14 +154,15 @@ def _late(rates: Array, late: int) -> Array:
 
 def _lagged(commands: Array, lag_s: float, behind_s: float) -> Array:
     """Return commands on the grid after a lag: that of first order, or of second where the acceleration lags, too."""
-    from scipy.signal import lfilter, lfilter_zi
+    from scipy.signal import lfilter
 
     if behind_s == 0.0:
         stays = float(np.exp(-_GRID_S / lag_s))
         b, a = np.array([0.0, 1.0 - stays]), np.array([1.0, -stays])
     else:
         b, a = _second_order(lag_s, behind_s)
-    rates: Array = lfilter(b, a, commands, zi=lfilter_zi(b, a) * commands[0])[0]
+    at_rest = np.cumsum((b - a)[:0:-1])[::-1]
+    rates: Array = lfilter(b, a, commands, zi=at_rest * commands[0])[0]
     return rates
 
 

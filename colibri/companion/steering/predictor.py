@@ -23,8 +23,8 @@ from colibri.plant.vehicle.description import Vehicle
 _FOLLOWS_US = 150_000
 """After a longer gap nothing is known of disturbances."""
 _KEPT_US = 1_000_000
-_DRIFT_1_S = 4.0
-"""How fast the drift of an estimate is learned: PX4 spreads a correction by GPS over a quarter of a second."""
+_DRIFT_1_S = 8.0
+"""How fast the drift of an estimate is learned: PX4 spreads each correction by GPS over a quarter of a second."""
 _MAX_DRIFT_M_S = 1.0
 _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
