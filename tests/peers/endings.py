@@ -145,8 +145,8 @@ CASES: dict[str, Case] = {
     "pilot": Case(PATIENT, lambda bench: bench.order(mav.MAV_CMD_DO_SET_MODE, *RETURN)),
     "interrupted": Case(PATIENT, _interrupt),
     "late states": Case(FlightLimits(min_pace=0.01, max_gap_s=1.0), lambda bench: bench.freeze(0.3)),
-    "box": Case(FlightLimits(margin_m=0.01, max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0), _nothing),
-    "tilt": Case(FlightLimits(max_tilt_deg=4.0, max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0), _nothing),
+    "box": Case(FlightLimits(margin_m=0.05, max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0), _nothing),
+    "tilt": Case(FlightLimits(max_tilt_deg=12.0, max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0), _nothing),
     "error": Case(FlightLimits(max_error_m=0.02, max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0), _nothing),
     "estimate lost": Case(PATIENT, lambda bench: bench.set("SIM_GPS_USED", 0)),
 }
