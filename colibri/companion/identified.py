@@ -30,9 +30,27 @@ def identified(companion: Companion) -> Identified:
     found = fit(RateLog(commanded[:, 0], commanded[:, 1:], measured[:, 0], measured[:, 1:]))
     p, q, r = found.time_constant_s.tolist()
     response = stack.response._replace(time_constant_s=(p, q, r), latency_s=found.latency_s)
+    if found.order > 1:
+        response = _of_second_order(response, found)
     explained = ", ".join(f"{100.0 * part:.0f}" for part in found.explained)
     remarks = [
-        f"Identified in flight on {stack.name}: a first-order lag of the body rates p, q, r.",
+        f"Identified in flight on {stack.name}: a lag of order {found.order} of the body rates p, q, r.",
         f"It explains {explained} % of their variance. For colibri companion --response.",
     ]
     return Identified(response, response_text(response, companion.thrust_scale, remarks), found)
+
+
+def _of_second_order(response: Response, found: Fit) -> Response:
+    """Return a response with the lags of its accelerations, and with as much of them as its rate loop asks for at most.
+
+    A law that was built for less of it than there is would brake late where it is thrown off its track, and swing.
+    """
+    p, q, r = found.acceleration_lag_s.tolist()
+    most = (
+        max(assumed, rate / lag_s)
+        for assumed, rate, lag_s in zip(
+            response.max_acceleration_rad_s2, response.max_rate_rad_s, response.time_constant_s, strict=True
+        )
+    )
+    most_p, most_q, most_r = most
+    return response._replace(acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))

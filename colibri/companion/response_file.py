@@ -11,6 +11,7 @@ from colibri.companion.stacks.stack import Response
 
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
 Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]
+Lag: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
 Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
 
 
@@ -22,6 +23,7 @@ class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     thrust_lag_s: NotNegative
     max_rate_rad_s: tuple[Positive, Positive, Positive]
     max_acceleration_rad_s2: tuple[Positive, Positive, Positive]
+    acceleration_lag_s: tuple[Lag, Lag, Lag] = (0.0, 0.0, 0.0)
     thrust_scale: Scale = 1.0
     """Thrust that was made, in parts of the one that the vehicle's parameters mean."""
 

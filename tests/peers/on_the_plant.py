@@ -60,12 +60,21 @@ def plant(whom: str, folder: Path) -> Iterator[None]:
 @contextmanager
 def px4(build: Path, parameters: Path, folder: Path) -> Iterator[None]:
     """Start PX4 with the parameters in its environment, as docs/simulators.md says."""
+    with killed_after(px4_command(build), folder, os.environ | px4_settings(parameters, SPEED)):
+        yield
+
+
+def px4_command(build: Path) -> list[str]:
+    """Return how PX4 is started for our plant."""
+    return [str(build / "bin" / "px4"), "-d", str(build / "etc"), "-s", "etc/init.d-posix/rcS"]
+
+
+def px4_settings(parameters: Path, speed: int) -> dict[str, str]:
+    """Return PX4's environment: a file of parameters, and what it needs without sticks and ground station."""
     lines = [line.split() for line in parameters.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     given = {f"PX4_PARAM_{name}": value for _, _, name, value, _ in lines}
-    others = {"PX4_SIM_MODEL": "none_iris", "PX4_SIM_SPEED_FACTOR": str(SPEED), "PX4_PARAM_NAV_DLL_ACT": "0"}
-    command = [str(build / "bin" / "px4"), "-d", str(build / "etc"), "-s", "etc/init.d-posix/rcS"]
-    with killed_after(command, folder, os.environ | given | others | {"PX4_PARAM_COM_RCL_EXCEPT": "7"}):
-        yield
+    others = {"PX4_SIM_MODEL": "none_iris", "PX4_SIM_SPEED_FACTOR": str(speed), "PX4_PARAM_NAV_DLL_ACT": "0"}
+    return given | others | {"PX4_PARAM_COM_RCL_EXCEPT": "7"}
 
 
 @contextmanager

@@ -2,10 +2,14 @@
 
 Of the exchanges of the last seconds the one that was quickest tells the offset: what delayed the others was jitter,
 which is all in one of their two ways (the clock filter of RFC 5905, section 10). An older one must have been so much
-quicker as the clocks may have drifted apart since. https://mavlink.io/en/services/timesync.html
+quicker as the clocks may have drifted apart since. A simulator's clock may go wrong by percents: where the exchanges
+show it, they are taken at their drift. https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
+from collections.abc import Iterable
+from math import sqrt
+from statistics import median
 from typing import NamedTuple
 
 NS_PER_US = 1000
@@ -16,7 +20,15 @@ _EVERY_US = 100_000
 _RESET_AFTER = 3
 _RESET_US = 10_000
 _DRIFT = 0.002
-"""By which clocks may differ: a simulator's is not a quartz."""
+"""By which clocks may differ beside the drift that is known: a simulator's is not a quartz."""
+_UNEVEN = 0.1
+"""Part of a drift that comes and goes: such a clock is held up by whatever else its computer does."""
+_LEAST_EXCHANGES = 10
+"""Fewer tell no drift."""
+_MAX_DRIFT = 0.2
+"""No larger one is believed; an offset that has changed by more is that of a vehicle that was started again."""
+_SURE = 4.0
+"""So many times its uncertainty a drift must be, to be one."""
 
 
 class Exchange(NamedTuple):
@@ -34,13 +46,15 @@ class VehicleClock:
         """Begin knowing nothing."""
         self._exchanges: deque[Exchange] = deque(maxlen=round(WINDOW_US / _EVERY_US))
         self._next_us: int | None = None
-        self._outliers = 0
+        self._outliers: list[Exchange] = []
         self._best: Exchange | None = None
+        self._drift = 0.0
+        self._known = False
 
     @property
     def known(self) -> bool:
         """Whether there were exchanges enough."""
-        return len(self._exchanges) >= ENOUGH
+        return self._known
 
     @property
     def round_trip_us(self) -> int:
@@ -56,7 +70,8 @@ class VehicleClock:
         """
         if self._best is None:
             raise ValueError("no TIMESYNC has been answered")
-        return vehicle_us - self._best.offset_us
+        own_us = vehicle_us - self._best.offset_us
+        return own_us - round(self._drift * (own_us - self._best.received_us))
 
     def request(self, now_us: int) -> tuple[int, int] | None:
         """Return the fields of a TIMESYNC if one is due."""
@@ -72,15 +87,20 @@ class VehicleClock:
             return
         exchange = Exchange(now_us, now_us - sent_us, tc1 // NS_PER_US - (sent_us + now_us) // 2)
         if self._contradicts(exchange):
-            self._outliers += 1
-            if self._outliers < _RESET_AFTER:
+            self._outliers.append(exchange)
+            if len(self._outliers) < _RESET_AFTER:
                 return
             self._exchanges.clear()
-        self._outliers = 0
-        self._exchanges.append(exchange)
+            self._exchanges.extend(self._outliers)
+        else:
+            self._exchanges.append(exchange)
+        self._outliers.clear()
         while self._exchanges[0].received_us < now_us - WINDOW_US:
             self._exchanges.popleft()
-        self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + _DRIFT * (now_us - it.received_us))
+        self._known = self._known or len(self._exchanges) >= ENOUGH
+        self._drift = drift_of(self._exchanges)
+        unsure = _DRIFT + _UNEVEN * abs(self._drift)
+        self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
         """Whether no delays explain an exchange beside the best: the vehicle was started again."""
@@ -88,4 +108,23 @@ class VehicleClock:
         if best is None:
             return False
         explained_us = (exchange.round_trip_us + best.round_trip_us) // 2 + _RESET_US
-        return abs(exchange.offset_us - best.offset_us) > explained_us
+        drifted_us = _MAX_DRIFT * (exchange.received_us - best.received_us)
+        return abs(exchange.offset_us - best.offset_us) > explained_us + drifted_us
+
+
+def drift_of(exchanges: Iterable[Exchange]) -> float:
+    """Return by how much the vehicle's clock is faster, in parts of the own; 0 where that is not sure.
+
+    The median slope between exchanges that are half of all apart (Theil and Sen).
+    """
+    told = tuple(exchanges)
+    half = len(told) // 2
+    if len(told) < _LEAST_EXCHANGES:
+        return 0.0
+    slopes = [
+        (late.offset_us - early.offset_us) / max(late.received_us - early.received_us, 1)
+        for early, late in zip(told, told[half:], strict=False)
+    ]
+    drift = median(slopes)
+    uncertain = median(abs(slope - drift) for slope in slopes) / sqrt(half)
+    return drift if _SURE * uncertain < abs(drift) <= _MAX_DRIFT else 0.0

@@ -15,7 +15,7 @@ def draw(fit: Fit, path: Path) -> None:
     t = fit.grid_s - fit.grid_s[0]
     for axis, (name, plot) in enumerate(zip(_AXES, figure.subplots(3, 1, sharex=True), strict=True)):
         plot.plot(t, fit.measured[:, axis], label="measured", linewidth=1.0)
-        plot.plot(t, fit.modelled[:, axis], label="first-order lag", linewidth=1.0)
+        plot.plot(t, fit.modelled[:, axis], label=f"lag of order {fit.order}", linewidth=1.0)
         lag_ms, explained = 1e3 * fit.time_constant_s[axis], 100.0 * fit.explained[axis]
         plot.set_title(f"{name}: {lag_ms:.0f} ms, after {1e3 * fit.latency_s:.0f} ms; {explained:.0f} % explained")
         plot.set_ylabel("rad/s")

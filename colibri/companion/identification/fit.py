@@ -1,7 +1,7 @@
-"""A first-order lag fitted to what was commanded and measured, by its output error: it is simulated, and compared.
+"""A lag fitted to what was commanded and measured, by its output error: it is simulated, and compared.
 
 The rates of the model follow the commands alone, never the measurements: so a law that answers the vehicle's motion
-meanwhile does not spoil the fit.
+meanwhile does not spoil the fit. A lag of first order is taken unless one of second order explains clearly more.
 """
 
 from typing import NamedTuple
@@ -12,8 +12,17 @@ from colibri.common.types import Array
 from colibri.companion.errors import CompanionError
 
 _GRID_S = 0.002
-_MAX_LATENCY_S = 0.08
-_TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 60)
+MAX_LATENCY_S = 0.12
+_LATENCIES = round(MAX_LATENCY_S / _GRID_S)
+_NEAR = 6
+"""So many latencies on either side of the best of the table are looked at closely."""
+_TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 36)
+_ACCELERATION_LAGS_S = np.geomspace(0.008, 0.15, 10)
+_FIRST_ORDER = np.zeros(1)
+_LEAST_LAG_S = 0.004
+"""A shorter one of the acceleration is none."""
+_CLEARLY_LESS = 0.9
+"""Of what a first order leaves unexplained, a second one must leave less than this."""
 _LEAST_SAMPLES = 200
 MIN_EXPLAINED = 0.5
 
@@ -39,6 +48,7 @@ class Fit(NamedTuple):
 
     Attributes:
         time_constant_s: Of p, q, r, (3,).
+        acceleration_lag_s: Of their acceleration, (3,); zeros for a lag of first order.
         latency_s: Of all three, beyond the way of a command.
         explained: Part of the rates' variance that the model has, (3,).
         grid_s: Times of the model's rates, (k,).
@@ -46,63 +56,123 @@ class Fit(NamedTuple):
     """
 
     time_constant_s: Array
+    acceleration_lag_s: Array
     latency_s: float
     explained: Array
     grid_s: Array
     modelled: Array
     measured: Array
 
+    @property
+    def order(self) -> int:
+        """Of the lag, 1 or 2."""
+        return 2 if self.acceleration_lag_s.any() else 1
+
 
 def fit(log: RateLog) -> Fit:
-    """Return the first-order lag that explains a log best.
+    """Return the lag that explains a log best.
 
     Raises:
         CompanionError: The log is too short, or no such lag explains half of what was measured.
     """
     if min(len(log.command_s), len(log.measured_s)) < _LEAST_SAMPLES:
         raise CompanionError(f"identification: only {len(log.measured_s)} states came while the steps were flown")
-    grid = np.arange(max(log.command_s[0], log.measured_s[0]) + _MAX_LATENCY_S, log.measured_s[-1], _GRID_S)
+    grid = np.arange(max(log.command_s[0], log.measured_s[0]), log.measured_s[-1], _GRID_S)
+    commands = log.commands[np.maximum(np.searchsorted(log.command_s, grid, side="right") - 1, 0)]
     measured = np.stack([np.interp(grid, log.measured_s, log.rates[:, axis]) for axis in range(3)], axis=1)
-    latencies = np.arange(0.0, _MAX_LATENCY_S, _GRID_S)
-    held = [log.commands[np.searchsorted(log.command_s, grid - late_s, side="right") - 1] for late_s in latencies]
-    errors = np.array([[_errors(commands, measured, lag_s) for lag_s in _TIME_CONSTANTS_S] for commands in held])
-    scaled = errors / np.maximum(measured.var(axis=0), 1e-12)
-    best = int(np.argmin(scaled.min(axis=1).sum(axis=1)))
-    lags = np.array([_refined(held[best], measured, axis, int(errors[best, :, axis].argmin())) for axis in range(3)])
-    modelled = np.stack([_lagged(held[best][:, axis], float(lags[axis])) for axis in range(3)], axis=1)
-    offset = (measured - modelled).mean(axis=0)
-    explained = 1.0 - (measured - modelled - offset).var(axis=0) / np.maximum(measured.var(axis=0), 1e-12)
+    found = _found(commands, measured, _FIRST_ORDER)
+    second = _found(commands, measured, _ACCELERATION_LAGS_S)
+    if second.unexplained.sum() < _CLEARLY_LESS * found.unexplained.sum():
+        found = second
+    explained = 1.0 - found.unexplained
     if explained.min() < MIN_EXPLAINED:
         axis = "pqr"[int(explained.argmin())]
         raise CompanionError(
-            f"identification: a first-order lag explains {100.0 * max(explained.min(), 0.0):.0f} % of the rate {axis}, "
+            f"identification: a lag explains {100.0 * max(explained.min(), 0.0):.0f} % of the rate {axis}, "
             f"less than {100 * MIN_EXPLAINED:.0f}: fly it again, in less wind"
         )
-    return Fit(lags, float(latencies[best]), explained, grid, modelled + offset, measured)
+    lags, compared = np.where(found.lags_s < _LEAST_LAG_S, 0.0, found.lags_s), measured[_LATENCIES:]
+    modelled = np.stack([_late(_lagged(commands[:, axis], *lags[axis]), found.late) for axis in range(3)], axis=1)
+    modelled += (compared - modelled).mean(axis=0)
+    latency_s = found.late * _GRID_S
+    return Fit(lags[:, 0], lags[:, 1], latency_s, explained, grid[_LATENCIES:], modelled, compared)
 
 
-def _errors(commands: Array, measured: Array, lag_s: float) -> Array:
-    """Return the variance of what a lag leaves unexplained of each rate, (3,)."""
-    modelled = np.stack([_lagged(commands[:, axis], lag_s) for axis in range(3)], axis=1)
-    unexplained: Array = (measured - modelled).var(axis=0)
-    return unexplained
+class _Found(NamedTuple):
+    """Lags of the three axes, (3, 2), samples of latency, and the part of each variance that they leave, (3,)."""
+
+    lags_s: Array
+    late: int
+    unexplained: Array
 
 
-def _lagged(commands: Array, lag_s: float) -> Array:
-    """Return commands on the grid after a first-order lag."""
+def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Found:
+    """Return the best lags: by a table first, then closely around its best latency."""
+    table = [(lag_s, behind_s) for lag_s in _TIME_CONSTANTS_S for behind_s in acceleration_lags_s]
+    left = np.array([[_unexplained(commands, measured, axis, lags) for lags in table] for axis in range(3)])
+    best = int(left.min(axis=1).sum(axis=0).argmin())
+    near = range(max(best - _NEAR, 0), min(best + _NEAR + 1, _LATENCIES))
+    closely = []
+    for late in near:
+        axes = [_refined(commands, measured, axis, late, table[int(left[axis, :, late].argmin())]) for axis in range(3)]
+        closely.append(_Found(np.array([lags for lags, _ in axes]), late, np.array([rest for _, rest in axes])))
+    return min(closely, key=lambda one: float(one.unexplained.sum()))
+
+
+def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[float, float]) -> Array:
+    """Return the part of a rate's variance that a lag leaves, at each latency of the table, (n,)."""
+    modelled, compared = _lagged(commands[:, axis], *lags_s), measured[_LATENCIES:, axis]
+    left = np.array([(compared - _late(modelled, late)).var() for late in range(_LATENCIES)])
+    return left / max(float(compared.var()), 1e-12)
+
+
+def _refined(
+    commands: Array, measured: Array, axis: int, late: int, near_s: tuple[float, float]
+) -> tuple[tuple[float, float], float]:
+    """Return the lags of least error near those of the table, and the part of the variance that they leave."""
+    from scipy.optimize import minimize
+
+    compared = measured[_LATENCIES:, axis]
+    is_second = near_s[1] > 0.0
+
+    def lags(logarithms: Array) -> tuple[float, float]:
+        lag_s, behind_s = np.exp(logarithms[0]), np.exp(logarithms[-1]) if is_second else 0.0
+        return float(lag_s), float(behind_s)
+
+    def left(logarithms: Array) -> float:
+        return float((compared - _late(_lagged(commands[:, axis], *lags(logarithms)), late)).var())
+
+    begin = np.log(near_s if is_second else near_s[:1])
+    found = minimize(left, begin, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-12, "maxiter": 60})
+    return lags(found.x), float(found.fun) / max(float(compared.var()), 1e-12)
+
+
+def _late(rates: Array, late: int) -> Array:
+    """Return rates so many samples later, from the largest latency on."""
+    return rates[_LATENCIES - late : len(rates) - late]
+
+
+def _lagged(commands: Array, lag_s: float, behind_s: float) -> Array:
+    """Return commands on the grid after a lag: that of first order, or of second where the acceleration lags, too."""
     from scipy.signal import lfilter
 
-    stays = float(np.exp(-_GRID_S / lag_s))
-    rates: Array = lfilter([0.0, 1.0 - stays], [1.0, -stays], commands, zi=[stays * commands[0]])[0]
+    if behind_s == 0.0:
+        stays = float(np.exp(-_GRID_S / lag_s))
+        b, a = np.array([0.0, 1.0 - stays]), np.array([1.0, -stays])
+    else:
+        b, a = _second_order(lag_s, behind_s)
+    at_rest = np.cumsum((b - a)[:0:-1])[::-1]
+    rates: Array = lfilter(b, a, commands, zi=at_rest * commands[0])[0]
     return rates
 
 
-def _refined(commands: Array, measured: Array, axis: int, near: int) -> float:
-    """Return the time constant of the least error near one of the table."""
-    lags = _TIME_CONSTANTS_S
-    for _ in range(3):
-        low, high = lags[max(near - 1, 0)], lags[min(near + 1, len(lags) - 1)]
-        lags = np.geomspace(low, high, 9)
-        wrong = [(measured[:, axis] - _lagged(commands[:, axis], float(lag_s))).var() for lag_s in lags]
-        near = int(np.argmin(wrong))
-    return float(lags[near])
+def _second_order(lag_s: float, behind_s: float) -> tuple[Array, Array]:
+    """Return the filter of T L w'' + T w' + w = c with c held from sample to sample."""
+    root = np.sqrt(complex(1.0 - 4.0 * behind_s / lag_s))
+    if abs(root) < 1e-4:
+        root = complex(1e-4)
+    fast, slow = ((-1.0 - sign * root) / (2.0 * behind_s) for sign in (1.0, -1.0))
+    u, v = np.exp(fast * _GRID_S), np.exp(slow * _GRID_S)
+    first = (1.0 + (slow * u - fast * v) / (fast - slow)).real
+    last = (u * v + (slow * v - fast * u) / (fast - slow)).real
+    return np.array([0.0, first, last]), np.array([1.0, -(u + v).real, (u * v).real])

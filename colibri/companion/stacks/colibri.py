@@ -6,7 +6,7 @@ from colibri.companion.stacks.thrust_curve import MiddleHovers
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
-_IDENTIFIED = Response((0.023, 0.023, 0.115), 0.022, 0.0, (4.0, 4.0, 2.0), (60.0, 60.0, 8.0))
+_IDENTIFIED = Response((0.032, 0.032, 0.128), 0.010, 0.0, (4.0, 4.0, 2.0), (120.0, 120.0, 15.0), (0.014, 0.014, 0.010))
 """As --identify finds it with profile `flight`, of any airframe: its generator of demands slews, its law follows."""
 
 

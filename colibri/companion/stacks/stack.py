@@ -49,14 +49,15 @@ class ParameterRule(NamedTuple):
 
 
 class Response(NamedTuple):
-    """How body rates follow their commands, as a first-order lag, and thrust its own.
+    """How body rates follow their commands, by a lag of first or second order, and thrust by its own.
 
     Attributes:
-        time_constant_s: Of p, q, r, s.
+        time_constant_s: Of p, q, r, s: a rate loop asks for an acceleration of (command - rate) / time constant.
         latency_s: Between a command's arrival and its first effect, s.
         thrust_lag_s: Of thrust, s; 0 where it follows at once.
         max_rate_rad_s: Commands beyond are cut by the stack.
         max_acceleration_rad_s2: So fast, at most, the stack lets each rate change.
+        acceleration_lag_s: Of that acceleration, of p, q, r, s: the motors', say; 0 where it is there at once.
 
     A time constant that is too short costs bandwidth, one that is too long stability: what is assumed is short.
     """
@@ -66,6 +67,7 @@ class Response(NamedTuple):
     thrust_lag_s: float
     max_rate_rad_s: Vector
     max_acceleration_rad_s2: Vector
+    acceleration_lag_s: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -145,9 +145,10 @@ class LawPilot:
         self._vehicle = turning_no_faster(self._airframe, response)
         self._loop = ControlLoop(slowed(self._profile, response), self._vehicle, self._clock, self._law)
         self._motion = packed(motion.motion_model(self._vehicle))
+        self._lags = max(response.acceleration_lag_s[:2]) > 0.0
 
     def begin(self, y: Array) -> None:
-        """Begin with a vehicle that moves as `y` says, (14,), and take it over as it moves: brake, and stay."""
+        """Begin with a vehicle that moves as `y` says, (17,), and take it over as it moves: brake, and stay."""
         frame = _frame(0, y)
         self._tick = 0
         self._loop.begin(self._vehicle.hover_speed, self._loop.state(frame).euler[2])
@@ -201,14 +202,26 @@ class LawPilot:
         speeds = np.array(self._loop.controls) * self._vehicle.rotors.max_speed
         x = np.concatenate((y[: model.LIFT], self._rotors))
         interval_s = self.interval_us * 1e-6
-        after = motion.carry(x, np.array([interval_s]), speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
+        after = self._carried(x, speeds)
         before_n = motion.thrust_n(self._rotors, self._motion)
         self._rotors = after[motion.ROTORS]
         thrust = 0.5 * (before_n + motion.thrust_n(self._rotors, self._motion))
-        now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
+        reached = after
+        if self._lags:
+            reached, thrust = self._without_lag(x, speeds), motion.thrust_n(speeds, self._motion)
+        now, then = y[model.RATE].tolist(), reached[motion.RATE].tolist()
         p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
         return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
+
+    def _without_lag(self, x: Array, speeds: Array) -> Array:
+        """Return the vehicle after an interval in which its rotors turn as commanded from the beginning."""
+        return self._carried(np.concatenate((x[: motion.ROTORS.start], speeds)), speeds)
+
+    def _carried(self, x: Array, speeds: Array) -> Array:
+        """Return the vehicle of the file after an interval."""
+        interval_s = np.array([self.interval_us * 1e-6])
+        return motion.carry(x, interval_s, speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
 
     def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
         """Return references whose heading is the vehicle's own, turning as it does."""
@@ -270,7 +283,11 @@ def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
         for inertia, moment, limit in zip(vehicle.body.inertia_kg_m2[:2], moments_n_m[:2], most[:2], strict=True)
     )
     iz = max(vehicle.body.inertia_kg_m2[2], abs(ix - iy))
-    return vehicle.replace("body.inertia_kg_m2", (ix, iy, iz))
+    turned = vehicle.replace("body.inertia_kg_m2", (ix, iy, iz))
+    behind_s = max(response.acceleration_lag_s[:2])
+    if behind_s == 0.0:
+        return turned
+    return turned.replace("rotors.lag", {"time_constant_up_s": behind_s, "time_constant_down_s": behind_s})
 
 
 def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
@@ -280,5 +297,5 @@ def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
 
 
 def _frame(time_us: int, y: Array) -> StateFrame:
-    px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r, _ = y.tolist()
+    px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = y[: model.LIFT].tolist()
     return StateFrame(time_us, (px, py, pz), (vx, vy, vz), (qw, qx, qy, qz), (p, q, r))

@@ -1,7 +1,8 @@
 """The vehicle at the instant at which a command takes effect: its last state carried there by the commands sent since.
 
 What each new state differs by from the one predicted for it is a disturbance: wind, a thrust that is not as it was
-thought. Of the thrust, what lasts is taken for a scale: the hover thrust, refined in flight.
+thought. Of the thrust, what lasts is taken for a scale: the hover thrust, refined in flight. What positions differ by
+is a drift of the estimate.
 """
 
 from collections import deque
@@ -22,6 +23,9 @@ from colibri.plant.vehicle.description import Vehicle
 _FOLLOWS_US = 150_000
 """After a longer gap nothing is known of disturbances."""
 _KEPT_US = 1_000_000
+_DRIFT_1_S = 8.0
+"""How fast the drift of an estimate is learned: PX4 spreads each correction by GPS over a quarter of a second."""
+_MAX_DRIFT_M_S = 1.0
 _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
 _TURN_PART = 0.5
@@ -31,6 +35,11 @@ _TURN_POWER = 8.0
 _CORRECTED_IN_LATENESSES = 8.0
 """So many times what the rates follow too late, an error of the predicted rates is corrected in. Of what is not rates
 the vehicle knows more than the model."""
+_CORRECTED_IN_LAGS = 2.0
+"""So many lags of its acceleration an error of a predicted rate of second order is corrected in: measured rates tremble
+more than such a model errs."""
+_TURN_PART_OF_LAGGING = 0.05
+"""Of a rate of second order next to nothing that it misses is a disturbance."""
 _SCALE_1_S = 0.25
 MIN_SCALE, MAX_SCALE = 0.5, 1.8
 
@@ -52,6 +61,8 @@ class Predictor:
             tuned for is added to it.
         thrust_scale: Thrust that is made, in parts of the one that was meant.
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
+        drift_m_s: How much faster the estimated position moves than the estimated velocity says, ENU, (3,): a filter
+            that corrects its position by its GPS receiver moves it so, for seconds.
     """
 
     def __init__(self, vehicle: Vehicle, response: Response) -> None:
@@ -66,14 +77,17 @@ class Predictor:
     def adopt(self, vehicle: Vehicle, response: Response) -> None:
         """Predict with another response."""
         self._model = packed(model.response_model(vehicle, response))
-        self._late_s = _CORRECTED_IN_LATENESSES * lateness_s(response)
-        self._turn_part = _TURN_PART * slowness(response) ** -_TURN_POWER
+        late_s = _CORRECTED_IN_LATENESSES * lateness_s(response)
+        behind_s = np.array(response.acceleration_lag_s)
+        self._late_s = np.maximum(late_s, _CORRECTED_IN_LAGS * behind_s)
+        parts = _TURN_PART * slowness(response) ** -_TURN_POWER
+        self._turn_part = np.where(behind_s > 0.0, _TURN_PART_OF_LAGGING, parts)
 
     def begin(self) -> None:
         """Begin with level hover commanded, and no disturbance."""
         self._sent = deque([SentCommand(-(2**62), (0.0, 0.0, 0.0, self._gravity_m_s2))])
         self._known: tuple[int, Array] | None = None
-        self.disturbance = np.zeros(6)
+        self.disturbance, self.drift_m_s = np.zeros(6), np.zeros(3)
         self.learns = False
 
     def sent(self, acts_us: int, rate: Vector, lift_m_s2: float) -> None:
@@ -90,18 +104,20 @@ class Predictor:
             return
         lift = self._acting(at_us)[0].values[3]
         values = (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s, lift)
-        y = np.array(values)
+        y = np.array((*values, 0.0, 0.0, 0.0))
         known = self._known
         if known is None or at_us - known[0] > _FOLLOWS_US:
-            self.disturbance = np.zeros(6)
+            self.disturbance, self.drift_m_s = np.zeros(6), np.zeros(3)
         else:
             expected = self._carried(known[1], known[0], at_us)
-            y[model.LIFT] = expected[model.LIFT]
+            y[model.LIFT], y[model.ACCELERATION] = expected[model.LIFT], expected[model.ACCELERATION]
             y = self._corrected(expected, y, (at_us - known[0]) * 1e-6)
         self._known = (at_us, y)
 
     def at(self, time_us: int) -> Array:
-        """Return position, velocity, attitude, rates and lift, (14,), at a time of the own clock.
+        """Return position, velocity, attitude, rates, lift, the rates' acceleration, (17,), at a time of the own clock.
+
+        The velocity is that of the position, drift and all.
 
         Raises:
             ValueError: No state is known.
@@ -109,7 +125,9 @@ class Predictor:
         if self._known is None:
             raise ValueError("no state is known")
         at_us, y = self._known
-        return self._carried(y, at_us, time_us) if time_us > at_us else y
+        there = self._carried(y, at_us, time_us) if time_us > at_us else y.copy()
+        there[model.VELOCITY] += self.drift_m_s
+        return there
 
     @property
     def known_us(self) -> int | None:
@@ -119,18 +137,24 @@ class Predictor:
     def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
         """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
         part = np.full(model.STATES, self._part(passed_s, 0.0))
-        part[model.RATE] = self._part(passed_s, self._late_s)
+        part[model.RATE] = [self._part(passed_s, late_s) for late_s in self._late_s.tolist()]
         if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
             measured[model.ATTITUDE] *= -1.0
         missed = part * (measured - expected)
         y: Array = expected + missed
         y[model.ATTITUDE] /= np.linalg.norm(y[model.ATTITUDE])
+        self._learn_drift(missed[model.POSITION], passed_s)
         self._learn(y, np.concatenate((missed[model.VELOCITY], self._turn_part * missed[model.RATE])), passed_s)
         return y
 
     def _part(self, passed_s: float, late_s: float) -> float:
         corrected_in_s = self.corrected_in_s + late_s
         return 1.0 - exp(-passed_s / corrected_in_s) if corrected_in_s > 0.0 else 1.0
+
+    def _learn_drift(self, missed_m: Array, passed_s: float) -> None:
+        part = 1.0 - exp(-_DRIFT_1_S * passed_s)
+        drift = self.drift_m_s + part * missed_m / passed_s
+        self.drift_m_s = np.clip(drift, -_MAX_DRIFT_M_S, _MAX_DRIFT_M_S)
 
     def _learn(self, y: Array, missed: Array, passed_s: float) -> None:
         part = 1.0 - exp(-_DISTURBANCE_1_S * passed_s)
@@ -147,7 +171,9 @@ class Predictor:
         acting = self._acting(from_us, until_us)
         begins = np.array([from_us, *(it.acts_us for it in acting[1:]), until_us])
         commands = np.array([it.values for it in acting])
-        return model.carry(y, np.diff(begins) * 1e-6, commands, self.disturbance, self._model)
+        there = model.carry(y, np.diff(begins) * 1e-6, commands, self.disturbance, self._model)
+        there[model.POSITION] += (until_us - from_us) * 1e-6 * self.drift_m_s
+        return there
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[SentCommand]:
         """Return the command that acts at a time, and those that take effect until another."""

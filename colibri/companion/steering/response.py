@@ -1,6 +1,8 @@
-"""A vehicle under a stack's rate loop, as a companion models it: rates and thrust that follow as first-order lags.
+"""A vehicle under a stack's rate loop, as a companion models it: rates and thrust that follow as lags.
 
-With c the commanded body rates and T a time constant of each axis, w' = (c - w) / T; thrust likewise. The rest is the
+With c the commanded body rates and T a time constant of each axis, a rate loop asks for the acceleration (c - w) / T.
+Where the acceleration is there at once, w' = (c - w) / T is a first-order lag; where it lags by L, as motors do,
+w' = a, a' = ((c - w) / T - a) / L is one of second order. Thrust follows as a first-order lag. The rest is the
 vehicle's: it drags, and is pushed by what is observed of a disturbance.
 """
 
@@ -16,9 +18,11 @@ from colibri.common.types import Array, Vector
 from colibri.companion.stacks.stack import Response
 from colibri.plant.vehicle.description import Vehicle
 
-STATES, COMMANDS = 14, 4
+STATES, COMMANDS = 17, 4
 POSITION, VELOCITY, ATTITUDE, RATE, LIFT = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), 13
 """Lift is thrust over mass, m/s²."""
+ACCELERATION = slice(14, 17)
+"""Of the body rates, rad/s²."""
 _STEP_S = 0.004
 _ROUNDING = 1e-6
 
@@ -29,12 +33,14 @@ class ResponseModel(NamedTuple):
     Attributes:
         time_constant_s: Of p, q, r, (3,).
         max_acceleration_rad_s2: Of rates, (3,).
+        acceleration_lag_s: Of their acceleration, (3,); 0 where it is there at once.
         lift_lag_s: Of thrust; 0 where it follows at once.
         drag_1_s: Along the FLU axes, over the mass, (3,).
     """
 
     time_constant_s: Array
     max_acceleration_rad_s2: Array
+    acceleration_lag_s: Array
     lift_lag_s: float
     drag_1_s: Array
     gravity_m_s2: float
@@ -47,13 +53,15 @@ def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
         in_plane = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m) * vehicle.hover_speed
         drag = (np.array(vehicle.drag.linear_n_s_m) + np.array([in_plane, in_plane, 0.0])) / vehicle.body.mass_kg
     lags, limits = np.array(response.time_constant_s), np.array(response.max_acceleration_rad_s2)
-    return ResponseModel(lags, limits, response.thrust_lag_s, drag, vehicle.gravity_m_s2)
+    behind = np.array(response.acceleration_lag_s)
+    return ResponseModel(lags, limits, behind, response.thrust_lag_s, drag, vehicle.gravity_m_s2)
 
 
 def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
     """Return the body rates to command so that those of now are `next_rate` an interval later, rad/s.
 
-    The exact inverse of the model, within what the stack lets through.
+    The exact inverse of the model, within what the stack lets through; where the acceleration lags, `next_rate` is that
+    of a vehicle whose acceleration does not.
     """
     p, q, r = (
         _rate_command(now, then, interval_s, *of)
@@ -63,6 +71,7 @@ def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: R
             response.time_constant_s,
             response.max_rate_rad_s,
             response.max_acceleration_rad_s2,
+            response.acceleration_lag_s,
             strict=True,
         )
     )
@@ -70,18 +79,26 @@ def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: R
 
 
 def _rate_command(
-    now: float, then: float, interval_s: float, lag_s: float, max_rate: float, max_acceleration: float
+    now: float,
+    then: float,
+    interval_s: float,
+    lag_s: float,
+    max_rate: float,
+    max_acceleration: float,
+    behind_s: float,
 ) -> float:
     change = min(max(then - now, -max_acceleration * interval_s), max_acceleration * interval_s)
-    return min(max(now + change / (1.0 - exp(-interval_s / lag_s)), -max_rate), max_rate)
+    reached = interval_s / lag_s if behind_s > 0.0 else 1.0 - exp(-interval_s / lag_s)
+    return min(max(now + change / reached, -max_rate), max_rate)
 
 
 @compiled
 def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, packed: Packed) -> Array:
-    """Return y, (14,), after commands that follow each other.
+    """Return y, (17,), after commands that follow each other.
 
     Args:
-        y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s².
+        y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s²;
+            acceleration of the body rates, rad/s².
         durations_s: How long each command acts, (n,).
         commands: Body rates, rad/s, and lift, m/s², (n, 4).
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
@@ -95,10 +112,7 @@ def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, pac
         h = durations_s[n] / steps
         for _ in range(steps):
             for i in range(3):
-                stays = exp(-h / model.time_constant_s[i])
-                change = (commands[n, i] - y[10 + i]) * (1.0 - stays)
-                most = h * model.max_acceleration_rad_s2[i]
-                after = y[10 + i] + min(max(change, -most), most) + h * disturbance[3 + i]
+                after = y[10 + i] + _change(y, i, commands[n, i], h, model) + h * disturbance[3 + i]
                 mean[i] = 0.5 * (y[10 + i] + after)
                 y[10 + i] = after
             lift = commands[n, 3]
@@ -110,6 +124,24 @@ def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, pac
             _push(y, mean_lift, disturbance, model.drag_1_s, model.gravity_m_s2, h)
             _turn(y, mean, 0.5 * h)
     return y
+
+
+@compiled
+def _change(y: Array, axis: int, command: float, h: float, model: ResponseModel) -> float:
+    """Return by how much a body rate follows its command within a while; move its acceleration on, in place."""
+    limit, lag_s = model.max_acceleration_rad_s2[axis], model.time_constant_s[axis]
+    rate, acceleration, behind_s = y[10 + axis], y[14 + axis], model.acceleration_lag_s[axis]
+    if behind_s == 0.0:
+        change: float = (command - rate) * (1.0 - exp(-h / lag_s))
+        change = min(max(change, -h * limit), h * limit)
+        y[14 + axis] = change / h
+        return change
+    asked = (command - rate - 0.5 * h * acceleration) / lag_s
+    asked = min(max(asked, -limit), limit)
+    stays = exp(-h / behind_s)
+    y[14 + axis] = asked + (acceleration - asked) * stays
+    followed: float = h * asked + (acceleration - asked) * behind_s * (1.0 - stays)
+    return followed
 
 
 @compiled

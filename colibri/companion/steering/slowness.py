@@ -17,8 +17,13 @@ _WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 
 
 
 def delay_s(response: Response) -> float:
-    """Return how late roll and pitch rates follow, dead time and lag together, s."""
-    return response.latency_s + max(response.time_constant_s[:2])
+    """Return how late roll and pitch rates follow, dead time and lag together, s.
+
+    Of a response of second order only the dead time and the lag of the acceleration count: a law knows that lag, and
+    what the rate loop does is undone.
+    """
+    pairs = zip(response.time_constant_s[:2], response.acceleration_lag_s[:2], strict=True)
+    return response.latency_s + max(behind_s or lag_s for lag_s, behind_s in pairs)
 
 
 def slowness(response: Response) -> float:

@@ -56,6 +56,30 @@ def test_a_vehicle_that_was_started_again_has_another_clock() -> None:
     assert abs(clock.own_us(now_us - 9_000_000) - now_us) <= 1_000
 
 
+@pytest.mark.parametrize("drift", [0.0, -0.016, -0.1, 0.03])
+def test_a_simulator_s_clock_that_drifts_is_followed_and_never_unknown(drift: float) -> None:
+    clock, chance, unknown = VehicleClock(), Random(5), 0
+    for n in range(300):
+        now_us = 100_000 * n
+        asked = clock.request(now_us)
+        assert asked
+        there_us, back_us = 100 + chance.randrange(1500), 100 + chance.randrange(1500)
+        vehicle_us = 3_000_000 + round((now_us + there_us) * (1.0 + drift))
+        clock.receive(vehicle_us * 1000, asked[1], now_us + there_us + back_us)
+        unknown += n > 5 and not clock.known
+        later_us = now_us + 90_000
+        if n > 50:
+            assert abs(clock.own_us(3_000_000 + round(later_us * (1.0 + drift))) - later_us) <= 2_500
+    assert not unknown
+
+
+def test_jitter_is_no_drift() -> None:
+    clock, chance = VehicleClock(), Random(6)
+    ways_us = [(20_000 + chance.randrange(20_000), 20_000 + chance.randrange(20_000)) for _ in range(100)]
+    now_us = exchanged(clock, 7_000_000, ways_us)
+    assert abs(clock.own_us(now_us + 7_000_000) - now_us) <= 5_000
+
+
 def test_what_is_no_answer_says_nothing_of_the_clock() -> None:
     clock = VehicleClock()
     clock.receive(0, 1_000_000, 2_000)

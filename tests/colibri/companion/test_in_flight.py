@@ -178,6 +178,7 @@ def test_an_identification_finds_the_response_that_the_vehicle_has(flights: Flig
     assert ride.companion.ended.in_order
     response, text, found = identified(ride.companion)
     assert response.time_constant_s == pytest.approx(COLIBRI.response.time_constant_s, rel=0.15)
+    assert response.acceleration_lag_s == pytest.approx(COLIBRI.response.acceleration_lag_s, abs=0.004)
     assert response.latency_s == pytest.approx(COLIBRI.response.latency_s, abs=0.005)
     assert found.explained.min() > 0.9
     assert "time_constant_s" in text

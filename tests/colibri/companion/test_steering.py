@@ -76,6 +76,24 @@ def test_a_fit_finds_the_lag_that_there_is() -> None:
     assert found.time_constant_s == pytest.approx([0.03, 0.06, 0.15], rel=0.12)
     assert found.latency_s == pytest.approx(0.02, abs=0.008)
     assert found.explained.min() > 0.95
+    assert found.order == 1
+
+
+def test_a_fit_finds_a_lag_of_second_order_behind_a_delay_and_says_so() -> None:
+    t, late, rows = np.arange(0.0, duration_s(), 0.008), 60, []
+    commands, rate, turning = np.array([step_at(float(time_s)) for time_s in t]), np.zeros(3), np.zeros(3)
+    times, lags, behind = np.arange(0.0, duration_s(), 0.001), np.array([0.07, 0.06, 0.3]), np.array([0.04, 0.03, 0.08])
+    for n, _ in enumerate(times):
+        wanted = commands[max(n - late, 0) // 8]
+        turning = turning + 0.001 * ((wanted - rate) / lags - turning) / behind
+        rate = rate + 0.001 * turning
+        rows.append(rate)
+    trembling = 0.05 * np.random.default_rng(3).normal(size=(len(rows[::8]), 3))
+    found = fit(RateLog(t, commands, times[::8], np.array(rows[::8]) + trembling))
+    assert found.order == 2
+    assert found.time_constant_s == pytest.approx(lags, rel=0.1)
+    assert found.acceleration_lag_s == pytest.approx(behind, rel=0.2)
+    assert found.latency_s == pytest.approx(0.06, abs=0.006)
 
 
 def test_noise_alone_is_no_response() -> None:

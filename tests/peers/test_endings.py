@@ -1,0 +1,62 @@
+"""Whatever ends a flight of the companion ends it on real PX4, too: `tests.peers.endings` provokes each once.
+
+COLIBRI_PX4 is a build folder of PX4's SITL (`build/px4_sitl_default`).
+"""
+
+import json
+import sys
+from subprocess import run
+from typing import Any
+
+import pytest
+
+from colibri.companion.stacks.px4_modes import HOLD, LAND
+from tests.peers.endings import CASES
+from tests.peers.programs import ALONE, program_of
+
+pytestmark = pytest.mark.peers
+
+MINUTES = 8.0
+OBEYED_WITHIN_S = 0.1
+RETURN = 5 << 24 | 4 << 16
+LIMITS = [name for name in CASES if name not in ("pilot", "interrupted", "estimate lost")]
+
+
+@pytest.fixture(scope="module")
+def endings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """Fly them all, one after another, on one PX4."""
+    folder, program = tmp_path_factory.mktemp("endings"), program_of("px4")
+    run(
+        [*ALONE, sys.executable, "-m", "tests.peers.endings", str(program), str(folder)],
+        check=True,
+        timeout=60 * MINUTES,
+    )
+    found: dict[str, dict[str, Any]] = json.loads((folder / "endings.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_the_pilot_s_choice_of_a_mode_is_obeyed_within_a_tenth_of_a_second(endings: dict[str, dict[str, Any]]) -> None:
+    ended = endings["pilot"]
+    assert ended["in_order"]
+    assert ended["sent_after_disturbed_s"] <= OBEYED_WITHIN_S
+    assert ended["mode"] == RETURN
+
+
+def test_interrupted_it_leaves_the_vehicle_in_hold(endings: dict[str, dict[str, Any]]) -> None:
+    ended = endings["interrupted"]
+    assert ended["in_order"]
+    assert ended["mode"] == HOLD.custom
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_limit_ends_it_and_the_vehicle_holds_by_itself(endings: dict[str, dict[str, Any]], name: str) -> None:
+    ended = endings[name]
+    assert ended["limit"] == name
+    assert not ended["in_order"]
+    assert ended["mode"] == HOLD.custom
+
+
+def test_a_vehicle_that_has_lost_its_place_and_cannot_hold_lands(endings: dict[str, dict[str, Any]]) -> None:
+    ended = endings["estimate lost"]
+    assert ended["limit"] == "estimate lost"
+    assert ended["mode"] == LAND.custom
