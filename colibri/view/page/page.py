@@ -86,8 +86,10 @@ class Page:
         self._vehicles = self._built()
 
     def _await_layout(self, client: viser.ClientHandle) -> None:
-        def note(_: viser.CameraHandle) -> None:
-            self.laid_out = True
+        aspect = client.camera.aspect
+
+        def note(camera: viser.CameraHandle) -> None:
+            self.laid_out = self.laid_out or camera.aspect != aspect
 
         client.camera.on_update(note)
 
