@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.view.recorded import RecordedFlight as RecordedFlight
+    from colibri.view.recorded.flight import RecordedFlight as RecordedFlight
     from colibri.view.snapshot import Chart as Chart
     from colibri.view.snapshot import Snapshot as Snapshot
     from colibri.view.snapshot import Source as Source

@@ -14,14 +14,14 @@ import numpy as np
 
 from colibri.common.process.lifecycle import Stop
 from colibri.view.access import Token
-from colibri.view.horizons import HorizonProcess, Horizons
 from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES
 from colibri.view.observer import Observer
 from colibri.view.page.page import Page
 from colibri.view.page.server import PageServer, serve
-from colibri.view.playback import Playback, speed_of
-from colibri.view.recorded import RecordedFlight
+from colibri.view.recorded.flight import RecordedFlight
+from colibri.view.recorded.horizons import HorizonProcess, Horizons
+from colibri.view.recorded.playback import Playback, speed_of
 from colibri.view.snapshot import Source, ViewError
 
 FRAMES_HZ = 30.0

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from colibri.view.page.scene import COLOURS, LAYERS
-from colibri.view.playback import SPEEDS
+from colibri.view.recorded.playback import SPEEDS
 from colibri.view.snapshot import Snapshot
 
 

@@ -1,6 +1,6 @@
 """The clock of a recorded flight."""
 
-from colibri.view.playback import SPEEDS, Playback, speed_of
+from colibri.view.recorded.playback import SPEEDS, Playback, speed_of
 
 
 def test_it_plays_pauses_and_goes_on() -> None:

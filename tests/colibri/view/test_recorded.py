@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from colibri.experiments.flight import Flight, fly
-from colibri.view.horizons import Horizons
-from colibri.view.prediction import predicted
-from colibri.view.recorded import RecordedFlight
+from colibri.view.recorded.flight import RecordedFlight
+from colibri.view.recorded.horizons import Horizons
+from colibri.view.recorded.prediction import predicted
 from colibri.view.run import PLOTTED_AFTER_S, WAITS_S, Show, export, read_flights
 from colibri.view.snapshot import ViewError
 

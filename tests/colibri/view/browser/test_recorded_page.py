@@ -10,7 +10,7 @@ from PIL import Image
 from colibri.experiments.flight import fly
 from colibri.view.page.page import Page
 from colibri.view.page.server import serve
-from colibri.view.recorded import RecordedFlight
+from colibri.view.recorded.flight import RecordedFlight
 from colibri.view.run import Show
 
 pytestmark = pytest.mark.view

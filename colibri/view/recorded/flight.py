@@ -17,7 +17,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
 from colibri.plant.vehicle.description import Vehicle
 from colibri.view.geometry import thinned
-from colibri.view.horizons import Horizons
+from colibri.view.recorded.horizons import Horizons
 from colibri.view.snapshot import NO_POINTS, NOWHERE, Airframe, Chart, Snapshot, Surroundings, ViewError
 
 MAX_ROWS = 30_000

@@ -1,7 +1,7 @@
 """Predicted horizons of a recorded flight: its logs hold none, so the autopilot answers the same frames once more.
 
-That happens in a process of its own, meanwhile the flight can be watched already: `python -m colibri.view.horizons DIR`
-prints a horizon a line, its time and then the coordinates of its points.
+That happens in a process of its own, meanwhile the flight can be watched already: `python -m
+colibri.view.recorded.horizons DIR` prints a horizon a line, its time and then the coordinates of its points.
 """
 
 import os
@@ -48,7 +48,7 @@ class HorizonProcess:
 
     def __init__(self, folder: Path, horizons: Horizons) -> None:
         """Begin."""
-        command = [sys.executable, "-m", "colibri.view.horizons", str(folder)]
+        command = [sys.executable, "-m", "colibri.view.recorded.horizons", str(folder)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self._thread = Thread(target=self._read, args=(horizons,), daemon=True)
         self._thread.start()
@@ -76,7 +76,9 @@ class HorizonProcess:
 def main() -> int:
     """Print the horizons of the flight of a folder; return the exit code."""
     os.nice(_NICE)
-    from colibri.view.prediction import predicted  # takes a second of a core, which the page does not have to wait for
+    from colibri.view.recorded.prediction import (
+        predicted,  # takes a second of a core, which the page does not have to wait for
+    )
 
     try:
         for time_s, points in predicted(Path(sys.argv[1])):
