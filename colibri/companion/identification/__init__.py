@@ -1,1 +1,1 @@
-"""How body rates follow their commands: small steps in flight, lags of first or second order fitted to them, a figure."""
+"""How body rates follow commands: small steps in flight, a lag of first or second order fitted to them, a figure."""
