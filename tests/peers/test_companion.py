@@ -1,4 +1,4 @@
-"""A companion on real PX4 and real ArduCopter, with their own physics or on our plant, in a network of their own.
+"""A companion on real PX4 and real ArduCopter, each with its own physics, at real time, in a network of its own.
 
 COLIBRI_PX4 is a build folder of PX4's SITL (`build/px4_sitl_default`), COLIBRI_ARDUCOPTER the program `arducopter`.
 What is started is ended by its number.
@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.peers.on_the_plant import px4_command, px4_settings
+from tests.peers.half_speed import WITHOUT_LOGGER
 from tests.peers.programs import ALONE, program_of
 
 pytestmark = pytest.mark.peers
@@ -42,32 +42,28 @@ PX4_SETTINGS = {
     "PX4_PARAM_COM_RCL_EXCEPT": "7",
     "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
 }
-WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}
-"""It holds PX4 up where the disk is slow."""
-PX4_ALONE_M = {"sihsim": 0.066, "iris": 0.066, "hummingbird": 0.061}
-"""RMS of a spiral by PX4's own position control, from its estimate: docs/simulators.md. Of SIH, which strays by 0.28 m
-by itself, that of the Iris is taken."""
 PX4_INSTANCE = 9
+PX4_ALONE_M = {"sihsim": 0.066, "iris": 0.066, "hummingbird": 0.061}
+"""RMS of a spiral by PX4's own position control, from its estimate: docs/simulators.md. Of PX4's own physics, where it
+strays by 0.28 m, that of the Iris is taken."""
 ON_A_BUSY_COMPUTER = "--wait 120 --max-age 500 --max-gap 1000 --min-pace 1"
 """At real time beside other tests all come late now and then; how near to its track the vehicle is to be stays."""
 SHELL = """
-{beside} > beside.log 2>&1 &
-beside=$!
 "$@" > vehicle.log 2>&1 &
 vehicle=$!
 {companion} > companion.log 2>&1
 code=$?
-kill -KILL $vehicle $beside 2>/dev/null
-wait $vehicle $beside 2>/dev/null
+kill -KILL $vehicle
+wait $vehicle 2>/dev/null
 exit $code
 """
 
 
-def fly(folder: Path, vehicle: list[str], options: str, beside: str = "true", **environment: str) -> dict[str, Any]:
-    """Fly a vehicle that is started here, and its plant `beside` it; return the companion's report."""
+def fly(folder: Path, vehicle: list[str], options: str, **environment: str) -> dict[str, Any]:
+    """Fly a vehicle that is started here; return the companion's report."""
     out = folder / "out"
     companion = f"{sys.executable} -m colibri companion {options} {ON_A_BUSY_COMPUTER} --out {out}"
-    command = [*ALONE, "sh", "-c", SHELL.format(companion=companion, beside=beside), "sh", *vehicle]
+    command = [*ALONE, "sh", "-c", SHELL.format(companion=companion), "sh", *vehicle]
     ended = subprocess.run(command, cwd=folder, env=os.environ | environment, check=False, timeout=400.0)
     said = (folder / "companion.log").read_text(encoding="utf-8")
     assert ended.returncode == 0, said
@@ -96,16 +92,6 @@ def px4(folder: Path, options: str) -> dict[str, Any]:
     )
 
 
-def px4_on_the_plant(folder: Path, name: str, options: str) -> dict[str, Any]:
-    """Fly PX4 on our plant, at real time."""
-    build, parameters, colibri = program_of("px4"), folder / "parameters", f"{sys.executable} -m colibri"
-    subprocess.run([*colibri.split(), "vehicle", name, "--for", "px4", "--out", str(parameters)], check=True)
-    plant = f"{colibri} plant --serve px4 --vehicle {name} --speed 1 --out {folder / 'plant'}"
-    settings = px4_settings(parameters, 1) | WITHOUT_LOGGER
-    options = f"{options} --model {name} --vehicle udpin:127.0.0.1:14540"
-    return fly(folder, px4_command(build), options, plant, **settings)
-
-
 def test_arducopter_flies_the_spiral_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
     report = arducopter(tmp_path, "spiral --arm --duration 60")
     assert report["stack"] == "ardupilot"
@@ -126,20 +112,10 @@ def test_px4_is_flown_and_left_in_hold(tmp_path: Path) -> None:
     assert report["control_rmse_m"] < 0.3
 
 
-def test_px4_s_own_physics_is_identified_and_flown_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
-    steps, track = tmp_path / "steps", tmp_path / "track"
-    steps.mkdir()
-    track.mkdir()
-    px4(steps, "--identify --arm --model sihsim")
-    response = steps / "out" / "companion.toml"
-    assert "acceleration_lag_s" in response.read_text(encoding="utf-8")
-    report = px4(track, f"spiral --arm --duration 40 --model sihsim --response {response}")
-    assert report["in_order"]
-    assert report["control_rmse_m"] <= PX4_ALONE_M["sihsim"] / 2.0
-
-
-@pytest.mark.parametrize("name", ["iris", "hummingbird"])
-def test_px4_on_the_plant_is_flown_twice_as_well_as_by_its_own_position_control(name: str, tmp_path: Path) -> None:
-    report = px4_on_the_plant(tmp_path, name, "spiral --arm --duration 40")
-    assert report["in_order"]
-    assert report["control_rmse_m"] <= PX4_ALONE_M[name] / 2.0
+@pytest.mark.parametrize("name", PX4_ALONE_M)
+def test_px4_is_flown_twice_as_well_as_by_its_own_position_control(name: str, tmp_path: Path) -> None:
+    command = [*ALONE, sys.executable, "-m", "tests.peers.tracks", str(program_of("px4")), str(tmp_path), name]
+    subprocess.run(command, check=True, timeout=500.0)
+    flown = json.loads((tmp_path / "track.json").read_text(encoding="utf-8"))
+    assert flown["in_order"], flown["ended"]
+    assert flown["rmse_m"] <= PX4_ALONE_M[name] / 2.0
