@@ -1,4 +1,4 @@
-"""A companion on real PX4 and real ArduCopter, each with its own physics, at real time, in a network of its own.
+"""A companion on real PX4 and real ArduCopter, with their own physics or on our plant, in a network of their own.
 
 COLIBRI_PX4 is a build folder of PX4's SITL (`build/px4_sitl_default`), COLIBRI_ARDUCOPTER the program `arducopter`.
 What is started is ended by its number.
@@ -49,21 +49,23 @@ strays by 0.28 m, that of the Iris is taken."""
 ON_A_BUSY_COMPUTER = "--wait 120 --max-age 500 --max-gap 1000 --min-pace 1"
 """At real time beside other tests all come late now and then; how near to its track the vehicle is to be stays."""
 SHELL = """
+{beside} > beside.log 2>&1 &
+beside=$!
 "$@" > vehicle.log 2>&1 &
 vehicle=$!
 {companion} > companion.log 2>&1
 code=$?
-kill -KILL $vehicle
-wait $vehicle 2>/dev/null
+kill -KILL $vehicle $beside 2>/dev/null
+wait $vehicle $beside 2>/dev/null
 exit $code
 """
 
 
-def fly(folder: Path, vehicle: list[str], options: str, **environment: str) -> dict[str, Any]:
-    """Fly a vehicle that is started here; return the companion's report."""
+def fly(folder: Path, vehicle: list[str], options: str, beside: str = "true", **environment: str) -> dict[str, Any]:
+    """Fly a vehicle that is started here, and what it needs `beside` it; return the companion's report."""
     out = folder / "out"
     companion = f"{sys.executable} -m colibri companion {options} {ON_A_BUSY_COMPUTER} --out {out}"
-    command = [*ALONE, "sh", "-c", SHELL.format(companion=companion), "sh", *vehicle]
+    command = [*ALONE, "sh", "-c", SHELL.format(companion=companion, beside=beside), "sh", *vehicle]
     ended = subprocess.run(command, cwd=folder, env=os.environ | environment, check=False, timeout=400.0)
     said = (folder / "companion.log").read_text(encoding="utf-8")
     assert ended.returncode == 0, said
@@ -83,6 +85,22 @@ def arducopter(folder: Path, options: str) -> dict[str, Any]:
     return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:14555")
 
 
+def arducopter_on_the_plant(folder: Path, options: str) -> dict[str, Any]:
+    """Fly ArduCopter on our plant, as the Hummingbird, at real time."""
+    program, parameters, colibri = program_of("ardupilot"), folder / "companion.parm", f"{sys.executable} -m colibri"
+    told = [*colibri.split(), "vehicle", "hummingbird", "--for", "ardupilot", "--out", str(parameters)]
+    subprocess.run(told, check=True)
+    others = {name: value for name, value in COPTER_PARAMETERS.items() if not name.startswith(("FRAME_", "MOT_"))}
+    with parameters.open("a", encoding="utf-8") as file:
+        file.writelines(f"{name} {value}\n" for name, value in others.items())
+    vehicle = [
+        *(str(program), "--model", "JSON:127.0.0.1", "--speedup", "1", "-w", "--defaults", str(parameters)),
+        *("--serial0", "udpclient:127.0.0.1:14555"),
+    ]
+    plant = f"{colibri} plant --serve ardupilot-json --vehicle hummingbird --out {folder / 'plant'}"
+    return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:14555", plant)
+
+
 def px4(folder: Path, options: str) -> dict[str, Any]:
     """Fly PX4 with its own physics, at real time."""
     build = program_of("px4")
@@ -95,6 +113,12 @@ def px4(folder: Path, options: str) -> dict[str, Any]:
 def test_arducopter_flies_the_spiral_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
     report = arducopter(tmp_path, "spiral --arm --duration 60")
     assert report["stack"] == "ardupilot"
+    assert report["in_order"]
+    assert report["control_rmse_m"] <= 0.045 / 2.0
+
+
+def test_arducopter_on_the_plant_is_flown_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
+    report = arducopter_on_the_plant(tmp_path, "spiral --arm --duration 40")
     assert report["in_order"]
     assert report["control_rmse_m"] <= 0.045 / 2.0
 
