@@ -46,11 +46,14 @@ def _of_second_order(response: Response, found: Fit) -> Response:
     A law that was built for less of it than there is would brake late where it is thrown off its track, and swing.
     """
     p, q, r = found.acceleration_lag_s.tolist()
-    most = (
-        max(assumed, rate / lag_s)
-        for assumed, rate, lag_s in zip(
-            response.max_acceleration_rad_s2, response.max_rate_rad_s, response.time_constant_s, strict=True
+    most_p, most_q, most_r = (
+        max(assumed, rate / lag_s) if behind_s > 0.0 else assumed
+        for assumed, rate, lag_s, behind_s in zip(
+            response.max_acceleration_rad_s2,
+            response.max_rate_rad_s,
+            response.time_constant_s,
+            (p, q, r),
+            strict=True,
         )
     )
-    most_p, most_q, most_r = most
     return response._replace(acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))

@@ -69,7 +69,7 @@ def px4_command(build: Path) -> list[str]:
     return [str(build / "bin" / "px4"), "-d", str(build / "etc"), "-s", "etc/init.d-posix/rcS"]
 
 
-def px4_settings(parameters: Path, speed: int) -> dict[str, str]:
+def px4_settings(parameters: Path, speed: float) -> dict[str, str]:
     """Return PX4's environment: a file of parameters, and what it needs without sticks and ground station."""
     lines = [line.split() for line in parameters.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     given = {f"PX4_PARAM_{name}": value for _, _, name, value, _ in lines}

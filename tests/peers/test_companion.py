@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.peers.on_the_plant import px4_command, px4_settings
+from tests.peers.half_speed import WITHOUT_LOGGER
 from tests.peers.programs import ALONE, program_of
 
 pytestmark = pytest.mark.peers
@@ -42,12 +42,10 @@ PX4_SETTINGS = {
     "PX4_PARAM_COM_RCL_EXCEPT": "7",
     "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
 }
-WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}
-"""It holds PX4 up where the disk is slow."""
-PX4_ALONE_M = {"sihsim": 0.066, "iris": 0.066, "hummingbird": 0.061}
-"""RMS of a spiral by PX4's own position control, from its estimate: docs/simulators.md. Of SIH, which strays by 0.28 m
-by itself, that of the Iris is taken."""
 PX4_INSTANCE = 9
+PX4_ALONE_M = {"sihsim": 0.066, "iris": 0.066, "hummingbird": 0.061}
+"""RMS of a spiral by PX4's own position control, from its estimate: docs/simulators.md. Of PX4's own physics, where it
+strays by 0.28 m, that of the Iris is taken."""
 ON_A_BUSY_COMPUTER = "--wait 120 --max-age 500 --max-gap 1000 --min-pace 1"
 """At real time beside other tests all come late now and then; how near to its track the vehicle is to be stays."""
 SHELL = """
@@ -64,7 +62,7 @@ exit $code
 
 
 def fly(folder: Path, vehicle: list[str], options: str, beside: str = "true", **environment: str) -> dict[str, Any]:
-    """Fly a vehicle that is started here, and its plant `beside` it; return the companion's report."""
+    """Fly a vehicle that is started here, and what it needs `beside` it; return the companion's report."""
     out = folder / "out"
     companion = f"{sys.executable} -m colibri companion {options} {ON_A_BUSY_COMPUTER} --out {out}"
     command = [*ALONE, "sh", "-c", SHELL.format(companion=companion, beside=beside), "sh", *vehicle]
@@ -87,6 +85,22 @@ def arducopter(folder: Path, options: str) -> dict[str, Any]:
     return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:14555")
 
 
+def arducopter_on_the_plant(folder: Path, options: str) -> dict[str, Any]:
+    """Fly ArduCopter on our plant, as the Hummingbird, at real time."""
+    program, parameters, colibri = program_of("ardupilot"), folder / "companion.parm", f"{sys.executable} -m colibri"
+    told = [*colibri.split(), "vehicle", "hummingbird", "--for", "ardupilot", "--out", str(parameters)]
+    subprocess.run(told, check=True)
+    others = {name: value for name, value in COPTER_PARAMETERS.items() if not name.startswith(("FRAME_", "MOT_"))}
+    with parameters.open("a", encoding="utf-8") as file:
+        file.writelines(f"{name} {value}\n" for name, value in others.items())
+    vehicle = [
+        *(str(program), "--model", "JSON:127.0.0.1", "--speedup", "1", "-w", "--defaults", str(parameters)),
+        *("--serial0", "udpclient:127.0.0.1:14555"),
+    ]
+    plant = f"{colibri} plant --serve ardupilot-json --vehicle hummingbird --out {folder / 'plant'}"
+    return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:14555", plant)
+
+
 def px4(folder: Path, options: str) -> dict[str, Any]:
     """Fly PX4 with its own physics, at real time."""
     build = program_of("px4")
@@ -96,19 +110,15 @@ def px4(folder: Path, options: str) -> dict[str, Any]:
     )
 
 
-def px4_on_the_plant(folder: Path, name: str, options: str) -> dict[str, Any]:
-    """Fly PX4 on our plant, at real time."""
-    build, parameters, colibri = program_of("px4"), folder / "parameters", f"{sys.executable} -m colibri"
-    subprocess.run([*colibri.split(), "vehicle", name, "--for", "px4", "--out", str(parameters)], check=True)
-    plant = f"{colibri} plant --serve px4 --vehicle {name} --speed 1 --out {folder / 'plant'}"
-    settings = px4_settings(parameters, 1) | WITHOUT_LOGGER
-    options = f"{options} --model {name} --vehicle udpin:127.0.0.1:14540"
-    return fly(folder, px4_command(build), options, plant, **settings)
-
-
 def test_arducopter_flies_the_spiral_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
     report = arducopter(tmp_path, "spiral --arm --duration 60")
     assert report["stack"] == "ardupilot"
+    assert report["in_order"]
+    assert report["control_rmse_m"] <= 0.045 / 2.0
+
+
+def test_arducopter_on_the_plant_is_flown_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
+    report = arducopter_on_the_plant(tmp_path, "spiral --arm --duration 40")
     assert report["in_order"]
     assert report["control_rmse_m"] <= 0.045 / 2.0
 
@@ -126,20 +136,10 @@ def test_px4_is_flown_and_left_in_hold(tmp_path: Path) -> None:
     assert report["control_rmse_m"] < 0.3
 
 
-def test_px4_s_own_physics_is_identified_and_flown_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
-    steps, track = tmp_path / "steps", tmp_path / "track"
-    steps.mkdir()
-    track.mkdir()
-    px4(steps, "--identify --arm --model sihsim")
-    response = steps / "out" / "companion.toml"
-    assert "acceleration_lag_s" in response.read_text(encoding="utf-8")
-    report = px4(track, f"spiral --arm --duration 40 --model sihsim --response {response}")
-    assert report["in_order"]
-    assert report["control_rmse_m"] <= PX4_ALONE_M["sihsim"] / 2.0
-
-
-@pytest.mark.parametrize("name", ["iris", "hummingbird"])
-def test_px4_on_the_plant_is_flown_twice_as_well_as_by_its_own_position_control(name: str, tmp_path: Path) -> None:
-    report = px4_on_the_plant(tmp_path, name, "spiral --arm --duration 40")
-    assert report["in_order"]
-    assert report["control_rmse_m"] <= PX4_ALONE_M[name] / 2.0
+@pytest.mark.parametrize("name", PX4_ALONE_M)
+def test_px4_is_flown_twice_as_well_as_by_its_own_position_control(name: str, tmp_path: Path) -> None:
+    command = [*ALONE, sys.executable, "-m", "tests.peers.tracks", str(program_of("px4")), str(tmp_path), name]
+    subprocess.run(command, check=True, timeout=500.0)
+    flown = json.loads((tmp_path / "track.json").read_text(encoding="utf-8"))
+    assert flown["in_order"], flown["ended"]
+    assert flown["rmse_m"] <= PX4_ALONE_M[name] / 2.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from colibri.companion.stacks.px4_modes import HOLD, LAND
+from colibri.companion.stacks.px4_modes import HOLD, OFFBOARD
 from tests.peers.endings import CASES
 from tests.peers.programs import ALONE, program_of
 
@@ -56,7 +56,8 @@ def test_a_limit_ends_it_and_the_vehicle_holds_by_itself(endings: dict[str, dict
     assert ended["mode"] == HOLD.custom
 
 
-def test_a_vehicle_that_has_lost_its_place_and_cannot_hold_lands(endings: dict[str, dict[str, Any]]) -> None:
+def test_a_vehicle_that_has_lost_its_place_is_left_to_itself_at_once(endings: dict[str, dict[str, Any]]) -> None:
     ended = endings["estimate lost"]
     assert ended["limit"] == "estimate lost"
-    assert ended["mode"] == LAND.custom
+    assert ended["sent_after_disturbed_s"] <= ended["limit_after_disturbed_s"]
+    assert ended["mode"] != OFFBOARD.custom

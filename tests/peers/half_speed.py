@@ -1,0 +1,148 @@
+"""Real PX4 and a companion in this process, both at half of real time, which a busy computer still keeps to.
+
+All times are the vehicle's. In a network namespace with loopback alone: PX4 binds to all addresses.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from subprocess import STDOUT, Popen, run
+from time import perf_counter
+from typing import Any
+
+from colibri.common.types import Address
+from colibri.companion.guide import Companion
+from colibri.companion.supervision.limits import FlightLimits
+from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.links.open import open_ground_link
+from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from tests.peers.on_the_plant import px4_command, px4_settings
+
+SPEED = 0.5
+WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}
+"""It holds PX4 up where the disk is slow."""
+OWN_PHYSICS = WITHOUT_LOGGER | {
+    "PX4_SYS_AUTOSTART": "10040",
+    "PX4_SIM_MODEL": "sihsim_quadx",
+    "PX4_SIM_SPEED_FACTOR": str(SPEED),
+    "PX4_PARAM_COM_RC_IN_MODE": "4",
+    "PX4_PARAM_NAV_DLL_ACT": "0",
+    "PX4_PARAM_COM_RCL_EXCEPT": "7",
+    "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
+    "PX4_PARAM_COM_LOW_BAT_ACT": "0",
+    "PX4_PARAM_SIM_BAT_MIN_PCT": "90",
+    "PX4_PARAM_EKF2_NOAID_TOUT": "1000000",
+}
+"""An estimate without aid is lost after a second, not five."""
+PATIENT = FlightLimits(max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0)
+"""Where it is not the lateness that counts: a busy computer is late now and then."""
+
+
+@dataclass
+class Bench:
+    """A vehicle, its companion and its pilot.
+
+    Attributes:
+        process: PX4's.
+        link: The companion's.
+        pilot: The ground station's.
+        sent_us: When the last setpoint was sent, own time.
+    """
+
+    process: Popen[bytes]
+    link: GroundLink
+    pilot: GroundLink
+    companion: Companion | None = None
+    began_s: float = field(default_factory=perf_counter)
+    codec: Codec = field(default_factory=lambda: Codec(255, 190))
+    stopped_until_us: int = 0
+    sent_us: int = 0
+    _address: Address | None = None
+    _pilot_address: Address | None = None
+
+    @property
+    def now_us(self) -> int:
+        """The own time, which passes as the vehicle's."""
+        return round((perf_counter() - self.began_s) * 1e6 * SPEED)
+
+    def turn(self) -> None:
+        """Carry what has come, and what is to be sent."""
+        assert self.companion is not None, "somebody flies"
+        for datagram, sender in self.link.receive_now():
+            self._address = sender
+            self.companion.receive(datagram, self.now_us)
+        for _, sender in self.pilot.receive_now():
+            self._pilot_address = sender
+        frames = self.companion.poll(self.now_us)
+        for frame in frames:
+            if self._address is not None:
+                self.link.send(frame, self._address)
+                if int.from_bytes(frame[7:10], "little") == mav.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET:
+                    self.sent_us = self.now_us
+        if self.stopped_until_us and self.now_us > self.stopped_until_us:
+            self.stopped_until_us = 0
+            self.process.send_signal(signal.SIGCONT)
+        self.link.wait(0.001)
+
+    def order(self, number: int, *parameters: float) -> None:
+        """Have the pilot give a command."""
+        padded = [*parameters, *[0.0] * 7][:7]
+        self._say("COMMAND_LONG", number, 0, *padded)
+
+    def set(self, name: str, value: int) -> None:
+        """Have the pilot set an integer parameter, bytewise."""
+        self._say("PARAM_SET", name, Bits(value), mav.MAV_PARAM_TYPE_INT32)
+
+    def _say(self, name: str, *fields: Any) -> None:
+        assert self._pilot_address is not None, "PX4 calls its ground station"
+        assert self.companion is not None, "somebody flies"
+        system = self.companion.peer.system
+        self.pilot.send(self.codec.encode(name, system, 1, *fields), self._pilot_address)
+
+    def freeze(self, for_s: float) -> None:
+        """Have PX4 stand still."""
+        self.process.send_signal(signal.SIGSTOP)
+        self.stopped_until_us = self.now_us + round(for_s * 1e6)
+
+
+@contextmanager
+def own_physics(build: Path, folder: Path) -> Iterator[Bench]:
+    """Start PX4 with its own physics."""
+    with _started([str(build / "bin" / "px4"), "-d", str(build / "etc")], folder, OWN_PHYSICS) as bench:
+        yield bench
+
+
+@contextmanager
+def on_the_plant(build: Path, folder: Path, vehicle: str) -> Iterator[Bench]:
+    """Start PX4 on our plant."""
+    colibri, parameters = (sys.executable, "-m", "colibri"), folder / "parameters"
+    run([*colibri, "vehicle", vehicle, "--for", "px4", "--out", str(parameters)], check=True)
+    options = ("--serve", "px4", "--vehicle", vehicle, "--speed", str(SPEED), "--out", str(folder / "plant"))
+    settings = px4_settings(parameters, SPEED) | WITHOUT_LOGGER
+    with (
+        (folder / "plant.txt").open("wb") as said,
+        Popen([*colibri, "plant", *options], stdout=said, stderr=STDOUT) as plant,
+    ):
+        try:
+            with _started(px4_command(build), folder, settings) as bench:
+                yield bench
+        finally:
+            plant.terminate()
+
+
+@contextmanager
+def _started(command: list[str], folder: Path, settings: dict[str, str]) -> Iterator[Bench]:
+    link, pilot = (open_ground_link(f"udpin:127.0.0.1:{port}") for port in (14540, 14550))
+    with (folder / "px4.txt").open("wb") as said:
+        process = Popen(command, cwd=folder, env=os.environ | settings, stdout=said, stderr=STDOUT)
+    try:
+        yield Bench(process, link, pilot)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        link.close()
+        pilot.close()
