@@ -59,6 +59,7 @@ def test_with_a_key_file_both_sign(tmp_path: Path, key_file: Path) -> None:
             assert not [message for message in station.heard if message.get_type() == "BAD_DATA"]
 
 
+@pytest.mark.long
 def test_unsigned_badly_signed_and_replayed_frames_are_refused(tmp_path: Path, key_file: Path) -> None:
     with GroundStation(announced=False) as station:
         sign(station)

@@ -82,6 +82,7 @@ def test_an_unknown_figure_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     assert capsys.readouterr().err == "colibri: error: there is no figure 5.1: choose 4.1 to 4.11 or A.1 to A.24\n"
 
 
+@pytest.mark.long
 def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     contenders = ["--profile", "thesis", "--profile", "thesis:global-lpv-mpc"]
     assert main(["compare", *contenders, "--track", "line", "--track", "spiral", "--out", str(tmp_path)]) == 1

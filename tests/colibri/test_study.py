@@ -151,7 +151,7 @@ def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in ("recovery", "limits") else pytest.mark.long) for name in NAMES]
+    "name", [pytest.param(name, marks=() if name == "recovery" else pytest.mark.long) for name in NAMES]
 )
 def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path) -> None:
     study = of_name(name)

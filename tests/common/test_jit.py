@@ -139,6 +139,7 @@ def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedP
     return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
 
 
+@pytest.mark.long
 def test_kernels_of_all_kinds_are_the_same_from_disk_and_most_need_no_front_end_of_numba(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(KINDS)
     first, second, third = (_run(tmp_path, *words).stdout.splitlines() for words in ((), (), ("caller",)))

@@ -68,6 +68,7 @@ def test_the_control_law_answers_whatever_decodes(seed: int) -> None:
         assert all(0.0 <= control <= 1.0 for control in step.command.controls)
 
 
+@pytest.mark.long
 def test_two_processes_under_fire(tmp_path: Path) -> None:
     outcome = campaign(tmp_path, 2500, burst=50, seed=1)
     assert outcome.failures == []

@@ -146,7 +146,14 @@ def test_the_first_strategy_fails_as_the_thesis_says(tmp_path: Path, link: str) 
     assert max(flown[f"omega{rotor}"].max() for rotor in (1, 2, 3, 4)) <= 8002.0
 
 
-@pytest.mark.parametrize(("track", "rms_m"), [("spiral", 1e-6), ("line", 1e-6), ("crown", 1e-3)])
+@pytest.mark.parametrize(
+    ("track", "rms_m"),
+    [
+        pytest.param("spiral", 1e-6, marks=pytest.mark.long),
+        pytest.param("line", 1e-6, marks=pytest.mark.long),
+        ("crown", 1e-3),
+    ],
+)
 def test_the_geometric_controller_follows_an_ideal_vehicle_exactly(tmp_path: Path, track: str, rms_m: float) -> None:
     figures = fly(tmp_path, track, "--profile", "se3", "--link", "memory", "--duration", "30")
     assert figures["rmse_after_20s_m"] < rms_m

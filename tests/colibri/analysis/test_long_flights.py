@@ -92,6 +92,7 @@ def test_parts_joined_are_the_flight_to_the_bit(plan: FlightPlan, monkeypatch: p
             assert np.array_equal(getattr(again, name), getattr(whole, name)), name
 
 
+@pytest.mark.long
 def test_report_and_table_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks(monkeypatch, ALL_ROWS)
     whole = kept(plan)

@@ -117,6 +117,7 @@ def test_a_file_that_is_no_mission_is_refused(text: str, tmp_path: Path) -> None
         read_plan(plan(tmp_path, waypoints(), speed_m_s=inf))
 
 
+@pytest.mark.long
 def test_a_vehicle_says_where_its_home_is_and_a_mission_is_flown_from_there(tmp_path: Path) -> None:
     with Flights(Setting(), None) as flights:
         sitl = flights.begin(airborne=2.5)

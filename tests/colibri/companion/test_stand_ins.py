@@ -40,11 +40,11 @@ def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
 @pytest.mark.parametrize(
     "numbers",
     [
-        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02),
         Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06),
-        Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04),
         Numbers(lag_s=(0.11, 0.11, 0.3), late_s=0.04),
-        Numbers(lag_s=(0.028, 0.028, 0.3), late_s=0.055),
+        pytest.param(Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02), marks=pytest.mark.long),
+        pytest.param(Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04), marks=pytest.mark.long),
+        pytest.param(Numbers(lag_s=(0.028, 0.028, 0.3), late_s=0.055), marks=pytest.mark.long),
     ],
 )
 def test_px4_s_rates_may_follow_late_and_overshoot(numbers: Numbers) -> None:

@@ -112,6 +112,7 @@ def test_a_folder_with_something_else_is_left_alone(folder: Path, results: Tunin
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.long
 def test_a_trial_that_is_clearly_worse_ends_early(tmp_path: Path) -> None:
     space = {f"{WEIGHTS}.position": {"log-uniform": [0.01, 1000]}}
     results = tuned(tmp_path, seeds="1-8", trials=6, prune_after=5, tune=space)

@@ -8,7 +8,8 @@ import pytest
 from tools.harness.processes import Process, rows, running, wait_for
 
 
-@pytest.mark.parametrize("vehicle", ["jmavsim", pytest.param("hummingbird", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("vehicle", ["jmavsim", "hummingbird"])
 def test_it_hovers_on_sensors_in_a_simulator_of_px4(tmp_path: Path, vehicle: str) -> None:
     out, said = tmp_path / "out", tmp_path / "said"
     said.mkdir()

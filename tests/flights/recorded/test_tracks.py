@@ -113,7 +113,7 @@ def test_forward_euler_flies_a_little_worse() -> None:
     ("name", "duration_s", "rms_m"),
     [
         ("circle:radius=3,speed=4", 25.0, 1e-3),
-        ("waypoints", 25.0, 1e-6),
+        pytest.param("waypoints", 25.0, 1e-6, marks=pytest.mark.long),
         pytest.param("hover", 25.0, 1e-6, marks=pytest.mark.long),
         pytest.param("lemniscate", 30.0, 0.01, marks=pytest.mark.long),
     ],
