@@ -42,9 +42,8 @@ def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
 
 
 @begins_as_recorded
-@pytest.mark.parametrize(
-    "name", ["openblas-nehalem", pytest.param("glibc-without-avx2-and-fma", marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["openblas-nehalem", "glibc-without-avx2-and-fma"])
 def test_fewer_are_the_same_under_a_few_variations(tmp_path: Path, name: str) -> None:
     check(ALL[name], fly_here(ALL[name], tmp_path, only=FEWER))
 

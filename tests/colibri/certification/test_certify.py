@@ -64,9 +64,9 @@ def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
     ("what", "spoil"),
     [
         ("decrease", lambda proof: spoilt(proof, 1, 1, 1.1)),
-        ("decrease", lambda proof: spoilt(proof, 0, 1, 1.0 + 1e-12)),
+        pytest.param("decrease", lambda proof: spoilt(proof, 0, 1, 1.0 + 1e-12), marks=pytest.mark.long),
         ("disturbance", lambda proof: proof._replace(multipliers=1.001 * proof.multipliers)),
-        ("limits", lambda proof: proof._replace(P=0.999 * proof.P)),
+        pytest.param("limits", lambda proof: proof._replace(P=0.999 * proof.P), marks=pytest.mark.long),
     ],
     ids=["P unlike", "P not symmetric", "larger multipliers", "larger set"],
 )
