@@ -1,5 +1,6 @@
 """The vehicle's side towards ground stations: all services, put together around one pilot, on one hub."""
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -57,6 +58,7 @@ from colibri.mavlink.wire.signing import Signing
 
 PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 MAX_SAID = 20
+"""Status texts kept for whoever watches the process."""
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
@@ -133,7 +135,7 @@ class Stations:
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._caught = lines, pilot, caught
         self._text = StatusText()
-        self._said: list[Line] = []
+        self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.setpoints = sources = SetpointSources(Offboard(), Manual(settings.system_id), Follow())
         self.missions, self.fence = missions, fence
@@ -230,7 +232,7 @@ class Stations:
         except Exception as error:
             self._left_out("hub", error, "not polled in this frame")
         said = self._text.take()
-        self._said = [*self._said, *said][-MAX_SAID:]
+        self._said.extend(said)
         try:
             self.log.update(self.snapshot, said, now_us, armed=self._pilot.state.armed)
         except Exception as error:
@@ -268,7 +270,8 @@ class Stations:
 
     def take_texts(self) -> list[Line]:
         """Return the status texts since the last time, the last of many, for whoever watches the process."""
-        said, self._said = self._said, []
+        said = list(self._said)
+        self._said.clear()
         return said
 
     def _provide(self, modes: StandardModes, metadata: Metadata) -> None:

@@ -3,6 +3,7 @@
 import csv
 import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from heapq import merge
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,10 +42,8 @@ def read_log(path: Path) -> tuple[Path, "ULog"]:
     Raises:
         ExportError: There is none, or what reads it is not installed.
     """
-    try:
+    with _needed("pyulog", "export"):
         from pyulog import ULog
-    except ModuleNotFoundError as error:
-        raise _missing("pyulog", "export") from error
     log = path / LOG if path.is_dir() else path
     try:
         with log.open("rb") as file:
@@ -61,10 +60,8 @@ def write_mcap(log: "ULog", path: Path) -> Path:
     Raises:
         ExportError: What writes it is not installed.
     """
-    try:
+    with _needed("mcap", "export"):
         from mcap.writer import Writer
-    except ModuleNotFoundError as error:
-        raise _missing("mcap", "export") from error
     with path.open("wb") as file:
         writer: Any = Writer(file)  # parts of it have no types
         writer.start(library="colibri")
@@ -93,18 +90,21 @@ def write_parquet(log: "ULog", folder: Path) -> Path:
     Raises:
         ExportError: What writes it is not installed.
     """
-    try:
+    with _needed("pyarrow", "parquet"):
         from pyarrow import table
         from pyarrow.parquet import write_table
-    except ModuleNotFoundError as error:
-        raise _missing("pyarrow", "parquet") from error
     for name, topic, _ in _topics(log):
         write_table(table(topic.data), _table(folder, f"{name}.parquet"))
     return folder
 
 
-def _missing(module: str, extra: str) -> ExportError:
-    return ExportError(f"this needs {module}: pip install 'colibri-sitl[{extra}]'")
+@contextmanager
+def _needed(module: str, extra: str) -> Iterator[None]:
+    """Say which extra brings a module that is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ExportError(f"this needs {module}: pip install 'colibri-sitl[{extra}]'") from error
 
 
 def _table(folder: Path, name: str) -> Path:

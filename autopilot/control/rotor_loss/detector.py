@@ -180,29 +180,9 @@ def _add_evidence(
     last: Array,
     noise: Array,
 ) -> tuple[int, float]:
-    """Add a sample to the CUSUMs, (4,); return the largest one's rotor, and what that has come to: see `_evidence`."""
-    sample = _evidence(before, now, speeds_before, speeds, interval_s, signature, last, noise)
-    likeliest = 0
-    for i in range(evidence.shape[0]):
-        evidence[i] = max(evidence[i] + sample[i], 0.0)
-        if evidence[i] > evidence[likeliest]:
-            likeliest = i
-    return likeliest, evidence[likeliest]
+    """Add a sample to the CUSUMs, (4,), in place; return the rotor of the largest, and what that has come to.
 
-
-@compiled
-def _evidence(
-    before: Array,
-    now: Array,
-    speeds_before: Array,
-    speeds: Array,
-    interval_s: float,
-    signature: Packed,
-    last: Array,
-    noise: Array,
-) -> Array:
-    """Return how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms, (4,).
-
+    It adds how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms.
     Of a sample ago and of now are velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU), (9,), and rotor speeds,
     parts of the largest, (4,). `last` is the residual of the sample before, (4,), and `noise` the variances of what
     changes in it from sample to sample, (4,); both are carried on in place.
@@ -231,8 +211,9 @@ def _evidence(
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
         last[row] = residual[row]
-    evidence = np.zeros(4)
+    likeliest = 0
     for i in range(4):
+        added = 0.0
         for row in range(4):
             missing = of.effect[row, i] * thrust_n[i]
             weak, none = residual[row] + _WEAK * missing, residual[row] + missing
@@ -241,6 +222,8 @@ def _evidence(
                 if minimum > maximum:
                     minimum, maximum = maximum, minimum
                 weak -= min(max(weak, minimum), maximum)
-            evidence[i] += 0.5 * (weak * weak - none * none) / (of.variances[row] + noise[row])
-        evidence[i] = min(evidence[i], MAX_EVIDENCE)
-    return evidence
+            added += 0.5 * (weak * weak - none * none) / (of.variances[row] + noise[row])
+        evidence[i] = max(evidence[i] + min(added, MAX_EVIDENCE), 0.0)
+        if evidence[i] > evidence[likeliest]:
+            likeliest = i
+    return likeliest, evidence[likeliest]
