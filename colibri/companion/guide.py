@@ -4,23 +4,20 @@ What is done in each phase is here; which follows which, and why, is in `supervi
 """
 
 from math import dist, inf, nan
-from typing import Any
 
-from colibri.autopilot.control.interface import FALLBACK_CODES, Clock
+from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.common.rotations import euler_from_quaternion, tilt_deg
-from colibri.common.types import Array, Vector
+from colibri.common.rotations import tilt_deg
 from colibri.companion.conversation.vehicle_peer import ReceivedState, VehiclePeer
 from colibri.companion.identification import steps
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
-from colibri.companion.settings import CompanionSettings, SetpointKind
+from colibri.companion.setpoint_forms import first, message_of, row_of
+from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.stack import Response
 from colibri.companion.stacks.thrust_curve import Thrust
-from colibri.companion.steering import response as model
-from colibri.companion.steering import setpoints
 from colibri.companion.steering.law_pilot import Asked, LawPilot
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
@@ -312,7 +309,7 @@ class Companion:
         self._pace.count(now_us)
         if asked.reference is not None:
             self._asked = asked
-            place = _first(asked.reference.position_enu_m)
+            place = first(asked.reference.position_enu_m)
             self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
         if self.phase is Phase.TAKING_OVER and not rehearses:
             asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
@@ -324,10 +321,13 @@ class Companion:
                 self._thrust.load(thrust) * self._weight_n * self._predictor.thrust_scale / self._vehicle.body.mass_kg
             )
             self._predictor.sent(acts_us, asked.rate_flu_rad_s, lift)
-        self._note(now_us, y, asked, thrust, sent=not rehearses)
+        assert self._asked is not None, "a law has decided"
+        head = (now_us * 1e-6, self.phase.value, self._age_s(now_us), self.peer.clock.round_trip_us * 1e-6)
+        self.rows.append(row_of(head, asked, self._asked, thrust, y, self._predictor, sent=not rehearses))
         if rehearses:
             return []
-        name, fields = self._encoded(now_us, asked, thrust, y)
+        kind, target = self._settings.setpoints, self.peer.target
+        name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
         return [self.peer.codec.encode(name, *fields)]
 
     def _with_step(self, asked: Asked, now_us: int) -> Asked:
@@ -335,16 +335,6 @@ class Companion:
         p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
         self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
         return asked._replace(rate_flu_rad_s=(p, q, r))
-
-    def _encoded(self, now_us: int, asked: Asked, thrust: float, y: Array) -> setpoints.Encoded:
-        kind, target, last = self._settings.setpoints, self.peer.target, self._asked
-        if kind is SetpointKind.RATES or last is None or last.reference is None or last.decision is None:
-            return setpoints.rates(now_us, target, asked.rate_flu_rad_s, thrust)
-        if kind is SetpointKind.ATTITUDE:
-            return setpoints.attitude(now_us, target, last.decision.attitude_reference, thrust)
-        if kind is SetpointKind.POSITION:
-            return setpoints.position(now_us, target, last.reference)
-        return setpoints.velocity(now_us, target, last.reference, _first(y[None, model.POSITION]))
 
     # Facts.
 
@@ -392,26 +382,3 @@ class Companion:
             pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
             gap_s=self._pace.gap_s(now_us) if flies else 0.0,
         )
-
-    def _note(self, now_us: int, y: Array, asked: Asked, thrust: float, *, sent: bool) -> None:
-        last = self._asked
-        assert last is not None, "a law has decided"
-        assert last.reference is not None, "a law has decided"
-        reference, place = last.reference, _first(y[None, model.POSITION])
-        wanted = _first(reference.position_enu_m)
-        fallback = last.decision.diagnostics.fallback if last.decision else None
-        euler = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
-        numbers: tuple[Any, ...] = (
-            *(now_us * 1e-6, self.phase.value, int(last.track_enu_m is not None), last.track_s),
-            *(self._age_s(now_us), self.peer.clock.round_trip_us * 1e-6),
-            *(*place, *y[model.VELOCITY].tolist(), *euler, *y[model.RATE].tolist()),
-            *(*wanted, *_first(reference.velocity_enu_m_s), float(reference.yaw_rad[0]), dist(place, wanted)),
-            *(*asked.rate_flu_rad_s, thrust, asked.thrust_n, self._predictor.thrust_scale),
-            *(*self._predictor.disturbance[:3].tolist(), FALLBACK_CODES[fallback], int(sent)),
-        )
-        self.rows.append(LogRow(*numbers))
-
-
-def _first(rows: Any) -> Vector:
-    x, y, z = rows[0].tolist()
-    return (x, y, z)

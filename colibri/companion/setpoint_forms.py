@@ -1,0 +1,76 @@
+"""A setpoint as the vehicle is sent it, and as a row of the log."""
+
+from math import dist
+from typing import Any
+
+from colibri.autopilot.control.interface import FALLBACK_CODES
+from colibri.common.rotations import euler_from_quaternion
+from colibri.common.types import Array, Vector
+from colibri.companion.log import LogRow
+from colibri.companion.settings import SetpointKind
+from colibri.companion.steering import response as model
+from colibri.companion.steering import setpoints
+from colibri.companion.steering.law_pilot import Asked
+from colibri.companion.steering.predictor import Predictor
+
+
+def message_of(
+    kind: SetpointKind,
+    now_us: int,
+    target: tuple[int, int],
+    asked: Asked,
+    decided: Asked | None,
+    thrust: float,
+    y: Array,
+) -> setpoints.Encoded:
+    """Return name and fields of a setpoint's message.
+
+    Args:
+        kind: What the vehicle takes; body rates where the law has decided nothing else.
+        now_us: The own clock.
+        target: System and component.
+        asked: Body rates and thrust.
+        decided: The law's last decision on references.
+        thrust: What is sent for the thrust, 0..1.
+        y: The vehicle when it takes effect, as `response.carry` has it.
+    """
+    if kind is SetpointKind.RATES or decided is None or decided.reference is None or decided.decision is None:
+        return setpoints.rates(now_us, target, asked.rate_flu_rad_s, thrust)
+    if kind is SetpointKind.ATTITUDE:
+        return setpoints.attitude(now_us, target, decided.decision.attitude_reference, thrust)
+    if kind is SetpointKind.POSITION:
+        return setpoints.position(now_us, target, decided.reference)
+    return setpoints.velocity(now_us, target, decided.reference, first(y[None, model.POSITION]))
+
+
+def row_of(
+    head: tuple[float, str, float, float],
+    asked: Asked,
+    decided: Asked,
+    thrust: float,
+    y: Array,
+    predictor: Predictor,
+    *,
+    sent: bool,
+) -> LogRow:
+    """Return the row of a setpoint: `head` is time, s, phase, age of the state and round trip, s; see `message_of`."""
+    time_s, phase, state_age_s, round_trip_s = head
+    assert decided.reference is not None, "a law has decided"
+    reference, place = decided.reference, first(y[None, model.POSITION])
+    wanted = first(reference.position_enu_m)
+    fallback = decided.decision.diagnostics.fallback if decided.decision else None
+    euler = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
+    numbers: tuple[Any, ...] = (
+        *(time_s, phase, int(decided.track_enu_m is not None), decided.track_s, state_age_s, round_trip_s),
+        *(*place, *y[model.VELOCITY].tolist(), *euler, *y[model.RATE].tolist()),
+        *(*wanted, *first(reference.velocity_enu_m_s), float(reference.yaw_rad[0]), dist(place, wanted)),
+        *(*asked.rate_flu_rad_s, thrust, asked.thrust_n, predictor.thrust_scale),
+        *(*predictor.disturbance[:3].tolist(), FALLBACK_CODES[fallback], int(sent)),
+    )
+    return LogRow(*numbers)
+
+
+def first(rows: Array) -> Vector:
+    """Return the first row of (n, 3)."""
+    x, y, z = rows[0].tolist()
+    return (x, y, z)
