@@ -17,10 +17,11 @@ import numpy as np
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, terminal
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, rotor_lag
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
-from colibri.common.jit import Packed, compiled, packed
-from colibri.common.rotations import rotation_matrix
-from colibri.common.types import Array
+from colibri.common.jit import Packed, compiled, opened, packed
+from colibri.common.matrices import put
+from colibri.common.types import Array, FourRotors, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
 ALARM = 20.0
@@ -36,6 +37,8 @@ _NOISE_PART = 1.0 / 64.0
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 """Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
 it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
+
+_STILL = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Signature(NamedTuple):
@@ -78,46 +81,81 @@ def signature_of(vehicle: Vehicle) -> Signature:
     )
 
 
+class Numbers(NamedTuple):
+    """What stays the same from sample to sample.
+
+    Attributes:
+        signature: Of the vehicle's rotors.
+        lag: Of the rotors over a control sample.
+        interval_s: Of a control sample.
+    """
+
+    signature: Signature
+    lag: RotorLag
+    interval_s: float
+
+
+class Memory(NamedTuple):
+    """What is remembered from sample to sample.
+
+    Attributes:
+        speeds: Rotor speeds, as their lag has them, parts of the largest, (4,).
+        motion: Velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU), (9,).
+        evidence: What each rotor's CUSUM has come to, (4,).
+        residual: Of force and moments, N and N m, (4,).
+        noise: Variances of what changes in it from sample to sample, (4,).
+    """
+
+    speeds: Array
+    motion: Array
+    evidence: Array
+    residual: Array
+    noise: Array
+
+
 class RotorWatch:
     """Watches the rotors of one vehicle.
 
     Attributes:
         lost: The rotor that is lost, 0..3; None while all turn. Once lost it stays so.
-        evidence: What each rotor's CUSUM has come to, (4,).
-        speeds: Rotor speeds now, as their lag has them, in parts of the largest, (4,).
         max_evidence: The most that any CUSUM has ever come to.
     """
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Watch `vehicle`, a control sample every `interval_s`."""
+        """Watch `vehicle`, a control sample every `interval_s`; what is compiled is loaded here."""
         self._interval_s = interval_s
         self.lost: int | None = None
-        self.evidence = np.zeros(4)
-        self.speeds = np.zeros(4)
         self.max_evidence = 0.0
-        self._before: Array | None = None
-        self._residual, self._noise = np.zeros(4), np.zeros(4)
+        self._memory = packed(Memory(np.zeros(4), np.zeros(9), np.zeros(4), np.zeros(4), np.zeros(4)))
+        self._kept = opened(self._memory, Memory)
         self.adopt(vehicle)
         controls = (0.0, 0.0, 0.0, 0.0)
-        self.speeds = _followed(self.speeds, controls, 1.0, self._lag, self._battery.numbers)
-        self._add(np.zeros(9), np.zeros(9), self.speeds)
+        self._take_in(_STILL, controls, 0.0, counts=True)
         self.begin(controls)
+
+    @property
+    def speeds(self) -> Array:
+        """Rotor speeds now, as their lag has them, in parts of the largest, (4,)."""
+        return self._kept.speeds.copy()
+
+    @speeds.setter
+    def speeds(self, speeds: Array) -> None:
+        self._kept.speeds[:] = speeds
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle."""
-        self._signature = packed(signature_of(vehicle))
-        self._lag: RotorLag = rotor_lag(vehicle, self._interval_s)
         self._battery = BatteryModel(vehicle)
+        lag = rotor_lag(vehicle, self._interval_s)
+        self._numbers = packed(Numbers(signature_of(vehicle), lag, self._interval_s))
 
-    def begin(self, controls: tuple[float, float, float, float]) -> None:
-        """Reset, with the rotors at `controls`, parts of the largest speed: no sample was before."""
+    def begin(self, controls: FourRotors) -> None:
+        """Reset, with the rotors at `controls`, parts of the largest: no sample was before."""
+        kept = self._kept
         self.speeds = np.array(controls)
-        self.evidence[:] = self._residual[:] = self._noise[:] = 0.0
-        self._before = None
+        kept.evidence[:] = kept.residual[:] = kept.noise[:] = 0.0
+        self._began = False
 
-    def step(
-        self, state: VehicleState, controls: tuple[float, float, float, float], charge_ah: float, *, airborne: bool
-    ) -> int | None:
+    def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
         """Take in a control sample; return the rotor that is lost, None while all turn.
 
         Args:
@@ -126,40 +164,64 @@ class RotorWatch:
             charge_ah: Charge taken from the battery.
             airborne: Whether nothing but air touches it.
         """
-        open_v = self._battery.open_voltage_v(charge_ah)
-        before, last = self.speeds, self._before
-        self.speeds = _followed(before, controls, open_v, self._lag, self._battery.numbers)
-        R = rotation_matrix(state.attitude)
-        self._before = now = np.array((*state.velocity_enu_m_s, *state.rate_flu_rad_s, R[0][2], R[1][2], R[2][2]))
-        if last is None or not airborne:
-            self.evidence[:] = 0.0
-            return self.lost
-        likeliest, most = self._add(last, now, before)
+        likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
+        self._began = True
         self.max_evidence = max(self.max_evidence, most)
         if self.lost is None and most >= ALARM:
             self.lost = likeliest
         return self.lost
 
-    def _add(self, last: Array, now: Array, speeds_before: Array) -> tuple[int, float]:
-        """Add a sample's evidence; return which rotor is likeliest to be lost, and its evidence."""
-        found: tuple[int, float] = _add_evidence(
-            self.evidence,
-            last,
-            now,
-            speeds_before,
-            self.speeds,
-            self._interval_s,
-            self._signature,
-            self._residual,
-            self._noise,
+    def _take_in(
+        self, state: VehicleState, controls: FourRotors, charge_ah: float, *, counts: bool
+    ) -> tuple[int, float]:
+        """Take in a sample that counts, or that is only remembered; return the likeliest rotor, and its evidence."""
+        _, velocity, attitude, _, rate, _ = state
+        battery = self._battery
+        found: tuple[int, float] = _take_in(
+            velocity,
+            attitude,
+            rate,
+            controls,
+            battery.open_voltage_v(charge_ah),
+            counts,
+            self._numbers,
+            battery.numbers,
+            self._memory,
         )
         return found
 
 
 @compiled
-def _followed(
-    speeds: Array, controls: tuple[float, float, float, float], open_v: float, lag: RotorLag, battery: Packed
-) -> Array:
+def _take_in(
+    velocity_enu_m_s: Vector,
+    attitude: Quaternion,
+    rate_flu_rad_s: Vector,
+    controls: FourRotors,
+    open_v: float,
+    counts: bool,
+    numbers: Packed,
+    battery: Packed,
+    memory: Packed,
+) -> tuple[int, float]:
+    """Carry the `Memory` on by a sample; return which rotor is likeliest to be lost, and its evidence.
+
+    `controls` are those since the sample before, `open_v` is the battery's voltage without load, `numbers` are the
+    `Numbers`, `battery` the `BatteryNumbers`. A sample that `counts` adds evidence; one that does not takes all away.
+    """
+    it, of = memory[0], numbers[0]
+    speeds_before, before = it.speeds.copy(), it.motion.copy()
+    put(_followed(speeds_before, controls, open_v, of.lag, battery), it.speeds)
+    R = rotation_matrix(attitude)
+    for i in range(3):
+        it.motion[i], it.motion[3 + i], it.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
+    if not counts:
+        it.evidence[:] = 0.0
+        return 0, 0.0
+    return _add_evidence(it, before, speeds_before, of.signature, of.interval_s)
+
+
+@compiled
+def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag, battery: Packed) -> Array:
     """Return the rotor speeds (4,) one control sample after `controls`, on a battery with an open voltage."""
     max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
     commands = np.empty_like(speeds)
@@ -170,24 +232,14 @@ def _followed(
 
 @compiled
 def _add_evidence(
-    evidence: Array,
-    before: Array,
-    now: Array,
-    speeds_before: Array,
-    speeds: Array,
-    interval_s: float,
-    signature: Packed,
-    last: Array,
-    noise: Array,
+    memory: Memory, before: Array, speeds_before: Array, of: Signature, interval_s: float
 ) -> tuple[int, float]:
-    """Add a sample to the CUSUMs, (4,), in place; return the rotor of the largest, and what that has come to.
+    """Add a sample to the CUSUMs, in place; return the rotor of the largest, and what that has come to.
 
-    It adds how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms.
-    Of a sample ago and of now are velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU), (9,), and rotor speeds,
-    parts of the largest, (4,). `last` is the residual of the sample before, (4,), and `noise` the variances of what
-    changes in it from sample to sample, (4,); both are carried on in place.
+    It adds how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms. Motion
+    and speeds of `memory` are those of now, of `before` and `speeds_before` a sample ago; the residual is that before.
     """
-    of = signature[0]
+    evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
     thrust_n = np.empty(4)
     h, h_rate = 0.0, 0.0
     for i in range(4):
