@@ -4,11 +4,15 @@ from typing import NamedTuple
 
 from colibri.autopilot.commander.flight.reference_generator import Guidance
 from colibri.autopilot.commander.rules.arming import ArmingInputs, battery_fault
-from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import MANUAL
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.core.parts import Parts
+from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.health import HealthWatch, not_known
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
+
+_CRITICAL = (mav.MAV_BATTERY_CHARGE_STATE_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE_EMERGENCY)
 
 
 class Sample(NamedTuple):
@@ -40,41 +44,43 @@ class Reporter:
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
         now_us, state, guidance, decision, duration_s = sample
         self.samples += 1
-        pilot.readiness.update(self._arming_inputs(now_us, state))
-        estimate = parts.state_source.estimate
+        estimate, charge_state = parts.state_source.estimate, parts.supervisor.charge_state
+        breach = stations.fence.breach(state.position_enu_m, now_us)
+        pilot.readiness.update(self._arming_inputs(state, estimate, breach, charge_state))
         if estimate is not None:
             for severity, line in self._health.lines(estimate.health):
                 stations.say(severity, line)
         controls = parts.actuation.turning(now_us, armed=pilot.state.armed)
         parts.battery.run(controls, self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
-        battery = parts.battery.state()
-        if battery is not None:
-            battery = battery._replace(charge_state=parts.supervisor.charge_state)
         snapshot = parts.snapshots.take(
-            now_us, state, pilot, guidance, decision, duration_s, controls, battery, stations, parts.state_source
+            *(now_us, state, pilot, guidance, decision, duration_s, controls),
+            *(parts.battery.state(charge_state), stations.fence, parts.state_source),
+            breached=breach is not None,
         )
         stations.update(snapshot)
 
-    def _arming_inputs(self, now_us: int, state: VehicleState) -> ArmingInputs:
+    def _arming_inputs(
+        self, state: VehicleState, estimate: Estimate | None, breach: Refusal | None, charge_state: int
+    ) -> ArmingInputs:
         """Return the inputs of the arming checks."""
         parts, pilot = self._parts, self._parts.pilot
-        sticks, estimate = pilot.sensed.steered.sticks, parts.state_source.estimate
+        sticks = pilot.sensed.steered.sticks
         return ArmingInputs(
             state,
             pilot.ground.standing,
             parts.battery.left,
             sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None,
-            parts.stations.fence.breach(state.position_enu_m, now_us),
+            breach,
             not_known(estimate.health) if estimate is not None else "",
-            self._battery_fault(),
+            self._battery_fault(charge_state),
         )
 
-    def _battery_fault(self) -> str:
+    def _battery_fault(self, charge_state: int) -> str:
         """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
-        battery, model = self._parts.battery.state(), self._parts.loop.vehicle.battery
-        if battery is None or model is None:
+        voltage_v, model = self._parts.battery.voltage_v, self._parts.loop.vehicle.battery
+        if model is None:
             return ""
-        if any(map(self._parts.supervisor.holds, (Condition.BATTERY_EMERGENCY, Condition.BATTERY_CRITICAL))):
-            return f"battery critical: {battery.voltage_v:.1f} V"
-        return battery_fault(battery.voltage_v, model.empty_voltage_v, model.full_voltage_v)
+        if charge_state in _CRITICAL:
+            return f"battery critical: {voltage_v:.1f} V"
+        return battery_fault(voltage_v, model.empty_voltage_v, model.full_voltage_v)

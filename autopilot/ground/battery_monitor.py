@@ -10,7 +10,7 @@ import numpy as np
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, estimated
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.plant_status import PlantBattery
-from colibri.mavlink.telemetry.snapshot import BatteryState
+from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState
 from colibri.plant.vehicle.description import Vehicle
 
 _CELL_V = 4.2
@@ -32,6 +32,7 @@ class BatteryMonitor:
         """Begin with a full battery."""
         self._model = BatteryModel(vehicle)
         self._battery = vehicle.battery
+        self._cells = 0 if vehicle.battery is None else max(1, round(vehicle.battery.full_voltage_v / _CELL_V))
         self.energy_wh = 0.0
         self._now = self._model.terminal(0.0, np.zeros(4))
         self._vehicle = vehicle
@@ -69,13 +70,17 @@ class BatteryMonitor:
             return 1.0
         return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
 
-    def state(self) -> BatteryState | None:
-        """Return the battery state for telemetry; None without a battery."""
+    @property
+    def voltage_v(self) -> float:
+        """Voltage at the terminals now, V; 0 without a battery."""
+        return max(0.0, self._now[0] + self._sag_v)
+
+    def state(self, charge_state: int = CHARGE_OK) -> BatteryState | None:
+        """Return the battery state for telemetry, with this MAV_BATTERY_CHARGE_STATE; None without a battery."""
         if self._battery is None:
             return None
-        voltage_v, current_a = self._now
-        left_ah = self.left * self._battery.capacity_ah
+        left, current_a = self.left, self._now[1]
+        left_ah = left * self._battery.capacity_ah
         left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _MIN_CURRENT_A else nan
-        cells = max(1, round(self._battery.full_voltage_v / _CELL_V))
-        voltage_v = max(0.0, voltage_v + self._sag_v)
-        return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self.energy_wh)
+        taken = self.charge_ah, left, left_s, self.energy_wh
+        return BatteryState(self._cells, self.voltage_v, current_a, *taken, charge_state)

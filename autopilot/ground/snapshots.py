@@ -2,6 +2,7 @@
 
 from math import isnan, nan
 
+from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.flight.reference_generator import Guidance
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
@@ -18,7 +19,6 @@ from colibri.autopilot.control.interface import (
 from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
-from colibri.autopilot.ground.stations import Stations
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.telemetry.snapshot import (
@@ -68,8 +68,10 @@ class SnapshotBuilder:
         duration_s: float,
         controls: FourRotors,
         battery: BatteryState | None,
-        stations: Stations,
+        fence: Fence,
         state_source: StateSource,
+        *,
+        breached: bool,
     ) -> Snapshot:
         """Return the vehicle as it is now.
 
@@ -82,37 +84,39 @@ class SnapshotBuilder:
             duration_s: How long it took.
             controls: Rotor commands, parts of the largest speed.
             battery: Its battery; None without one.
-            stations: The ground stations' side, for the fence.
+            fence: Where it may be.
             state_source: How the state is known.
+            breached: Whether it is where it must not be.
         """
-        sticks = pilot.context().steered.sticks
+        sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
         mode, armed = pilot.state
-        before, self._velocity = self._velocity or state.velocity_enu_m_s, state.velocity_enu_m_s
-        ax, ay, az = ((new - old) / self._interval_s for new, old in zip(state.velocity_enu_m_s, before, strict=True))
+        number = custom_mode(mode)
+        vx, vy, vz = velocity = state.velocity_enu_m_s
+        (ux, uy, uz), self._velocity, dt = self._velocity or velocity, velocity, self._interval_s
         speed = self._vehicle.rotors.max_speed * self._vehicle.rad_s_per_speed_unit
         c1, c2, c3, c4 = controls
         return Snapshot(
             time_us=now_us,
             armed=armed,
             base_mode=_MANUAL if sticks is not None and mode in _BY_STICKS else _AUTO,
-            custom_mode=custom_mode(mode),
-            intended_custom_mode=custom_mode(mode),
+            custom_mode=number,
+            intended_custom_mode=number,
             standard_mode=ROWS[mode].standard,
             landed_state=landed_state(pilot, state),
             failsafe=pilot.saving is not Action.NONE,
             emergency=pilot.saving >= Action.LAND,
             terminated=pilot.terminated,
-            armable=not pilot.readiness.refusals(),
+            armable=pilot.readiness.may_arm,
             position_enu_m=state.position_enu_m,
-            velocity_enu_m_s=state.velocity_enu_m_s,
-            acceleration_enu_m_s2=(ax, ay, az),
+            velocity_enu_m_s=velocity,
+            acceleration_enu_m_s2=((vx - ux) / dt, (vy - uy) / dt, (vz - uz) / dt),
             attitude=state.attitude,
             rate_flu_rad_s=state.rate_flu_rad_s,
-            origin=pilot.home.origin,
+            origin=home.origin,
             gps_ok=state_source.has_gps(now_us),
-            fence_enabled=stations.fence.exists,
-            fence_breached=stations.fence.breach(state.position_enu_m, now_us) is not None,
-            home=Home(pilot.home.position_enu_m, pilot.home.yaw_rad),
+            fence_enabled=fence.exists,
+            fence_breached=breached,
+            home=Home(home.position_enu_m, home.yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,
             battery=battery,
@@ -120,12 +124,12 @@ class SnapshotBuilder:
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
             delay_us=pilot.sensed.delay_us,
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
-            flight_started_us=pilot.ground.times.armed_us,
-            takeoff_us=pilot.ground.times.takeoff_us,
-            landing_us=pilot.ground.times.landing_us,
-            flights=pilot.ground.times.flights,
-            ground_m=pilot.home.position_enu_m[2],
-            load=min(duration_s / self._interval_s, 1.0),
+            flight_started_us=times.armed_us,
+            takeoff_us=times.takeoff_us,
+            landing_us=times.landing_us,
+            flights=times.flights,
+            ground_m=home.position_enu_m[2],
+            load=min(duration_s / dt, 1.0),
             sensed=state_source.sensed,
             fix=state_source.fix,
             latest=dict(state_source.latest),
@@ -181,7 +185,8 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
     """Return what the control law steers to."""
     if decision is None:
         return NO_SETPOINT
-    thrust = sum(control * control for control in controls) / len(controls)
+    c1, c2, c3, c4 = controls
+    thrust = (c1 * c1 + c2 * c2 + c3 * c3 + c4 * c4) / len(controls)
     attitude = quaternion_from_euler(*decision.attitude_reference)
     if guidance.horizon is None:
         return Setpoint(attitude=attitude, rate_flu_rad_s=rates_of(guidance.attitude), thrust=thrust)

@@ -201,10 +201,12 @@ class Stations:
 
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle's state. Called once a control sample."""
+        vehicle = self._pilot.sensed.vehicle
+        assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
         self._heartbeat.update(snapshot)
         self._streams.update(snapshot)
-        self.setpoints.update(snapshot, self._pilot.context().state.euler[2])
+        self.setpoints.update(snapshot, vehicle.euler[2])
 
     def go_on(self) -> None:
         """Send the mode at least, where the vehicle's state could not be taken in."""

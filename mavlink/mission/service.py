@@ -186,7 +186,8 @@ class MissionService:
     @property
     def ids(self) -> tuple[int, ...]:
         """Opaque ids of the plans."""
-        return tuple(plan.id for plan in self.plans.values())
+        mission, fence, rally = self.plans.values()
+        return mission.id, fence.id, rally.id
 
     def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
         """Hold the plans that were kept over a restart; the owner gives them to the vehicle that flies them."""

@@ -4,7 +4,6 @@ Specification: mavlink.io/en/services/heartbeat.html: HEARTBEAT at 1 Hz.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to_all
 from colibri.mavlink.services.identity import Identity
@@ -43,7 +42,7 @@ class HeartbeatService:
     def go_on(self, custom_mode: int, *, armed: bool) -> None:
         """Send this from now on, where there is no newer state of the vehicle."""
         if self._snapshot is not None:
-            self._snapshot = replace(self._snapshot, custom_mode=custom_mode, armed=armed)
+            self._snapshot = self._snapshot._replace(custom_mode=custom_mode, armed=armed)
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Note the time of a ground station's heartbeat."""

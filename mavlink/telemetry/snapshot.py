@@ -1,8 +1,8 @@
 """The vehicle as its telemetry sees it at one instant: plain values in SI, ENU and FLU."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from math import nan
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
@@ -121,8 +121,7 @@ NO_SETPOINT = Setpoint()
 NOT_SOLVED = SolverState()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
+class Snapshot(NamedTuple):
     """Everything that telemetry sends.
 
     Attributes:
@@ -189,5 +188,5 @@ class Snapshot:
     load: float = 0.0
     sensed: SensorFrame | None = None
     fix: GpsFix | None = None
-    latest: Mapping[str, Any] = field(default_factory=dict)
+    latest: Mapping[str, Any] = MappingProxyType({})
     estimator: EstimatorState | None = None

@@ -1,5 +1,6 @@
 """The arming checks: what must hold before the rotors may turn."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
@@ -13,6 +14,8 @@ MIN_CHARGE = 0.1
 VOLTAGE_OF = (0.5, 1.2)
 """Of the voltages empty and full: a voltage outside of these bounds is not that of a sound battery."""
 MAX_THRUST_STICK = 0.6
+_SURELY_LEVEL = 0.1
+"""x² + y² of a quaternion that is tilted by 37 degrees; below, the arc cosine, which is slow, need not be taken."""
 
 
 class ArmingInputs(NamedTuple):
@@ -39,30 +42,40 @@ class ArmingInputs(NamedTuple):
 
 def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
     """Return why a battery of these voltages is not healthy; empty if it is."""
-    minimum, maximum = (part * bound for part, bound in zip(VOLTAGE_OF, (empty_v, full_v), strict=True))
-    return "" if minimum <= voltage_v <= maximum else f"battery not healthy: {voltage_v:.1f} V"
+    minimum, maximum = VOLTAGE_OF
+    healthy = minimum * empty_v <= voltage_v <= maximum * full_v
+    return "" if healthy else f"battery not healthy: {voltage_v:.1f} V"
 
 
 def refusals(inputs: ArmingInputs) -> list[str]:
     """Return every reason why the rotors may not be armed; empty if they may."""
+    return list(_refusals(inputs))
+
+
+def may_arm(inputs: ArmingInputs) -> bool:
+    """Whether the rotors may be armed; the first reason why not is enough."""
+    return next(_refusals(inputs), None) is None
+
+
+def _refusals(inputs: ArmingInputs) -> Iterator[str]:
     state, stick = inputs.state, inputs.thrust_stick
     if state is None:
-        return ["no telemetry from the plant"]
-    reasons = []
-    if (tilted_deg := tilt_deg(state.attitude)) > MAX_TILT_DEG:
-        reasons.append(f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}")
+        yield "no telemetry from the plant"
+        return
+    _, x, y, _ = state.attitude
+    if not x * x + y * y < _SURELY_LEVEL and (tilted_deg := tilt_deg(state.attitude)) > MAX_TILT_DEG:
+        yield f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}"
     if (fastest_m_s := max(map(abs, state.velocity_enu_m_s))) > MAX_SPEED_M_S:
-        reasons.append(f"moving at {fastest_m_s:.1f} m/s")
+        yield f"moving at {fastest_m_s:.1f} m/s"
     if not inputs.standing:
-        reasons.append("not standing on the ground")
+        yield "not standing on the ground"
     if inputs.charge < MIN_CHARGE:
-        reasons.append(f"battery at {inputs.charge:.0%}")
+        yield f"battery at {inputs.charge:.0%}"
     if inputs.battery:
-        reasons.append(inputs.battery)
+        yield inputs.battery
     if stick is not None and stick > MAX_THRUST_STICK:
-        reasons.append("thrust stick is up")
+        yield "thrust stick is up"
     if inputs.outside_fence is not None:
-        reasons.append(inputs.outside_fence.reason)
+        yield inputs.outside_fence.reason
     if inputs.not_known:
-        reasons.append(inputs.not_known)
-    return reasons
+        yield inputs.not_known

@@ -1,7 +1,5 @@
 """Heartbeats: ours at 1 Hz and at once with news, the time of ground stations."""
 
-from dataclasses import replace
-
 import pytest
 
 from colibri.mavlink.node.service import Peer, Send
@@ -38,7 +36,7 @@ def test_once_a_second_to_all(service: HeartbeatService) -> None:
 @pytest.mark.parametrize(("identity", "autopilot"), [(PX4, 12), (GENERIC, 0)])
 def test_it_says_who_and_how(identity: Identity, autopilot: int) -> None:
     service = HeartbeatService(identity)
-    service.update(replace(AT_REST, armed=True))
+    service.update(AT_REST._replace(armed=True))
     (fields,) = (received.fields for received in on_the_wire(list(service.poll(0))))
     assert (fields.type, fields.autopilot) == (mav.MAV_TYPE_QUADROTOR, autopilot)
     assert fields.custom_mode == AT_REST.custom_mode
@@ -56,7 +54,7 @@ def test_it_says_who_and_how(identity: Identity, autopilot: int) -> None:
     ],
 )
 def test_the_state_of_the_system(service: HeartbeatService, changes: dict[str, bool], state: int) -> None:
-    service.update(replace(AT_REST, **changes))  # type: ignore[arg-type]
+    service.update(AT_REST._replace(**changes))  # type: ignore[arg-type]
     (send,) = service.poll(0)
     assert send.fields[4] == state
 
@@ -65,7 +63,7 @@ def test_the_state_of_the_system(service: HeartbeatService, changes: dict[str, b
 def test_news_do_not_wait(service: HeartbeatService, news: dict[str, int]) -> None:
     list(service.poll(0))
     assert list(service.poll(4_000)) == []
-    service.update(replace(AT_REST, **news))  # type: ignore[arg-type]
+    service.update(AT_REST._replace(**news))  # type: ignore[arg-type]
     assert len(list(service.poll(8_000))) == 1
     assert [now_us for now_us, _ in beats(service, 12_000, 2_100_000)] == [1_008_000, 2_008_000]
 

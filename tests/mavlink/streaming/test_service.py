@@ -1,7 +1,6 @@
 """Streams: rates that hold, on each channel its own, whatever is asked."""
 
 from collections import Counter
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -43,7 +42,7 @@ def ask(stream: StreamService, command: int, p1: float, p2: float = 0.0, peer: P
 def fly(stream: StreamService, from_us: int, until_us: int, frame_us: int = FRAME_US) -> list[tuple[int, Send]]:
     sends = []
     for now_us in range(from_us, until_us, frame_us):
-        stream.update(replace(FLYING, time_us=now_us))
+        stream.update(FLYING._replace(time_us=now_us))
         sends += [(now_us, send) for send in stream.poll(now_us)]
     return sends
 

@@ -104,6 +104,10 @@ ARBITRARY = st.builds(
     ground_m=ANYTHING,
     target_enu_m=VECTORS,
     load=ANYTHING,
+    sensed=st.none(),
+    fix=st.none(),
+    latest=st.just({}),
+    estimator=st.none(),
 )
 
 

@@ -1,6 +1,5 @@
 """Every message of telemetry, from the snapshot over the wire: values in the units and frames of its definition."""
 
-from dataclasses import replace
 from math import cos, degrees, isnan, pi, radians, sin
 from typing import Any
 
@@ -181,7 +180,7 @@ def test_each_figure_of_the_solver_has_a_name() -> None:
     assert figures["mpc_iter"] == 7.0
     assert figures["mpc_us"] == pytest.approx(100.0)
     assert figures["mpc_active"] == 10.0
-    weighed = replace(FLYING, solver=FLYING.solver._replace(mass_kg=0.75))
+    weighed = FLYING._replace(solver=FLYING.solver._replace(mass_kg=0.75))
     assert {fields.name: fields.value for fields in sent("NAMED_VALUE_FLOAT", weighed)} == figures | {"mass_kg": 0.75}
 
 
@@ -248,21 +247,21 @@ def test_health_is_what_clients_wait_for() -> None:
 @pytest.mark.parametrize(("cells", "ext"), [(14, [3700] * 4), (12, [3700] * 2 + [0] * 2), (10, [0] * 4)])
 def test_many_cells_go_on_in_the_extension(cells: int, ext: list[int]) -> None:
     battery = BatteryState(cells, 3.7 * cells, 1.0, 0.0, 1.0, 60.0, 0.0)
-    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=battery))
+    (fields,) = sent("BATTERY_STATUS", FLYING._replace(battery=battery))
     assert list(fields.voltages) == [3700] * 10
     assert list(fields.voltages_ext) == ext
 
 
 def test_unknown_cells_are_told_as_one() -> None:
     battery = BatteryState(0, 11.1, 1.0, 0.0, 1.0, 60.0, 0.0)
-    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=battery))
+    (fields,) = sent("BATTERY_STATUS", FLYING._replace(battery=battery))
     assert list(fields.voltages) == [11_100] + [65535] * 9
 
 
 @pytest.mark.parametrize("state", [1, 2, 3, 4])
 def test_charge_states(state: int) -> None:
     assert FLYING.battery is not None
-    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=FLYING.battery._replace(charge_state=state)))
+    (fields,) = sent("BATTERY_STATUS", FLYING._replace(battery=FLYING.battery._replace(charge_state=state)))
     assert fields.charge_state == state
 
 
@@ -280,7 +279,7 @@ def test_gravity_is_felt_at_rest() -> None:
 
 def test_the_standard_atmosphere() -> None:
     """ISO 2533: 898.76 hPa and 8.5 °C at 1000 m."""
-    (fields,) = sent("SCALED_PRESSURE", replace(FLYING, position_enu_m=(0.0, 0.0, 600.0)))
+    (fields,) = sent("SCALED_PRESSURE", FLYING._replace(position_enu_m=(0.0, 0.0, 600.0)))
     assert fields.press_abs == pytest.approx(898.76, abs=0.05)
     assert fields.temperature == 850
 

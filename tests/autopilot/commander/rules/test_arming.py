@@ -1,13 +1,16 @@
 """Every check before the rotors may turn, and why it fails."""
 
-from math import cos, radians, sin
+from math import cos, nan, radians, sin
 
 import pytest
+from hypothesis import given
 
-from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
+from colibri.autopilot.commander.rules.arming import MAX_TILT_DEG, ArmingInputs, may_arm, refusals
 from colibri.autopilot.control.interface import VehicleState
-from colibri.common.types import Vector
+from colibri.common.rotations import tilt_deg
+from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.wire.refusal import Refusal
+from tests.strategies import quaternions
 
 READY = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 INPUTS = ArmingInputs(READY, standing=True, charge=1.0, thrust_stick=None)
@@ -25,6 +28,7 @@ def moving(velocity: Vector) -> VehicleState:
 def test_a_vehicle_that_stands_may_be_armed() -> None:
     assert refusals(INPUTS) == []
     assert refusals(INPUTS._replace(thrust_stick=0.5)) == []
+    assert may_arm(INPUTS)
 
 
 FAILING = [
@@ -44,6 +48,7 @@ FAILING = [
 def test_a_check_that_fails_says_why(inputs: ArmingInputs, reason: str) -> None:
     (said,) = refusals(inputs)
     assert reason in said
+    assert not may_arm(inputs)
 
 
 @pytest.mark.parametrize(
@@ -57,6 +62,17 @@ def test_a_check_that_fails_says_why(inputs: ArmingInputs, reason: str) -> None:
 )
 def test_less_than_that_is_no_reason(inputs: ArmingInputs) -> None:
     assert refusals(inputs) == []
+
+
+@given(quaternions())
+def test_an_attitude_is_judged_by_its_tilt_whatever_its_heading(attitude: Quaternion) -> None:
+    inputs = INPUTS._replace(state=READY._replace(attitude=attitude))
+    assert may_arm(inputs) is (tilt_deg(attitude) <= MAX_TILT_DEG)
+
+
+@pytest.mark.parametrize("attitude", [(nan, nan, nan, nan), (1.0, nan, 0.0, 0.0)])
+def test_an_attitude_that_is_no_number_is_refused(attitude: Quaternion) -> None:
+    assert not may_arm(INPUTS._replace(state=READY._replace(attitude=attitude)))
 
 
 def test_every_reason_is_told_at_once() -> None:
