@@ -13,6 +13,7 @@ are made for: a target that jumps must not ask for all of them at once. A target
 whatever it does.
 """
 
+from functools import lru_cache
 from math import ceil, floor, pi, radians, sqrt
 from typing import NamedTuple, TypeAlias
 
@@ -58,6 +59,18 @@ class Limits(NamedTuple):
     jerk_m_s3: float = 12.0
     yaw_rate_rad_s: float = radians(60.0)
     yaw_acceleration_rad_s2: float = radians(180.0)
+
+
+@lru_cache(maxsize=64)
+def at_speed(limits: Limits, speed_m_s: float) -> Limits:
+    """Return limits of which only the horizontal speed is another."""
+    return limits._replace(speed_m_s=speed_m_s)
+
+
+@lru_cache(maxsize=64)
+def climbing_at(limits: Limits, climb_m_s: float) -> Limits:
+    """Return limits of which only the speed upwards is another."""
+    return limits._replace(climb_m_s=climb_m_s)
 
 
 class Axes(NamedTuple):

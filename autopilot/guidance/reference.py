@@ -6,6 +6,7 @@ the reference, to the last bit, until it jumps. An axis may have no target posit
 
 from collections.abc import Sequence
 from enum import IntEnum
+from functools import cache
 from math import pi
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Horizon, VehicleState
 from colibri.autopilot.guidance import integrator_chain
-from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.integrator_chain import Integers, Limits
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
@@ -115,11 +116,14 @@ def lead(
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
         return _on_target(reference, target)
-    followed = integrator_chain.Target(
-        target.motion, np.array(target.kinds, dtype=np.int64), target.heading, target.turns
-    )
+    followed = integrator_chain.Target(target.motion, _integers(target.kinds), target.heading, target.turns)
     motion, heading = integrator_chain.advance(reference.motion, reference.heading, followed, limits, interval_s)
     return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
+
+
+@cache
+def _integers(kinds: tuple[Kind, Kind, Kind]) -> Integers:
+    return np.array(kinds, dtype=np.int64)
 
 
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
@@ -150,9 +154,13 @@ def _motion_at(plan: Horizon, sample: int) -> Array:
 
 
 def _horizon(motion: Array, heading: Array) -> Horizon:
-    p, v, a, j, s = (np.ascontiguousarray(motion[:, order]) for order in range(5))
-    yaw, rate, acceleration = (np.ascontiguousarray(heading[:, order]) for order in range(3))
-    return Horizon(p, v, a, j, s, yaw, rate, acceleration)
+    return Horizon(*np.ascontiguousarray(motion.transpose(1, 0, 2)), *np.ascontiguousarray(heading.T))
+
+
+def stays(reference: Reference, after: Reference) -> bool:
+    """Whether a reference is, a sample later, where it was, to the last bit."""
+    moved = reference.motion.tobytes() != after.motion.tobytes()
+    return not moved and reference.heading.tobytes() == after.heading.tobytes()
 
 
 def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:

@@ -6,7 +6,17 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, VehicleState
 from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, slowed, still_target
+from colibri.autopilot.guidance.reference import (
+    Reference,
+    Target,
+    at_rest,
+    lead,
+    lead_along,
+    moving_with,
+    slowed,
+    stays,
+    still_target,
+)
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
@@ -31,6 +41,28 @@ class Guidance(NamedTuple):
 RESTS = Guidance()
 
 
+class Led(NamedTuple):
+    """How a reference was last led to a target.
+
+    Attributes:
+        target, limits: By which it was.
+        horizon, for_law: From where it was before, and as the control law previews it.
+        reference: Where it was led to.
+        stays: Whether it was there before: the same target and limits lead it nowhere else.
+    """
+
+    target: Target
+    limits: Limits
+    horizon: Horizon
+    for_law: Horizon
+    reference: Reference
+    stays: bool
+
+    def is_again(self, reference: Reference, target: Target, limits: Limits) -> bool:
+        """Whether a reference that stays is to be led by the same again."""
+        return self.stays and reference is self.reference and target is self.target and limits == self.limits
+
+
 class ReferenceGenerator:
     """Generates the references of one vehicle.
 
@@ -47,6 +79,7 @@ class ReferenceGenerator:
         self.samples = instants.preview.samples
         self.reference: Reference | None = None
         self._ahead: Horizon | None = None
+        self._led: Led | None = None
         self._waited = False
         self._path_speed = 1.0
         motionless = Reference(np.zeros((4, 3)), np.zeros(2))
@@ -78,16 +111,25 @@ class ReferenceGenerator:
 
     def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
         """Move the reference on by one sample, and return the control law's preview of it."""
-        reference, limits, interval_s, waited = context.reference, wanted.limits, context.interval_s, self._waited
+        reference, waited = context.reference, self._waited
         if wanted.pace is Pace.CLOCK and self._path_speed != 1.0:
             reference = slowed(reference, self._path_speed)
-        for_law = None
-        if isinstance(wanted, PlannedMotion):
-            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s, waited=waited)
-            if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
-                turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
-                for_law = wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
-        else:
-            horizon, self.reference = lead(reference, wanted.target, limits, interval_s, waited=waited)
+        if isinstance(wanted, Motion):
+            self._led = led = self._lead_to(reference, wanted, waited=waited)
+            self._ahead, self._waited, self.reference = led.horizon, False, led.reference
+            return led.for_law
+        horizon, self.reference = lead_along(reference, wanted.horizon, wanted.limits, self.interval_s, waited=waited)
         self._ahead, self._waited = horizon, False
-        return self._instants.for_law(horizon) if for_law is None else for_law
+        if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
+            turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
+            return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
+        return self._instants.for_law(horizon)
+
+    def _lead_to(self, reference: Reference, wanted: Motion, *, waited: bool) -> Led:
+        """Return how a reference is led to a target: as in the sample before, once it stays there."""
+        before, (target, limits, _) = self._led, wanted
+        if before is not None and not waited and before.is_again(reference, target, limits):
+            return before
+        horizon, after = lead(reference, target, limits, self.interval_s, waited=waited)
+        stayed = not waited and stays(reference, after)
+        return Led(target, limits, horizon, self._instants.for_law(horizon), after, stayed)

@@ -5,7 +5,8 @@ from math import dist, hypot
 from typing import TypeAlias
 
 from colibri.autopilot.control.interface import Pace
-from colibri.autopilot.guidance.reference import Kind, Reference, still_target
+from colibri.autopilot.guidance.integrator_chain import at_speed, climbing_at
+from colibri.autopilot.guidance.reference import Kind, Reference, Target, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
 from colibri.autopilot.guidance.tasks.task import (
     EndlessTask,
@@ -42,6 +43,7 @@ class GoToTask:
         east, north = (order.position_enu_m[axis] - context.place[axis] for axis in (0, 1))
         along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else context.yaw_rad
         self._yaw_rad = along if order.yaw_rad is None else order.yaw_rad
+        self._target = still_target(self._place, self._yaw_rad, context.samples)
 
     @property
     def order(self) -> GoTo:
@@ -52,8 +54,8 @@ class GoToTask:
         """Return the place."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
-            limits = limits._replace(speed_m_s=min(self._speed_m_s, context.behaviour.max_speed_m_s))
-        return Motion(still_target(self._place, self._yaw_rad, context.samples), limits, Pace.WAITING)
+            limits = at_speed(limits, min(self._speed_m_s, context.behaviour.max_speed_m_s))
+        return Motion(self._target, limits, Pace.WAITING)
 
     def arrived(self, context: TaskContext) -> bool:
         """Whether the vehicle is there, and slow."""
@@ -67,6 +69,7 @@ class HoldTask:
         """Begin to brake."""
         self._place: Vector | None = None
         self._yaw_rad = 0.0
+        self._target: Target | None = None
 
     @property
     def order(self) -> Order:
@@ -75,13 +78,16 @@ class HoldTask:
 
     def update(self, context: TaskContext) -> Motion:
         """Return rest: of the velocity first, then of the place that it led to."""
+        limits = context.behaviour.limits
+        if self._target is not None:
+            return Motion(self._target, limits)
         turning = abs(float(context.reference.heading[1])) > _REST_RAD_S
-        if self._place is None and not turning and hypot(*context.velocity) < _REST_M_S:
+        if not turning and hypot(*context.velocity) < _REST_M_S:
             self._place, self._yaw_rad = context.place, context.yaw_rad
-        if self._place is not None:
-            return Motion(still_target(self._place, self._yaw_rad, context.samples), context.behaviour.limits)
+            self._target = still_target(self._place, self._yaw_rad, context.samples)
+            return Motion(self._target, limits)
         braking = still_target(context.place, context.yaw_rad, context.samples, (Kind.VELOCITY,) * 3)
-        return Motion(braking._replace(turns=False), context.behaviour.limits)
+        return Motion(braking._replace(turns=False), limits)
 
     def arrived(self, context: TaskContext) -> bool:
         """Whether it stands."""
@@ -108,16 +114,17 @@ class TakeoffTask:
 
     def update(self, context: TaskContext) -> Motion:
         """Return the height, and rest in the plane until that is reached."""
-        x, y, _ = context.place
-        if self._way is None and hypot(*context.velocity[:2]) < _REST_M_S:
-            self._way = GoToTask(GoTo((x, y, self._height_m), self._yaw_rad), context)
+        limits = context.behaviour.limits
+        if self._speed_m_s is not None:
+            limits = climbing_at(limits, self._speed_m_s)
         if self._way is None:
-            kinds = (Kind.VELOCITY, Kind.VELOCITY, Kind.POSITION)
-            target = still_target((x, y, self._height_m), self._yaw_rad, context.samples, kinds)
-            limits = context.behaviour.limits
-        else:
-            target, limits, _ = self._way.update(context)
-        return Motion(target, limits if self._speed_m_s is None else limits._replace(climb_m_s=self._speed_m_s))
+            x, y, _ = context.place
+            above = (x, y, self._height_m)
+            if hypot(*context.velocity[:2]) >= _REST_M_S:
+                kinds = (Kind.VELOCITY, Kind.VELOCITY, Kind.POSITION)
+                return Motion(still_target(above, self._yaw_rad, context.samples, kinds), limits)
+            self._way = GoToTask(GoTo(above, self._yaw_rad), context)
+        return Motion(self._way.update(context).target, limits)
 
     def arrived(self, context: TaskContext) -> bool:
         """Whether the vehicle is there, and slow."""
