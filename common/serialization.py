@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 Data = TypeVar("Data")
+_FLOAT64 = np.dtype(np.float64)
 
 
 def to_bytes(data: Any) -> bytes:
@@ -26,8 +27,8 @@ def of_bytes(kind: type[Data], content: bytes) -> Data | None:
 
 
 def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.dtype == np.float64:
-        return [value.shape, value.tobytes()]
+    if isinstance(value, np.ndarray) and value.dtype == _FLOAT64:
+        return value.shape, value.tobytes()
     raise TypeError(f"{type(value)} is not plain")
 
 

@@ -35,16 +35,17 @@ class OnboardLog:
         if begins:
             self._log.update(armed, now_us)
             self._log.record(self._recorder.begin())
-        if self._log.name is None:
+        log, recorder = self._log, self._recorder
+        if log.name is None:
             return
         for line in said:
-            self._log.record(self._recorder.say(now_us, *line))
+            log.record(recorder.say(now_us, *line))
         if snapshot is not None and snapshot is not self._snapshot:
-            self._log.record(self._recorder.update(snapshot))
+            log.record(recorder.update(snapshot))
         self._snapshot = snapshot
         if ends:
-            self._log.record(self._recorder.take())
-        self._log.update(armed, now_us)
+            log.record(recorder.take())
+        log.update(armed, now_us)
 
     def close(self) -> None:
         """Close the log."""

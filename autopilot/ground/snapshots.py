@@ -1,6 +1,6 @@
 """Snapshots for telemetry: what the flight is like at a control sample."""
 
-from math import isnan, nan
+from math import isnan
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.flight.reference_generator import Guidance
@@ -24,6 +24,7 @@ from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.telemetry.snapshot import (
     NO_SETPOINT,
     NOT_SOLVED,
+    NOWHERE,
     BatteryState,
     Home,
     Setpoint,
@@ -40,6 +41,7 @@ _AUTO = (
     _CUSTOM | mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUIDED_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
 )
 _NEAR_GROUND_M = 1.0
+_SINKING_M_S = -0.1
 
 
 class SnapshotBuilder:
@@ -53,7 +55,7 @@ class SnapshotBuilder:
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go by other numbers of the vehicle, with nothing remembered of the samples before."""
-        self._vehicle = vehicle
+        self._max_speed_rad_s = vehicle.rotors.max_speed * vehicle.rad_s_per_speed_unit
         self._forecaster = Forecaster(vehicle, self._interval_s, self._columns)
         self._velocity: Vector | None = None
         self._solver = NOT_SOLVED
@@ -93,7 +95,7 @@ class SnapshotBuilder:
         number = custom_mode(mode)
         vx, vy, vz = velocity = state.velocity_enu_m_s
         (ux, uy, uz), self._velocity, dt = self._velocity or velocity, velocity, self._interval_s
-        speed = self._vehicle.rotors.max_speed * self._vehicle.rad_s_per_speed_unit
+        speed = self._max_speed_rad_s
         c1, c2, c3, c4 = controls
         return Snapshot(
             time_us=now_us,
@@ -148,18 +150,11 @@ class SnapshotBuilder:
             forecast = self._forecaster.forecast(state, horizon, how)
             squared = () if how.planned_squared is None else tuple(map(tuple, how.planned_squared.tolist()))
         self._solver = SolverState(
-            status=STATUS_CODES[how.qp_status],
-            fallback=FALLBACK_CODES[how.fallback],
-            iterations=-1 if isnan(how.qp_iterations) else int(how.qp_iterations),
-            solve_time_s=how.solve_time_s,
-            step_time_s=duration_s,
-            cost=how.cost,
-            slack=how.slack,
-            active=how.active,
-            planned_squared=squared,
-            horizon=forecast,
-            mass_kg=how.mass_kg,
-            path_lag_s=how.path_lag_s,
+            STATUS_CODES[how.qp_status],
+            FALLBACK_CODES[how.fallback],
+            -1 if isnan(how.qp_iterations) else int(how.qp_iterations),
+            *(how.solve_time_s, duration_s, how.cost, how.slack, how.active),
+            *(squared, forecast, how.mass_kg, how.path_lag_s),
         )
         return self._solver
 
@@ -174,11 +169,14 @@ def landed_state(pilot: Pilot, state: VehicleState) -> int:
     mode = pilot.state.mode
     if mode is Mode.TAKEOFF:
         return int(mav.MAV_LANDED_STATE_TAKEOFF)
-    sinking = pilot.generator.reference is not None and float(pilot.generator.reference.motion[1, 2]) < -0.1
-    near = state.position_enu_m[2] - pilot.home.position_enu_m[2] < _NEAR_GROUND_M
-    if mode is Mode.LAND or (mode is Mode.RETURN and sinking and near):
+    if mode is Mode.LAND or (mode is Mode.RETURN and _comes_down(pilot, state)):
         return int(mav.MAV_LANDED_STATE_LANDING)
     return int(mav.MAV_LANDED_STATE_IN_AIR)
+
+
+def _comes_down(pilot: Pilot, state: VehicleState) -> bool:
+    reference, height_m = pilot.generator.reference, state.position_enu_m[2] - pilot.home.position_enu_m[2]
+    return height_m < _NEAR_GROUND_M and reference is not None and float(reference.motion[1, 2]) < _SINKING_M_S
 
 
 def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors) -> Setpoint:
@@ -192,20 +190,15 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
         return Setpoint(attitude=attitude, rate_flu_rad_s=rates_of(guidance.attitude), thrust=thrust)
     h = guidance.horizon
     return Setpoint(
-        position_enu_m=first(h.position_enu_m),
-        velocity_enu_m_s=first(h.velocity_enu_m_s),
-        acceleration_enu_m_s2=first(h.acceleration_enu_m_s2),
-        yaw_rad=float(h.yaw_rad[0]),
-        yaw_rate_rad_s=float(h.yaw_rate_rad_s[0]),
-        attitude=attitude,
-        rate_flu_rad_s=(nan, nan, nan),
-        thrust=thrust,
+        *(first(h.position_enu_m), first(h.velocity_enu_m_s), first(h.acceleration_enu_m_s2)),
+        *(h.yaw_rad.item(0), h.yaw_rate_rad_s.item(0)),
+        *(attitude, NOWHERE, thrust),
     )
 
 
 def rates_of(demand: AttitudeDemand | None) -> Vector:
     """Return the angular rates demanded now, rad/s; for small tilt they are the body's."""
-    return (nan, nan, nan) if demand is None else first(demand.angle_rates_rad_s)
+    return NOWHERE if demand is None else first(demand.angle_rates_rad_s)
 
 
 def first(column: Array) -> Vector:
