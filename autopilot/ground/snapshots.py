@@ -190,9 +190,14 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
         return Setpoint(attitude=attitude, rate_flu_rad_s=rates_of(guidance.attitude), thrust=thrust)
     h = guidance.horizon
     return Setpoint(
-        *(first(h.position_enu_m), first(h.velocity_enu_m_s), first(h.acceleration_enu_m_s2)),
-        *(h.yaw_rad.item(0), h.yaw_rate_rad_s.item(0)),
-        *(attitude, NOWHERE, thrust),
+        position_enu_m=first(h.position_enu_m),
+        velocity_enu_m_s=first(h.velocity_enu_m_s),
+        acceleration_enu_m_s2=first(h.acceleration_enu_m_s2),
+        yaw_rad=h.yaw_rad.item(0),
+        yaw_rate_rad_s=h.yaw_rate_rad_s.item(0),
+        attitude=attitude,
+        rate_flu_rad_s=NOWHERE,
+        thrust=thrust,
     )
 
 

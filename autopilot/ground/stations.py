@@ -272,6 +272,8 @@ class Stations:
 
     def take_texts(self) -> list[Line]:
         """Return the status texts since the last time, the last of many, for whoever watches the process."""
+        if not self._said:
+            return []
         said = list(self._said)
         self._said.clear()
         return said

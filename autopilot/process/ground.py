@@ -138,7 +138,8 @@ class Ground:
         """Record what ground stations are told, where it is new; keep the texts for the terminal."""
         stations = self.copter.stations
         snapshot, said = stations.snapshot, stations.take_texts()
-        self._texts.extend(map(str, said))
+        if said:
+            self._texts.extend(map(str, said))
         if self._log is None:
             return
         try:
@@ -169,10 +170,12 @@ class Ground:
 
     def _keep(self) -> None:
         """Save what the flight needs to go on, should this process be killed."""
-        copter = self.copter
+        copter, samples = self.copter, self.copter.samples
+        if samples == self._kept_samples:  # between two control samples
+            return
         changes, armed = copter.stations.missions.changes, copter.pilot.state.armed
         changed = armed is not self._kept_armed or changes != self._kept_plans
-        if copter.samples - self._kept_samples < (1 if armed or changed else _STANDING_SAMPLES):
+        if not (armed or changed) and samples - self._kept_samples < _STANDING_SAMPLES:
             return
         if changes != self._kept_plans:
             plans = copter.stations.plans.plans
@@ -181,7 +184,7 @@ class Ground:
         if record is not None and not self._state.keep(record) and not self._full_reported:
             self._full_reported = True
             self._status.say("said", "the flight is too much to keep: after a restart it would begin in hold")
-        self._kept_samples, self._kept_plans, self._kept_armed = copter.samples, changes, armed
+        self._kept_samples, self._kept_plans, self._kept_armed = samples, changes, armed
 
     def close(self) -> None:
         """Write what is left to write, and let go of everything."""

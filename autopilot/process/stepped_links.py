@@ -71,14 +71,14 @@ class SteppedLinks:
     def introduce(self, stations: Stations) -> None:
         """Open nothing: each channel opens with the first message on it."""
 
-    def receive(self, stations: Stations) -> Iterator[Received]:
+    def receive(self, stations: Stations) -> Iterable[Received]:
         """Wait for what is sent at this instant, then yield it; what is not taken is yielded the next time."""
         del stations
         step_message = self._conductor.receive()
         if step_message is not None:
             self._time_us = step_message.time_us
             self._waiting.extend(step_message.parcels)
-        return self._taken()
+        return self._taken() if self._waiting else ()
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send the conductor what the vehicle sends."""

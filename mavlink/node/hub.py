@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from colibri.common.types import Address
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.router import Router, target_of
-from colibri.mavlink.node.service import Peer, Send, Service
+from colibri.mavlink.node.service import Peer, PolledService, Send, Service
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import Signing
 
@@ -69,7 +69,7 @@ class Hub:
         What a service raises goes to `caught`, the others go on; without it, it is raised.
         """
         self._own = (system_id, component_id)
-        self._services = tuple(services)
+        self._polled = tuple(service for service in services if isinstance(service, PolledService))
         names = frozenset[str]().union(*(service.handles for service in services))
         self._receivers = {name: [service for service in services if name in service.handles] for name in names}
         self._signing = signing
@@ -136,9 +136,9 @@ class Hub:
             self._take_in(message, channel, loopback)
 
     def poll(self, now_us: int) -> None:
-        """Have every service do what is due at `now_us`."""
+        """Have every polled service do what is due at `now_us`."""
         self._now_us = now_us
-        for service in self._services:
+        for service in self._polled:
             try:
                 sends = service.poll(now_us)
                 if sends:
@@ -200,7 +200,7 @@ class Hub:
         self._raised[service] += 1
         self._tell(service, error, "tried again, then off")
         if self._raised[service] >= _TRIES:
-            self._services = tuple(each for each in self._services if each is not service)
+            self._polled = tuple(each for each in self._polled if each is not service)
 
     def _tell(self, service: Service, error: Exception, instead: str) -> None:
         if self._caught is None:

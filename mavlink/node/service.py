@@ -6,7 +6,7 @@ enumerations and lies about counts are the service's to refuse.
 """
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from colibri.mavlink.wire.dialect import Message
 
@@ -42,6 +42,11 @@ class Service(Protocol):
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Take in one message; return what to send at once."""
+
+
+@runtime_checkable
+class PolledService(Service, Protocol):
+    """A microservice that sends by itself, or later than it received."""
 
     def poll(self, now_us: int) -> Iterable[Send]:
         """Do what is due at `now_us`; return what to send. Called once a frame of the plant."""

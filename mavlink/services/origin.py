@@ -51,10 +51,5 @@ class OriginService:
             return self._refused(refusal)
         return [to_all("GPS_GLOBAL_ORIGIN", fields.latitude, fields.longitude, fields.altitude, now_us)]
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        """Nothing is ever due."""
-        del now_us
-        return ()
-
     def _refused(self, refusal: Refusal | None) -> list[Send]:
         return [] if refusal is None else self._text.say(WARNING, refusal.reason)

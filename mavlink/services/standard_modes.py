@@ -49,10 +49,6 @@ class StandardModes:
         """Everything comes as a command."""
         return ()
 
-    def poll(self, now_us: int) -> Iterable[Send]:  # noqa: ARG002
-        """The modes never change, so nothing is ever due."""
-        return ()
-
     def handlers(self) -> dict[int, Handler]:
         """Return who obeys the commands of this service."""
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}

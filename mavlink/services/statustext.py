@@ -60,6 +60,8 @@ class StatusText:
 
     def take(self) -> list[Line]:
         """Return all texts since the last time."""
+        if not self._said:
+            return []
         said = list(self._said)
         self._said.clear()
         return said

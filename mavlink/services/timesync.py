@@ -26,7 +26,3 @@ class TimeService:
             # "The response has the same time and sequence, and the target of whoever sent the request."
             return (to(peer, "PING", fields.time_usec, fields.seq, peer.system, peer.component),)
         return ()
-
-    def poll(self, now_us: int) -> Iterable[Send]:  # noqa: ARG002
-        """Nothing is ever due."""
-        return ()

@@ -11,6 +11,7 @@ from colibri.mavlink.node import hub
 from colibri.mavlink.node.channel import DATAGRAM_BYTES
 from colibri.mavlink.node.hub import CHANNELS, FORGET_AFTER_US, Hub
 from colibri.mavlink.node.service import Peer, Send, to_all
+from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.signing import Signing
 from tests.mavlink.node.hub_ends import GCS, HEARTBEAT, SDK, Observer, Recorder, Station, frames_to, sent
@@ -67,6 +68,14 @@ def test_poll_sends_what_services_say(ours: Hub, service: Recorder) -> None:
     ours.poll(8000)
     assert sent(ours) == [(0, GCS, ["HEARTBEAT"])]
     assert ours.take_outbox() == []
+
+
+def test_a_service_that_only_answers_needs_no_poll(service: Recorder) -> None:
+    ours = Hub(1, 1, [TimeService(), service])
+    service.due = [to_all("HEARTBEAT", *HEARTBEAT)]
+    ours.receive(Station(255).says("TIMESYNC", 0, 5), 0, GCS, 4000)
+    ours.poll(4000)
+    assert sent(ours) == [(0, GCS, ["TIMESYNC", "HEARTBEAT"])]
 
 
 def test_many_frames_share_datagrams_and_keep_their_order(ours: Hub) -> None:

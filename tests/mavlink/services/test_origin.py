@@ -77,7 +77,3 @@ def test_what_is_no_place_is_never_handed_on(make: object, place: tuple[int, int
     (answer,) = vehicle.hear(make(*place))
     assert answer.name == "STATUSTEXT"
     assert vehicle.told == []
-
-
-def test_nothing_is_ever_due() -> None:
-    assert list(Vehicle().service.poll(10**9)) == []
