@@ -34,8 +34,10 @@ def fitted(name: str, encoder: Encoder) -> Encoder:
 
     def fit(fields: Fields) -> Fields:
         return tuple(
-            tuple(map(convert, value)) if type(value) is tuple else convert(value)
-            for convert, value in zip(converters, fields, strict=False)
+            [
+                tuple(map(convert, value)) if type(value) is tuple else convert(value)
+                for convert, value in zip(converters, fields, strict=False)
+            ]
         )
 
     def encode(snapshot: Snapshot) -> Fields | list[Fields] | None:

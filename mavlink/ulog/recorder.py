@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import nan
 
-from colibri.common.rotations import euler_from_quaternion
+from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, Snapshot
 from colibri.mavlink.ulog import messages, topics
