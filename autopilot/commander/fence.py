@@ -41,7 +41,8 @@ class Fence:
     @property
     def exists(self) -> bool:
         """Whether there is a fence, uploaded or around home."""
-        return bool(self._items) or self._around_home.exists
+        behaviour = self._behaviour
+        return bool(self._items) or behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
 
     @property
     def _around_home(self) -> AroundHome:

@@ -1,7 +1,6 @@
 """The pilot: modes, arming, take-off and landing; decides what the control law is given to follow."""
 
 from collections.abc import Callable, Collection
-from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.commander.flight.ground_contact import GroundContact, GroundRecord
@@ -14,7 +13,7 @@ from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, next_state
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
-from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.behaviour import Behaviour, at_speed
 from colibri.autopilot.guidance.landing_detector import is_below, stands_at_first
 from colibri.autopilot.guidance.reference import Reference
 from colibri.autopilot.guidance.sample_grid import Instants
@@ -218,7 +217,7 @@ class Pilot:
         speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
         speed = min(speed, behaviour.max_speed_m_s)
         if speed != behaviour.limits.speed_m_s:
-            behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
+            behaviour = at_speed(behaviour, speed)
         return TaskContext(
             now_us + delay_us - self.lag_us,
             vehicle,
@@ -327,7 +326,7 @@ class Pilot:
             self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
         ended = _ENDS.get(self.state.mode)
-        if self.task.arrived(context) and ended is not None:
+        if ended is not None and self.task.arrived(context):
             self.happened(ended)
         return guidance
 

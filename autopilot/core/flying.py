@@ -86,7 +86,7 @@ class Flying:
             flown = errors.THREE_ROTORS if parts.rotor_loss.flies else errors.LAW
             try:
                 solve_time_s = parts.pilot.behaviour.solve_time_s
-                felt = state._replace(airborne=parts.pilot.ground.clear(state))
+                felt = state if parts.pilot.ground.clear(state) else state._replace(airborne=False)
                 return actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
             except Exception as error:
                 defence.caught(flown, error)

@@ -1,6 +1,7 @@
 """The numbers that a flight is flown by, apart from those of the control law: speeds, heights, times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import radians
 
 from colibri.autopilot.guidance.integrator_chain import Limits
@@ -45,3 +46,9 @@ class Behaviour:
     inject_failures: bool = False
     solve_time_s: float = 0.0
     delay_s: float = -0.001
+
+
+@lru_cache(maxsize=8)
+def at_speed(behaviour: Behaviour, speed_m_s: float) -> Behaviour:
+    """Return behaviour of which only the horizontal speed is another."""
+    return replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed_m_s))

@@ -93,8 +93,11 @@ def following(
     begun: list[Row] = []
     cleared: list[tuple[int, str]] = []
     for row in TABLE:
-        condition, setting = row.condition, settings[row.condition]
+        condition = row.condition
         began_us = since_us.get(condition)
+        if began_us is None and condition not in held_us:
+            continue
+        setting = settings[condition]
         holds = began_us is not None and now_us - began_us > setting.delay_us
         if holds and setting.action is not Action.NONE and (flight.armed or row.grounded):
             if condition not in held_us:
@@ -103,6 +106,8 @@ def following(
         elif now_us - held_us.get(condition, now_us) >= CLEAR_AFTER_US and not (row.kept and flight.armed):
             del held_us[condition]
             cleared.append((NOTICE, f"{condition}: cleared"))
+    if not begun:
+        return Verdict(Memory(held_us, flight.armed), Action.NONE, tuple(cleared))
     action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
     return Verdict(Memory(held_us, flight.armed), action, (*lines, *cleared))
 

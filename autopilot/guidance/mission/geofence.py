@@ -172,11 +172,6 @@ class AroundHome(NamedTuple):
     max_distance_m: float
     max_height_m: float
 
-    @property
-    def exists(self) -> bool:
-        """Whether there is any."""
-        return self.max_distance_m > 0.0 or self.max_height_m > 0.0
-
     def margin_m(self, position_enu_m: Vector) -> float:
         """Return how far a position is inside, m; negative outside."""
         east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
