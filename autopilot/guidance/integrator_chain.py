@@ -36,6 +36,9 @@ more a target is overshot."""
 _STOPPING = 0.6
 """Part of the acceleration that stopping may count on; the rest is for keeping to it."""
 
+_JERK, _JERK_SCALE = 3, 1e-2
+"""Jerk is the last of the chain to settle, and the largest number of it."""
+
 
 class Limits(NamedTuple):
     """How fast the reference approaches a target.
@@ -135,6 +138,17 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
             yaw += step * (rate + step * acceleration / 2.0)
             rate += step * acceleration
     return out, out_heading
+
+
+@compiled
+def is_near(motion: Array, target: Array, within: float) -> bool:
+    """Whether position, velocity, acceleration and jerk, ENU, (4, 3), differ by less than `within` from a target's."""
+    for order in range(motion.shape[0]):
+        scale = _JERK_SCALE if order == _JERK else 1.0
+        for i in range(3):
+            if not abs(motion[order, i] - target[order, i]) * scale < within:
+                return False
+    return True
 
 
 @compiled

@@ -22,8 +22,6 @@ _REACHED = 1e-5
 """How far off a moving target the chain, whose snap changes once a sample, stays at most."""
 _CARRIED = 1e-2
 """How far off it one is at most that was carried there by its derivatives."""
-_IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
-"""Jerk is the last of the chain to settle, and the largest number of it."""
 
 
 class Kind(IntEnum):
@@ -102,8 +100,11 @@ def still_target(
 
 def target_of(horizon: Horizon) -> Target:
     """Return a planned horizon as a target."""
-    motion = np.stack(horizon[:5], axis=1)
-    return Target(motion, ALL_BOUND, np.stack(horizon[5:], axis=1))
+    p, v, a, j, s, yaw, rate, acceleration = horizon
+    motion, heading = np.empty((len(yaw), 5, 3)), np.empty((len(yaw), 3))
+    motion[:, 0], motion[:, 1], motion[:, 2], motion[:, 3], motion[:, 4] = p, v, a, j, s
+    heading[:, 0], heading[:, 1], heading[:, 2] = yaw, rate, acceleration
+    return Target(motion, ALL_BOUND, heading)
 
 
 def lead(
@@ -166,9 +167,9 @@ def stays(reference: Reference, after: Reference) -> bool:
 def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:
     """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
     reached = _CARRIED if waited else _REACHED
-    yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
-    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= reached:
+    yaw, rate = reference.heading.tolist()
+    if max(abs(yaw - nearest_turn(float(heading[0]), yaw)), abs(rate - float(heading[1]))) >= reached:
         return False
     if reference.motion.tobytes() == motion.tobytes():  # as at every sample but the first, and quickly compared
         return True
-    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < reached)
+    return integrator_chain.is_near(reference.motion, motion, reached)
