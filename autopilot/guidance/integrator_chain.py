@@ -104,7 +104,7 @@ class Target(NamedTuple):
 
 @compiled
 def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: float) -> tuple[Array, Array]:
-    """Return motion, (n, 5, 3), and heading, (n, 3), from now on; snap and yaw acceleration act until the next instant.
+    """Return motion, (5, n, 3), and heading, (3, n), from now on; snap and yaw acceleration act until the next instant.
 
     Between instants that are too far apart for its loops the chain takes several steps.
 
@@ -116,7 +116,7 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
         dt: Between two instants, s.
     """
     count = target.motion.shape[0]
-    out, out_heading = np.empty((count, 5, 3)), np.empty((count, 3))
+    out, out_heading = np.empty((5, count, 3)), np.empty((3, count))
     steps = ceil(dt / _MAX_STEP_S)
     step = dt / steps
     motion = motion.copy()
@@ -128,8 +128,8 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
             _drive(motion, target.motion[k], target.kinds, limits, snap)
             acceleration = _turn(yaw, rate, target.heading[k], target.turns, limits)
             if part == 0:
-                out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = p, v, a, j, snap
-                out_heading[k, 0], out_heading[k, 1], out_heading[k, 2] = yaw, rate, acceleration
+                out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = p, v, a, j, snap
+                out_heading[0, k], out_heading[1, k], out_heading[2, k] = yaw, rate, acceleration
             for i in range(3):
                 p[i] += step * (v[i] + step * (a[i] / 2.0 + step * (j[i] / 6.0 + step * snap[i] / 24.0)))
                 v[i] += step * (a[i] + step * (j[i] / 2.0 + step * snap[i] / 6.0))

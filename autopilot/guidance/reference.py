@@ -119,7 +119,7 @@ def lead(
         return _on_target(reference, target)
     followed = integrator_chain.Target(target.motion, _integers(target.kinds), target.heading, target.turns)
     motion, heading = integrator_chain.advance(reference.motion, reference.heading, followed, limits, interval_s)
-    return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
+    return Horizon(*motion, *heading), Reference(motion[:4, 1].copy(), heading[:2, 1].copy())
 
 
 @cache
@@ -135,7 +135,8 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
         heading = heading.copy()
         heading[:, 0] += 2.0 * pi * turns
     after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy())
-    return _horizon(target.motion, heading), after
+    columns = np.ascontiguousarray(target.motion.transpose(1, 0, 2)), np.ascontiguousarray(heading.T)
+    return Horizon(*columns[0], *columns[1]), after
 
 
 def lead_along(
@@ -152,10 +153,6 @@ def lead_along(
 
 def _motion_at(plan: Horizon, sample: int) -> Array:
     return np.array([column[sample] for column in plan[:4]])
-
-
-def _horizon(motion: Array, heading: Array) -> Horizon:
-    return Horizon(*np.ascontiguousarray(motion.transpose(1, 0, 2)), *np.ascontiguousarray(heading.T))
 
 
 def stays(reference: Reference, after: Reference) -> bool:
