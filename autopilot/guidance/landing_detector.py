@@ -25,6 +25,9 @@ class Landing(NamedTuple):
     climb_m_s: float = 0.0
 
 
+_MOVES = Landing()
+
+
 def watch(
     landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
 ) -> tuple[Landing, bool]:
@@ -37,16 +40,16 @@ def watch(
     whose climb does not change.
     """
     if not sinks:
-        return Landing(), False
+        return _MOVES, False
     climb_m_s = state.velocity_enu_m_s[2]
     if drifts:
         still, for_us = abs(climb_m_s - landing.climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
     else:
         still, for_us = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S, _FOR_US
     if max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
-        return Landing(), False
+        return _MOVES, False
     if landing.since_us is None or not still:
-        return (Landing(now_us, climb_m_s) if still or drifts else Landing()), False
+        return (Landing(now_us, climb_m_s) if still or drifts else _MOVES), False
     return landing, now_us - landing.since_us >= for_us
 
 

@@ -10,7 +10,7 @@ from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.guidance.integrator_chain import Limits as Pace
-from colibri.common.types import Vector
+from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint
 from colibri.mavlink.telemetry.snapshot import BatteryState
 
@@ -70,7 +70,8 @@ class Conditions:
     def __init__(self) -> None:
         """Begin with nothing lost."""
         self._since_us: dict[Condition, int] = {}
-        self._pose: tuple[Vector, object] | None = None
+        self._position: Vector | None = None
+        self._attitude: Quaternion | None = None
         self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
@@ -91,13 +92,13 @@ class Conditions:
 
     def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
         """Return since when position and attitude stay the same though the rates are not zero; None if they do not."""
-        pose = (inputs.state.position_enu_m, inputs.state.attitude)
-        if pose != self._pose or inputs.standing:
-            self._pose, self._pose_us = pose, inputs.now_us
+        state, now_us = inputs.state, inputs.now_us
+        if state.position_enu_m != self._position or state.attitude != self._attitude or inputs.standing:
+            self._position, self._attitude, self._pose_us = state.position_enu_m, state.attitude, now_us
             return None
-        for_s = (inputs.now_us - self._pose_us) * 1e-6
-        moved = hypot(*inputs.state.velocity_enu_m_s) * for_s > _FROZEN_M
-        turned = hypot(*inputs.state.rate_flu_rad_s) * for_s > _FROZEN_RAD
+        for_s = (now_us - self._pose_us) * 1e-6
+        moved = hypot(*state.velocity_enu_m_s) * for_s > _FROZEN_M
+        turned = hypot(*state.rate_flu_rad_s) * for_s > _FROZEN_RAD
         return self._pose_us if moved or turned else None
 
 
@@ -147,8 +148,8 @@ def _estimate_invalid(inputs: FailsafeInputs, limits: Limits) -> bool:
 
 
 def _tilted(inputs: FailsafeInputs, limits: Limits) -> bool:
-    roll, pitch, _ = map(abs, inputs.state.euler)
-    return roll > radians(limits["FD_FAIL_R"]) or pitch > radians(limits["FD_FAIL_P"])
+    roll, pitch, _ = inputs.state.euler
+    return abs(roll) > radians(limits["FD_FAIL_R"]) or abs(pitch) > radians(limits["FD_FAIL_P"])
 
 
 def _fence_breached(inputs: FailsafeInputs, limits: Limits) -> bool:
@@ -169,7 +170,7 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.TILTED: _tilted,
     Condition.ROTOR_FAILED: lambda inputs, _: inputs.rotor_lost is not None,
     Condition.POSITION_LOST: lambda inputs, limits: (
-        needs_position(inputs.mode, inputs.setpoint) and not position_known(inputs.estimate, limits)
+        not position_known(inputs.estimate, limits) and needs_position(inputs.mode, inputs.setpoint)
     ),
     Condition.ESTIMATE_INVALID: _estimate_invalid,
     Condition.BATTERY_EMERGENCY: _battery("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT"),
