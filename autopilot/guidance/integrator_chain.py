@@ -121,11 +121,11 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
     step = dt / steps
     motion = motion.copy()
     p, v, a, j = motion[0], motion[1], motion[2], motion[3]
-    snap = np.empty(3)
+    snap, wanted = np.empty(3), np.empty(3)
     yaw, rate = heading[0], heading[1]
     for k in range(count):
         for part in range(steps):
-            _drive(motion, target.motion[k], target.kinds, limits, snap)
+            _drive(motion, target.motion[k], target.kinds, limits, wanted, snap)
             acceleration = _turn(yaw, rate, target.heading[k], target.turns, limits)
             if part == 0:
                 out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = p, v, a, j, snap
@@ -152,22 +152,25 @@ def is_near(motion: Array, target: Array, within: float) -> bool:
 
 
 @compiled
-def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, snap: Array) -> None:
-    """Write the snap, (3,): the horizontal axes share their limits, the vertical one has its own."""
+def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, wanted: Array, snap: Array) -> None:
+    """Write the snap, (3,): the horizontal axes share their limits, the vertical one has its own.
+
+    `wanted` is written to, too, (3,): what one loop demands of the next.
+    """
     vertically = limits.sink_m_s if motion[0, 2] > target[0, 2] else limits.climb_m_s
     jerk = limits.jerk_m_s3
-    _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), snap)
-    _drive_axes(motion, target, kinds, Axes(2, 3, vertically, limits.lift_m_s2, jerk), snap)
+    _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), wanted, snap)
+    _drive_axes(motion, target, kinds, Axes(2, 3, vertically, limits.lift_m_s2, jerk), wanted, snap)
 
 
 @compiled
-def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, snap: Array) -> None:
+def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wanted: Array, snap: Array) -> None:
     """Write the snap of the axes from `first` to before `last`."""
     p, v, a, j = motion[0], motion[1], motion[2], motion[3]
     first, last = axes.first, axes.last
-    wanted = np.zeros(3)
     distance_squared = 0.0
     for i in range(first, last):
+        wanted[i] = 0.0
         if kinds[i] == 0:
             distance_squared += (p[i] - target[0, i]) ** 2
     distance = sqrt(distance_squared)
