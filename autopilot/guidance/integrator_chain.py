@@ -20,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled, packed
 from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -65,6 +65,12 @@ class Limits(NamedTuple):
 
 
 @lru_cache(maxsize=64)
+def packed_limits(limits: Limits) -> Packed:
+    """Return limits as a record: a kernel takes three times as long to recognise them as a tuple."""
+    return packed(limits)
+
+
+@lru_cache(maxsize=64)
 def at_speed(limits: Limits, speed_m_s: float) -> Limits:
     """Return limits of which only the horizontal speed is another."""
     return limits._replace(speed_m_s=speed_m_s)
@@ -86,24 +92,17 @@ class Axes(NamedTuple):
     jerk_m_s3: float
 
 
-class Target(NamedTuple):
-    """What the chain follows, at every instant.
-
-    Attributes:
-        motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
-        kinds: Which of the first three binds, for x, y and z, (3,).
-        heading: Yaw, rate, acceleration, (n, 3).
-        turns: Whether yaw itself binds; otherwise its rate.
-    """
-
-    motion: Array
-    kinds: Integers
-    heading: Array
-    turns: bool
-
-
 @compiled
-def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: float) -> tuple[Array, Array]:
+def advance(
+    motion: Array,
+    heading: Array,
+    target: Array,
+    kinds: Integers,
+    target_heading: Array,
+    turns: bool,
+    limits: Packed,
+    dt: float,
+) -> tuple[Array, Array]:
     """Return motion, (5, n, 3), and heading, (3, n), from now on; snap and yaw acceleration act until the next instant.
 
     Between instants that are too far apart for its loops the chain takes several steps.
@@ -111,11 +110,14 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
     Args:
         motion: Position, velocity, acceleration, jerk now, ENU, (4, 3).
         heading: Yaw, rad, and its rate now, (2,).
-        target: To follow, at n instants.
-        limits: Of the approach.
+        target: To follow at n instants: position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
+        kinds: Which of the first three binds, for x, y and z, (3,).
+        target_heading: Yaw, rate, acceleration to follow, (n, 3).
+        turns: Whether yaw itself binds; otherwise its rate.
+        limits: Of the approach, packed.
         dt: Between two instants, s.
     """
-    count = target.motion.shape[0]
+    count = target.shape[0]
     out, out_heading = np.empty((5, count, 3)), np.empty((3, count))
     steps = ceil(dt / _MAX_STEP_S)
     step = dt / steps
@@ -125,8 +127,8 @@ def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: f
     yaw, rate = heading[0], heading[1]
     for k in range(count):
         for part in range(steps):
-            _drive(motion, target.motion[k], target.kinds, limits, wanted, snap)
-            acceleration = _turn(yaw, rate, target.heading[k], target.turns, limits)
+            _drive(motion, target[k], kinds, limits[0], wanted, snap)
+            acceleration = _turn(yaw, rate, target_heading[k], turns, limits[0])
             if part == 0:
                 out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = p, v, a, j, snap
                 out_heading[0, k], out_heading[1, k], out_heading[2, k] = yaw, rate, acceleration

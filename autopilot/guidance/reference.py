@@ -117,8 +117,16 @@ def lead(
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
         return _on_target(reference, target)
-    followed = integrator_chain.Target(target.motion, _integers(target.kinds), target.heading, target.turns)
-    motion, heading = integrator_chain.advance(reference.motion, reference.heading, followed, limits, interval_s)
+    motion, heading = integrator_chain.advance(
+        reference.motion,
+        reference.heading,
+        target.motion,
+        _integers(target.kinds),
+        target.heading,
+        target.turns,
+        integrator_chain.packed_limits(limits),
+        interval_s,
+    )
     return Horizon(*motion, *heading), Reference(motion[:4, 1].copy(), heading[:2, 1].copy())
 
 
