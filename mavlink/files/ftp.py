@@ -29,7 +29,7 @@ from colibri.mavlink.files.ftp_wire import (
     request_of,
 )
 from colibri.mavlink.files.tree import FileRefusal, Files, Names, Reading
-from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
 MAX_SESSIONS = 32
@@ -134,7 +134,7 @@ class Ftp:
         """Go on with bursts and checksums."""
         del now_us
         if not self._bursts and not self._checksums:
-            return ()
+            return IDLE
         sends: list[Send] = []
         for key in list(self._bursts)[:BURST_PACKETS_A_POLL]:
             burst = self._bursts.pop(key)  # to go to the end of the line

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, Reading
-from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.wire.dialect import Message
 
 BLOCK_BYTES = 90
@@ -80,7 +80,7 @@ class Logs:
         """Go on with what was asked for."""
         del now_us
         if not self._transfers and not self._listings:
-            return ()
+            return IDLE
         return self._due()
 
     def _due(self) -> list[Send]:

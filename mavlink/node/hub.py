@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from colibri.common.types import Address
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.router import Router, target_of
-from colibri.mavlink.node.service import Peer, PolledService, Send, Service
+from colibri.mavlink.node.service import IDLE, Peer, PolledService, Send, Service
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import Signing
 
@@ -70,6 +70,8 @@ class Hub:
         """
         self._own = (system_id, component_id)
         self._polled = tuple(service for service in services if isinstance(service, PolledService))
+        self._awake = self._polled
+        self._idle: set[Service] = set()
         names = frozenset[str]().union(*(service.handles for service in services))
         self._receivers = {name: [service for service in services if name in service.handles] for name in names}
         self._signing = signing
@@ -138,11 +140,14 @@ class Hub:
     def poll(self, now_us: int) -> None:
         """Have every polled service do what is due at `now_us`."""
         self._now_us = now_us
-        for service in self._polled:
+        for service in self._awake:
             try:
                 sends = service.poll(now_us)
                 if sends:
                     self.send(sends)
+                elif sends is IDLE:
+                    self._idle.add(service)
+                    self._choose()
             except Exception as error:
                 self._drop(service, error)
         if now_us >= self._tidy_at_us:
@@ -190,10 +195,17 @@ class Hub:
         if self._router.concerns_us(target) and (self.accepts_only is None or message.name in self.accepts_only):
             peer = Peer(channel.number, *message.source)
             for service in self._receivers.get(message.name, ()):
+                if service in self._idle:
+                    self._idle.discard(service)
+                    self._choose()
                 try:
                     self.send(service.receive(message, peer, self._now_us))
                 except Exception as error:
                     self._tell(service, error, f"{message.name} dropped")
+
+    def _choose(self) -> None:
+        """Poll, from now on, the services that are not idle, always in the same order."""
+        self._awake = tuple(service for service in self._polled if service not in self._idle)
 
     def _drop(self, service: Service, error: Exception) -> None:
         """Poll a service no more that has raised too often."""
@@ -201,6 +213,7 @@ class Hub:
         self._tell(service, error, "tried again, then off")
         if self._raised[service] >= _TRIES:
             self._polled = tuple(each for each in self._polled if each is not service)
+            self._choose()
 
     def _tell(self, service: Service, error: Exception, instead: str) -> None:
         if self._caught is None:

@@ -5,8 +5,8 @@ Whatever the fields hold, `receive` and `poll` raise nothing. Nobody has checked
 enumerations and lies about counts are the service's to refuse.
 """
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from colibri.mavlink.wire.dialect import Message
 
@@ -35,6 +35,10 @@ class Send(NamedTuple):
     channel: int | None = None
 
 
+IDLE: Final[Sequence[Send]] = []
+"""Nothing, of a service that has nothing under way either: it is not polled again before it receives a message."""
+
+
 class Service(Protocol):
     """A microservice, and the names of the messages that its `receive` is to be given."""
 
@@ -49,7 +53,7 @@ class PolledService(Service, Protocol):
     """A microservice that sends by itself, or later than it received."""
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Do what is due at `now_us`; return what to send. Called once a frame of the plant."""
+        """Do what is due at `now_us`; return what to send, or `IDLE`. Called once a frame of the plant."""
 
 
 def to(peer: Peer, name: str, *fields: Any) -> Send:

@@ -7,7 +7,7 @@ Specification: https://mavlink.io/en/services/parameter.html. Values are encoded
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parameters, Value, bits_of, value_of
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
@@ -52,7 +52,7 @@ class ParameterService:
     def poll(self, now_us: int) -> Iterable[Send]:
         """Send what is due of each list: "allow breaks between each message" (read all parameters)."""
         if not self._listings:
-            return ()
+            return IDLE
         return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
 
     def _begin_list(self, peer: Peer, now_us: int) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -144,7 +144,9 @@ class CommandService:
 
     def poll(self, now_us: int) -> Iterable[Send]:
         """Report once a second the commands in progress."""
-        if self._report_at_us is None or 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
+        if self._report_at_us is None:
+            return IDLE
+        if 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
             return ()
         sends = []
         for number, running in self._running.items():

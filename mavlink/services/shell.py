@@ -6,7 +6,7 @@ Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
-from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.wire.dialect import Message, mav
 
 DATA_BYTES = 70
@@ -56,7 +56,7 @@ class Shell:
     def poll(self, now_us: int) -> Iterable[Send]:
         """Send more of the answers."""
         del now_us
-        return self._due() if self._answers else ()
+        return self._due() if self._answers else IDLE
 
     def _due(self) -> list[Send]:
         sends: list[Send] = []

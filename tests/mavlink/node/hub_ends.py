@@ -5,6 +5,7 @@ from typing import Any
 
 from colibri.mavlink.node.hub import Hub
 from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.services.shell import DATA_BYTES, Shell
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 
@@ -33,6 +34,22 @@ class Recorder:
     @property
     def names(self) -> list[str]:
         return [name for name, _, _ in self.received]
+
+
+class CountedShell(Shell):
+    """A shell that counts how often it is polled."""
+
+    polls = 0
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        self.polls += 1
+        return super().poll(now_us)
+
+
+def typed(text: bytes) -> tuple[object, ...]:
+    """Return the fields of a SERIAL_CONTROL of who types `text` into a shell, and waits for its answer."""
+    device, flags = dialect.mav.SERIAL_CONTROL_DEV_SHELL, dialect.mav.SERIAL_CONTROL_FLAG_RESPOND
+    return device, flags, 0, 0, len(text[:DATA_BYTES]), text[:DATA_BYTES].ljust(DATA_BYTES, b"\0")
 
 
 class Observer:

@@ -14,7 +14,18 @@ from colibri.mavlink.node.service import Peer, Send, to_all
 from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.signing import Signing
-from tests.mavlink.node.hub_ends import GCS, HEARTBEAT, SDK, Observer, Recorder, Station, frames_to, sent
+from tests.mavlink.node.hub_ends import (
+    GCS,
+    HEARTBEAT,
+    SDK,
+    CountedShell,
+    Observer,
+    Recorder,
+    Station,
+    frames_to,
+    sent,
+    typed,
+)
 
 
 @pytest.fixture
@@ -76,6 +87,36 @@ def test_a_service_that_only_answers_needs_no_poll(service: Recorder) -> None:
     ours.receive(Station(255).says("TIMESYNC", 0, 5), 0, GCS, 4000)
     ours.poll(4000)
     assert sent(ours) == [(0, GCS, ["TIMESYNC", "HEARTBEAT"])]
+
+
+def test_an_idle_service_is_polled_again_once_it_has_received() -> None:
+    shell, recorder = CountedShell({}), Recorder()
+    ours = Hub(1, 1, [shell, recorder])
+    station = Station(255)
+    ours.open(0, GCS)
+    for now_us in range(0, 40_000, 4000):
+        ours.poll(now_us)
+    assert shell.polls == 1
+    recorder.due = [to_all("HEARTBEAT", *HEARTBEAT)]
+    ours.receive(station.says("SERIAL_CONTROL", *typed(b"help\n" * 20)), 0, GCS, 40_000)
+    ours.poll(40_000)
+    ((_, _, names),) = sent(ours)
+    assert names == [*["SERIAL_CONTROL"] * (len(names) - 1), "HEARTBEAT"]  # in the order of the services
+    for now_us in range(44_000, 80_000, 4000):
+        ours.poll(now_us)
+    assert len(names) > 1
+    assert shell.polls == 3  # once before, once for the answer, once to find that nothing is left
+
+
+def test_a_service_that_raises_as_it_receives_is_not_idle() -> None:
+    shell = CountedShell({"fail": lambda _: str(1 // 0)})
+    caught: list[tuple[str, Exception, str]] = []
+    ours = Hub(1, 1, [shell], caught=lambda *what: caught.append(what))
+    ours.poll(0)
+    ours.receive(Station(255).says("SERIAL_CONTROL", *typed(b"help\nfail\n")), 0, GCS, 4000)
+    ours.poll(4000)
+    assert [instead for _, _, instead in caught] == ["SERIAL_CONTROL dropped"]
+    assert shell.polls == 2
 
 
 def test_many_frames_share_datagrams_and_keep_their_order(ours: Hub) -> None:
