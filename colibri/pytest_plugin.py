@@ -50,12 +50,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--sitl-link",
         choices=LINKS,
         default="memory",
-        help="memory: plant and autopilot in this process (default); udp: each in a process of its own",
+        help="memory: plant and autopilot in this process (default); udp: the autopilot in a process of its own",
     )
     add(
         "--sitl-from-scratch",
         action="store_true",
-        help="with udp: start each process as a user does, rather than by a fork of one that has loaded everything",
+        help="with udp: start plant and autopilot each as a user does, rather than fork the autopilot from a process "
+        "that has loaded everything",
     )
     add(
         "--sitl-keep",

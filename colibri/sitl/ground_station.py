@@ -93,9 +93,10 @@ class Station(Inbox):
             self._beat_at_us = now_us + HEARTBEAT_EVERY_US
             kind, nobody = mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID
             self.send("HEARTBEAT", kind, nobody, 0, 0, mav.MAV_STATE_ACTIVE, 3)
-        for upload in self._uploads:
-            upload.poll(now_us)
-        self._uploads = [upload for upload in self._uploads if upload.result is None]
+        if self._uploads:
+            for upload in self._uploads:
+                upload.poll(now_us)
+            self._uploads = [upload for upload in self._uploads if upload.result is None]
         return self._up.due(now_us)
 
     def arriving(self, datagram: bytes, now_us: int) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from argparse import ArgumentTypeError
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
@@ -19,7 +19,7 @@ from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.launcher import Launcher
 from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
-from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
+from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant, WallClock
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.flight_figure import draw
@@ -60,16 +60,21 @@ class Flights:
     def _lockstep(self, setting: Setting, state: Path) -> LockstepSession:
         state.mkdir()
         _write_parameters(setting, state)
-        plant, autopilot = setting.plant_options(_hover_rpm(setting)), setting.autopilot_options(state)
-        if self._launcher is None:
-            return self._met(MemoryPlant(plant), MemoryAutopilot(autopilot), setting)
-        begun = UdpPlant(self._launcher, plant, state)
-        self._ends.callback(begun.close)
-        return self._met(begun, UdpAutopilot(self._launcher, autopilot, state), setting)
-
-    def _met(self, plant: Plant, autopilot: Autopilot, setting: Setting) -> LockstepSession:
+        plant = self._plant(setting.plant_options(_hover_rpm(setting)), state)
+        self._ends.callback(plant.close)
+        autopilot = self._autopilot(setting.autopilot_options(state), state)
         self._ends.callback(autopilot.close)
         return LockstepSession(plant, autopilot, setting.system, setting.seed)
+
+    def _plant(self, options: Sequence[str], state: Path) -> Plant:
+        if self._launcher is None:
+            return MemoryPlant(options)
+        if not self._launcher.starts_plants:
+            return MemoryPlant(options, WallClock())
+        return UdpPlant(self._launcher, options, state)
+
+    def _autopilot(self, options: Sequence[str], state: Path) -> Autopilot:
+        return MemoryAutopilot(options) if self._launcher is None else UdpAutopilot(self._launcher, options, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
         """Write all that is known of the flights below `folder`; return where each is.

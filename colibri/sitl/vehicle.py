@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
-from colibri.mavlink.hil.conductor import Parcel, StepMessage
-from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.conductor import Parcel
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
@@ -87,7 +86,6 @@ class Sitl(View, Stepped, Steered):
         self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
         self.record = Record()
         self._lockstep = lockstep
-        self._to_stations = StepMessage(0, ())
         self._injected = b""
         self._wind, self._payload_kg = str(setting.wind or CALM), 0.0
         self._sticks: dict[str, float] | None = None
@@ -96,7 +94,6 @@ class Sitl(View, Stepped, Steered):
         self.gcs = self.client(255, 190)
         self._texts = StatusTexts()
         self.fleet: Sequence[Sitl] = ()
-        self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     if not TYPE_CHECKING:  # checkers know what there is
 
@@ -106,7 +103,7 @@ class Sitl(View, Stepped, Steered):
             Raises:
                 AttributeError: There is no such attribute.
             """
-            if name[0] != "_" and "rotors" in self.__dict__ and not hasattr(self, name):
+            if name[0] != "_" and "fleet" in self.__dict__ and not hasattr(self, name):
                 raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
             super().__setattr__(name, value)
 
@@ -133,22 +130,22 @@ class Sitl(View, Stepped, Steered):
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
-        parcels = []
-        for station in self._stations:
-            for datagram in station.departing(now_us):
-                parcels.append(Parcel(station.number, datagram))
-                self.record.note(now_us, datagram)
-        injected, self._injected = self._injected, b""
-        instant = self._lockstep.advance(parcels, injected)
+        stations, note = self._stations, self.record.note
+        parcels = [Parcel(station.number, datagram) for station in stations for datagram in station.departing(now_us)]
+        for _, datagram in parcels:
+            note(now_us, datagram)
+        instant = self._lockstep.advance(parcels, self._injected)
+        if self._injected:
+            self._injected = b""
         self.record.add(instant)
-        self._to_stations, self.rotors = instant.to_stations, instant.command
         for number, datagram in instant.to_stations.parcels:
-            self.record.note(now_us, datagram)
+            note(now_us, datagram)
             if number == self.gcs.number:
                 self._texts.add_datagram(datagram, now_us)
-            self._stations[number - 1].arriving(datagram, now_us)
-        for station in self._stations:
-            station.listen(self.time_us)
+            stations[number - 1].arriving(datagram, now_us)
+        now_us = self.time_us
+        for station in stations:
+            station.listen(now_us)
 
     # Commands.
 

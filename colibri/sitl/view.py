@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.rotations import euler_from_quaternion, tilt_deg
 from colibri.common.types import Vector
-from colibri.mavlink.hil.conductor import StepMessage
+from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.wire.ned import ned_from_enu
 from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
@@ -37,7 +37,6 @@ class View:
     gcs: Station
     record: Record
     _lockstep: LockstepSession
-    _to_stations: StepMessage
     _texts: StatusTexts
 
     @property
@@ -88,12 +87,17 @@ class View:
     @property
     def mode(self) -> Mode | None:
         """The flight mode, as the autopilot has it at this frame, whatever the links do."""
-        return mode_of_custom(self._to_stations.custom_mode)
+        return mode_of_custom(self._lockstep.flown.to_stations.custom_mode)
 
     @property
     def armed(self) -> bool:
         """Whether its rotors may turn, as the autopilot has it at this frame."""
-        return self._to_stations.armed
+        return self._lockstep.flown.to_stations.armed
+
+    @property
+    def rotors(self) -> ActuatorCommand:
+        """What the autopilot has commanded at this frame."""
+        return self._lockstep.flown.command
 
     @property
     def home(self) -> Vector | None:

@@ -48,15 +48,15 @@ def packets(step_message: StepMessage) -> list[bytes]:
     Raises:
         ValueError: It is more than 255 packets.
     """
-    parts = [_HEAD.pack(step_message.time_us, step_message.custom_mode, step_message.armed, len(step_message.parcels))]
-    for station, whole in step_message.parcels:
+    time_us, parcels, custom_mode, armed = step_message
+    content = _HEAD.pack(time_us, custom_mode, armed, len(parcels))
+    for station, whole in parcels:
         datagram = whole[:MAX_PARCEL_BYTES]
-        parts += (_PARCEL.pack(station, len(datagram)), datagram)
-    content = b"".join(parts)
+        content += _PARCEL.pack(station, len(datagram)) + datagram
     pieces = [content[at : at + _PIECE_BYTES] for at in range(0, len(content), _PIECE_BYTES)]
     if len(pieces) > 255:
         raise ValueError(f"{len(content)} bytes are too many for one step message")
-    return [_PIECE.pack(step_message.time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
+    return [_PIECE.pack(time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
 
 
 class Gathering:
@@ -70,6 +70,8 @@ class Gathering:
     def take(self, packet: bytes) -> StepMessage | None:
         """Take in a packet from the other process; return the step message if that completes it."""
         time_us, number, count = _PIECE.unpack_from(packet)
+        if count == 1:
+            return _step_message(packet, _PIECE.size)
         if time_us != self._time_us:
             self._time_us, self._pieces = time_us, {}
         self._pieces[number] = packet[_PIECE.size :]
@@ -80,9 +82,9 @@ class Gathering:
         return _step_message(content)
 
 
-def _step_message(content: bytes) -> StepMessage:
-    time_us, custom_mode, armed, count = _HEAD.unpack_from(content)
-    at = _HEAD.size
+def _step_message(content: bytes, at: int = 0) -> StepMessage:
+    time_us, custom_mode, armed, count = _HEAD.unpack_from(content, at)
+    at += _HEAD.size
     parcels = []
     for _ in range(count):
         station, length = _PARCEL.unpack_from(content, at)

@@ -21,10 +21,17 @@ class UdpLink(Endpoint):
         super().__init__(url, target)
         sock.setblocking(False)
         self._socket = sock
-        self._connected = target is not None and _connect(sock, target)
+        self._connected = False
         self.spin_s = SPIN_S
         self._waited_s = 0.0
-        self._opened = [] if target is None else [target]
+        if target is not None:
+            self.speak_with(target)
+
+    def speak_with(self, target: Address) -> None:
+        """Speak with `target`, and hear nobody else from now on."""
+        self.target = target
+        self._connected = _connect(self._socket, target)
+        self._opened = [target]
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send to `address`, or to the target. What the network will not take now is lost, as UDP may lose it.

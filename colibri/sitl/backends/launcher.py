@@ -32,7 +32,13 @@ class Running(Protocol):
 
 
 class Launcher(Protocol):
-    """Starts processes."""
+    """Starts processes.
+
+    Attributes:
+        starts_plants: Whether the plant is to be a process, too; if not, the test's own has it.
+    """
+
+    starts_plants: bool
 
     def start(self, package: str, options: Sequence[str], log: Path) -> Running:
         """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
@@ -83,6 +89,8 @@ class LoggedChild:
 class FromScratch:
     """Starts each process from scratch, as a user does."""
 
+    starts_plants = True
+
     def start(self, package: str, options: Sequence[str], log: Path) -> Running:
         """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
         with log.open("wb") as out:
@@ -93,7 +101,13 @@ class FromScratch:
 
 
 class Forked:
-    """Has a fork server start each process: it has loaded what both need, which takes longer than most flights."""
+    """Has a fork server start each autopilot: it has loaded what they need, which takes longer than most flights.
+
+    Plants stay with the test, which steps them: of three processes that share a core each would find less of what it
+    needs in the caches than of two.
+    """
+
+    starts_plants = False
 
     def __init__(self) -> None:
         """Start the fork server; it loads while this process goes on."""

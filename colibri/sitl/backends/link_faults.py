@@ -52,7 +52,8 @@ class Trouble:
     @property
     def any(self) -> bool:
         """Whether it does anything at all."""
-        return self.down or any((self.loss, self.delay_s, self.jitter_s, self.duplicate, self.reorder, self.corrupt))
+        of_chance = self.loss or self.duplicate or self.reorder or self.corrupt
+        return bool(of_chance or self.delay_s or self.jitter_s or self.down)
 
 
 class Pipe:

@@ -3,7 +3,7 @@
 The two may be in this process or in others: see `memory` and `udp`. Either way the same bytes pass.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
@@ -29,7 +29,7 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
-_ANSWER: int = mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")
 _GLANCE_S = 0.002
 _GIVE_UP_S = 20.0
 """Of the clock that a link is late by. No flight depends on it."""
@@ -60,6 +60,9 @@ class Plant(Protocol):
 
     def clock_s(self) -> float:
         """Return the time that links are late by."""
+
+    def close(self) -> None:
+        """End it."""
 
 
 class Autopilot(Protocol):
@@ -123,6 +126,7 @@ class LockstepSession:
 
     Attributes:
         truth: How the vehicle is now.
+        flown: The last frame that was flown; before the first one, what there is to it.
         acks: Answers of the plant to commands: number and MAV_RESULT.
         trouble: What the link between plant and autopilot does.
     """
@@ -139,6 +143,8 @@ class LockstepSession:
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
         plant.receive(autopilot.call())
         self._frame, self.truth = self._taken_in(plant.frame())
+        still = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+        self.flown = Instant(self.truth, still, StepMessage(0, ()), b"", b"")
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
         """Fly one frame.
@@ -156,14 +162,16 @@ class LockstepSession:
             answer, to_stations, received = self._struggle(frame, step_message, injected)
         else:
             self._autopilot.receive_frame(frame, step_message)
+            # What comes last is waited for first: to be woken for each datagram would cost a turn of the core each.
+            to_stations = self._autopilot.to_stations()
             answer = self._autopilot.answer()
             self._plant.take(answer + injected)
-            to_stations = self._autopilot.to_stations()
             received = self._plant.frame()
         self._frame, self.truth = self._taken_in(received)
         if injected:
             self._read_acks(self._frame)
-        return Instant(began, self._command(answer), to_stations, frame, answer)
+        self.flown = Instant(began, self._command(answer), to_stations, frame, answer)
+        return self.flown
 
     def _struggle(
         self, frame: bytes, step_message: StepMessage, injected: bytes
@@ -252,31 +260,23 @@ class LockstepSession:
         raise SessionError("the autopilot answered with what no rotor can follow")
 
 
-def frames_of(datagram: bytes) -> Iterator[bytes]:
-    """Yield the frames of a datagram of whole MAVLink 2 frames that are not signed."""
+def answers(datagram: bytes, time_us: int) -> bool:
+    """Whether a datagram of whole MAVLink 2 frames that are not signed holds the answer to the frame of a time."""
+    sought = time_us.to_bytes(8, "little")
     at = 0
     while at < len(datagram):
-        end = at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
-        yield datagram[at:end]
-        at = end
-
-
-def answers(datagram: bytes, time_us: int) -> bool:
-    """Whether a datagram holds the answer to the frame of a time."""
-    return any(
-        int.from_bytes(frame[7:_HEADER_BYTES], "little") == _ANSWER
-        and int.from_bytes(frame[10:18], "little") == time_us
-        for frame in frames_of(datagram)
-    )
+        if datagram[at + 7 : at + _HEADER_BYTES] == _ANSWER and datagram[at + _HEADER_BYTES : at + 18] == sought:
+            return True
+        at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+    return False
 
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
-    """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
-    feedback: list[bytes] = []
-    truth: list[bytes] = []
-    for frame in frames_of(datagram):
-        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else feedback).append(frame)
-    return b"".join(feedback), b"".join(truth)
+    """Return what of a plant's datagram is for the autopilot, and the truth, which comes behind it."""
+    at = 0
+    while at < len(datagram) and datagram[at + _COMPONENT_AT] != TRUTH_COMPONENT:
+        at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+    return datagram[:at], datagram[at:]
 
 
 def _us(time_s: float) -> int:

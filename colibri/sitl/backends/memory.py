@@ -4,8 +4,8 @@ import io
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
-from time import perf_counter
-from typing import Any
+from time import perf_counter, sleep
+from typing import Any, Protocol
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.autopilot.control.registry import DecisionError
@@ -30,6 +30,45 @@ from colibri.sitl.backends.setting import SettingError
 
 NEVER_LATE_S = 0.0
 _ADDRESS: Address = ("memory", 0)
+_SOON_S = 2e-4
+
+
+class LinkClock(Protocol):
+    """What links between plant and autopilot are late by. No flight depends on it."""
+
+    def now_s(self) -> float:
+        """Return the time, s."""
+
+    def wait(self, timeout_s: float) -> None:
+        """Let time pass, `timeout_s` at most."""
+
+
+class StoppedClock:
+    """The clock of a plant whose autopilot is in this process, too: it goes only while the plant waits."""
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        self._now_s = 0.0
+
+    def now_s(self) -> float:
+        """Return the time, s."""
+        return self._now_s
+
+    def wait(self, timeout_s: float) -> None:
+        """Let `timeout_s` pass at once."""
+        self._now_s += timeout_s
+
+
+class WallClock:
+    """The clock of a plant whose autopilot is another process, which computes meanwhile."""
+
+    def now_s(self) -> float:
+        """Return the time, s."""
+        return perf_counter()
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep, and see soon whether there is something to do."""
+        sleep(min(timeout_s, _SOON_S))
 
 
 class MemoryPlant:
@@ -37,8 +76,8 @@ class MemoryPlant:
 
     process = None
 
-    def __init__(self, options: Sequence[str]) -> None:
-        """Begin with the options of a command line.
+    def __init__(self, options: Sequence[str], clock: LinkClock | None = None) -> None:
+        """Begin with the options of a command line; without a `clock` the autopilot is in this process, too.
 
         Raises:
             SettingError: It cannot begin so.
@@ -52,7 +91,7 @@ class MemoryPlant:
         self._answered = False
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._plant: Plant | None = None
-        self._now_s = 0.0
+        self._clock = clock or StoppedClock()
 
     def receive(self, datagram: bytes) -> None:
         """Take in a datagram of an autopilot: its call, or an answer.
@@ -60,7 +99,7 @@ class MemoryPlant:
         Raises:
             SessionError: The state cannot be integrated any further.
         """
-        command = self._end.receive(datagram, _ADDRESS, self._now_s)
+        command = self._end.receive(datagram, _ADDRESS, self._clock.now_s())
         self._end.received.clear()
         if command is None:
             return
@@ -89,13 +128,16 @@ class MemoryPlant:
         if self._answered:
             self._offer()
         else:
-            self._now_s += timeout_s
-            self._end.poll(self._now_s)
+            self._clock.wait(timeout_s)
+            self._end.poll(self._clock.now_s())
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def clock_s(self) -> float:
-        """Return the time that links are late by: it passes only while the plant waits."""
-        return self._now_s
+        """Return the time that links are late by."""
+        return self._clock.now_s()
+
+    def close(self) -> None:
+        """Leave nothing: it has no process."""
 
     def _offer(self) -> None:
         end = self._end
@@ -103,7 +145,7 @@ class MemoryPlant:
             self._plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
         frame, plant_status = self._plant.measure()
-        end.offer(frame, self._now_s, plant_status, state_frame(self._plant.world))
+        end.offer(frame, self._clock.now_s(), plant_status, state_frame(self._plant.world))
 
 
 class MemoryAutopilot:

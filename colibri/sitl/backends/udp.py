@@ -99,9 +99,7 @@ class UdpAutopilot:
         """Start it; `folder` takes its output."""
         self._launcher = launcher
         self._folder = folder
-        self._link, self._stations = opened(_HERE), opened(_HERE)
-        plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
-        self._options = ["--plant", plant, "--stepped", stations, *options]
+        self._options = options
         self._starts = 0
         self.start()
 
@@ -113,17 +111,20 @@ class UdpAutopilot:
     def start(self) -> None:
         """Start it again."""
         self._starts += 1
+        self._link, self._stations = opened(_HERE), opened(_HERE)
+        plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
         log = self._folder / f"autopilot-{self._starts}.said"
-        self._child = LoggedChild(self._launcher, "autopilot", self._options, log)
+        options = ["--plant", plant, "--stepped", stations, *self._options]
+        self._child = LoggedChild(self._launcher, "autopilot", options, log)
         self._gathering = Gathering()
         self._time_us = 0
-        self._address: Address | None = None
-        self._stations_address: Address | None = None
 
     def call(self) -> bytes:
         """Return how it calls a plant."""
-        _, self._stations_address = received(self._stations, (self._child,), "autopilot")
-        call, self._address = received(self._link, (self._child,), "autopilot")
+        _, address = received(self._stations, (self._child,), "autopilot")
+        self._stations.speak_with(address)
+        call, address = received(self._link, (self._child,), "autopilot")
+        self._link.speak_with(address)
         return call
 
     def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
@@ -135,11 +136,11 @@ class UdpAutopilot:
         """Take in what ground stations send at the time of the next frame."""
         self._time_us = step_message.time_us
         for packet in packets(step_message):
-            self._stations.send(packet, self._stations_address)
+            self._stations.send(packet)
 
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
-        self._link.send(datagram, self._address)
+        self._link.send(datagram)
 
     def listen(self) -> list[bytes]:
         """Return what it has sent to the plant."""
@@ -165,10 +166,7 @@ class UdpAutopilot:
 
     def kill(self) -> None:
         """End it as a power cut does, and forget what is still on its way."""
-        self._child.kill()
-        for link in (self._link, self._stations):
-            while link.receive_now():
-                pass
+        self.close()
 
     def close(self) -> None:
         """End it."""

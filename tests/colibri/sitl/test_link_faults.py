@@ -62,7 +62,6 @@ def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
     assert any("take-off" in text for text in in_memory[1])
 
 
-@pytest.mark.long
 def test_the_same_flight_of_processes_from_scratch() -> None:
     def hover(sitl: Sitl) -> None:
         sitl.run(0.2)
@@ -179,7 +178,8 @@ def test_a_world_that_there_is_not_is_refused() -> None:
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
 def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
-    with Flights(Setting(airborne=3.0), forked) as flights:
+    launcher = FromScratch() if package == "plant" else forked
+    with Flights(Setting(airborne=3.0), launcher) as flights:
         sitl = flights.begin()
         sitl.run(0.1)
         os.kill(process_of(sitl, package), signal.SIGKILL)
@@ -204,9 +204,9 @@ def test_a_fleet_flies_as_each_flies_alone() -> None:
     assert together == [flown(None, alone, airborne=3.0, system=system, seed=system)[0] for system in (1, 2)]
 
 
-def test_a_process_that_cannot_begin_is_quoted(forked: Launcher) -> None:
+def test_a_process_that_cannot_begin_is_quoted() -> None:
     with (
-        Flights(Setting(wind="three"), forked) as flights,
+        Flights(Setting(wind="three"), FromScratch()) as flights,
         pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*must be SPEED@FROM"),
     ):
         flights.begin()
