@@ -52,6 +52,10 @@ class TaskRecord(NamedTuple):
     legs: tuple[int, ...] = ()
 
 
+_ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask)
+"""Tasks that begin again with an order."""
+
+
 def task_record(task: FlightTask) -> TaskRecord:
     """Return the state of a task."""
     if isinstance(task, MissionTask):
@@ -60,7 +64,7 @@ def task_record(task: FlightTask) -> TaskRecord:
         return task_record(task.task) if isinstance(task.task, TrackTask) else TaskRecord(legs=task.left)
     if isinstance(task, TrackTask):
         return TaskRecord(began_us=task.began_us)
-    if isinstance(task, GoToTask | OrbitTask | TakeoffTask | HoldTask):
+    if isinstance(task, _ORDERED):
         return TaskRecord(record_of(task.order))
     return TaskRecord()
 

@@ -60,4 +60,5 @@ class Supervisor:
     def charge_state(self) -> int:
         """MAV_BATTERY_CHARGE_STATE, as the failsafes take it."""
         ok: int = mav.MAV_BATTERY_CHARGE_STATE_OK
-        return next((state for condition, state in _CHARGE_STATES if self.holds(condition)), ok)
+        held = self.memory.held_us
+        return next((state for condition, state in _CHARGE_STATES if condition in held), ok) if held else ok

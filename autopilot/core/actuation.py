@@ -98,8 +98,8 @@ class Actuation:
         """Return how the rotors turn at `now_us`, idling at the least while armed, parts of the largest speed."""
         rotors = self._loop.vehicle.rotors
         minimum = rotors.idle_speed / rotors.max_speed if armed else 0.0
-        c1, c2, c3, c4 = (max(control, minimum) for control in self._solving.controls(now_us))
-        return c1, c2, c3, c4
+        c1, c2, c3, c4 = self._solving.controls(now_us)
+        return max(c1, minimum), max(c2, minimum), max(c3, minimum), max(c4, minimum)
 
     def decide(
         self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float

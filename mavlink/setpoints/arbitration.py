@@ -47,11 +47,6 @@ class StreamedService(ABC, Generic[Value]):
             self.dropped["another client"] += 1
         return ()
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        """Nothing is ever due."""
-        del now_us
-        return ()
-
     def engage(self, peer: Peer, now_us: int) -> None:
         """Obey `peer`, which has requested the mode, from now on, if it streams."""
         if self._streams(peer, now_us):

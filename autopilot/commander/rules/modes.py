@@ -218,13 +218,8 @@ def first_missing(mode: Mode, missing: Collection[Need]) -> Need | None:
     return next((need for need in ROWS[mode].needs if need in missing), None)
 
 
-def custom_mode(mode: Mode) -> int:
-    """Return the number of a mode in a HEARTBEAT."""
-    row = ROWS[mode]
-    return row.main << 16 | row.sub << 24
-
-
-_BY_NUMBER = {custom_mode(row.mode): row.mode for row in MODES}
+_NUMBERS = {row.mode: row.main << 16 | row.sub << 24 for row in MODES}
+_BY_NUMBER = {number: mode for mode, number in _NUMBERS.items()}
 _ALIASES = {(1, 0): Mode.STABILIZED}
 """PX4's manual mode flies a multicopter as its stabilized one does."""
 
@@ -232,6 +227,11 @@ _ALIASES = {(1, 0): Mode.STABILIZED}
 def mode_of(main: int, sub: int) -> Mode | None:
     """Return the mode of PX4's main and sub mode; None if this vehicle has none such."""
     return _BY_NUMBER.get(main << 16 | sub << 24, _ALIASES.get((main, sub)))
+
+
+def custom_mode(mode: Mode) -> int:
+    """Return the number of a mode in a HEARTBEAT."""
+    return _NUMBERS[mode]
 
 
 def mode_of_custom(number: int) -> Mode | None:
