@@ -41,12 +41,15 @@ class UdpConductor:
 
     def receive(self) -> StepMessage | None:
         """Wait for its step message."""
-        while not self._ended():
+        while True:
             received = self._link.receive(_MAX_WAIT_S)
-            step_message = None if received is None else self._gathering.take(received[0])
+            if received is None:
+                if self._ended():
+                    return None
+                continue
+            step_message = self._gathering.take(received[0])
             if step_message is not None:
                 return step_message
-        return None
 
     def send(self, step_message: StepMessage) -> None:
         """Send a step message."""
