@@ -1,4 +1,4 @@
-"""Quadratic programs by DAQP, or through qpsolvers by any solver. Every result is a value, never an exception."""
+"""Quadratic programs by DAQP or Clarabel, or through qpsolvers by any solver. Every result is a value, no exception."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -23,7 +23,7 @@ MAX_RESIDUAL = 1e-6
 
 MAX_ITERATIONS = 100_000
 
-_DAQP = "daqp"
+_DAQP, _CLARABEL = "daqp", "clarabel"
 _UNBOUNDED = 1e30
 _NONE = np.empty(0)
 _PATTERNS = 64
@@ -92,7 +92,7 @@ class QpSolver:
 
         self._residual = residual
         options = _options(name, tolerance, max_iterations)
-        self._optimum: Callable[[Qp], _Optimum] = _Daqp(options) if name == _DAQP else _Qpsolvers(name, options)
+        self._optimum = _solver(name, options)
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
@@ -118,6 +118,13 @@ class _Optimum(NamedTuple):
     iterations: float
 
 
+def _solver(name: str, options: dict[str, Any]) -> Callable[[Qp], _Optimum]:
+    """Return a solver that is installed; it raises where a QP is none."""
+    if name == _DAQP:
+        return _Daqp(options)
+    return _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)
+
+
 class _Daqp:
     """DAQP by its own interface, with what qpsolvers' asks of it: that loads all solvers, and SciPy."""
 
@@ -136,6 +143,35 @@ class _Daqp:
         x, _, code, found = self._daqp.solve(qp.H, qp.f, qp.G, upper, lower, kinds, **self._options)
         multipliers = found["lam"]
         return _Optimum(x if code > 0 else None, multipliers[bounds:], multipliers[:bounds], found["iterations"])
+
+
+class _Clarabel:
+    """Clarabel by its own interface, asked as by qpsolvers: whose way to it takes longer than Clarabel itself."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        import clarabel
+
+        self._clarabel = clarabel
+        self._settings = clarabel.DefaultSettings()
+        self._settings.verbose = False
+        for option, value in options.items():
+            setattr(self._settings, option, value)
+
+    def __call__(self, qp: Qp) -> _Optimum:
+        n, rows = len(qp.upper), len(qp.h)
+        G, h = qp.G, qp.h
+        if n:
+            G, h = np.concatenate((G, -np.eye(n), np.eye(n))), np.concatenate((h, -qp.lower, qp.upper))
+        cones = [self._clarabel.NonnegativeConeT(len(h))]
+        problem = (_filled("P", qp.H), qp.f, _filled("G", G), h, cones, self._settings)
+        try:
+            found = self._clarabel.DefaultSolver(*problem).solve()
+        except BaseException as error:  # Rust panics
+            raise ValueError(str(error)) from error
+        if found.status != self._clarabel.SolverStatus.Solved:
+            return _Optimum(None, None, None, nan)
+        z = np.array(found.z)
+        return _Optimum(np.array(found.x), z[:rows], z[rows + n :] - z[rows : rows + n], nan)
 
 
 class _Qpsolvers:
@@ -210,7 +246,7 @@ def check_solver(name: str) -> None:
     Raises:
         SolverError: There is no such solver, or it is not installed.
     """
-    if name == _DAQP:  # as numpy is, always
+    if name in (_DAQP, _CLARABEL):  # as numpy is, always
         return
     import qpsolvers
 

@@ -53,16 +53,26 @@ def test_rows_and_bounds_together(name: str) -> None:
     assert (G @ result.x).max() == pytest.approx(0.1, abs=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:Converted matrix")
 @pytest.mark.parametrize("bounded", [False, True])
-def test_daqp_by_itself_gives_the_bits_that_it_gives_through_qpsolvers(*, bounded: bool) -> None:
-    solver = QpSolver("daqp", TOLERANCE)
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("daqp", {"iter_limit": 100_000}),
+        ("clarabel", dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TOLERANCE)),
+    ],
+)
+def test_a_solver_by_itself_gives_the_bits_that_it_gives_through_qpsolvers(
+    name: str, options: dict[str, Any], *, bounded: bool
+) -> None:
+    solver = QpSolver(name, TOLERANCE)
     for seed in range(20):
         H, f = random_qp(seed, 12)
         G = np.random.default_rng(seed).normal(size=(8, 12))
         bounds = (np.full(12, -0.2), np.full(12, 0.2)) if bounded else ()
         result = solver.solve(Qp(H, f, G, np.full(8, 0.05), *bounds))
         problem = qpsolvers.Problem(H, f, G, np.full(8, 0.05), None, None, *bounds)
-        solution = qpsolvers.solve_problem(problem, "daqp", iter_limit=100_000)
+        solution = qpsolvers.solve_problem(problem, name, **options)
         assert result.x is not None
         assert solution.x is not None
         assert result.x.tobytes() == solution.x.tobytes()
