@@ -1,6 +1,7 @@
 """The estimate of the vehicle's state, its standard deviations, and the health of what it is made of."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.estimation.sensing.rejection import Rejections
@@ -71,16 +72,21 @@ class Health(NamedTuple):
     @property
     def flags(self) -> int:
         """ESTIMATOR_STATUS_FLAGS of MAVLink."""
-        flags: int = (
-            self.attitude * mav.ESTIMATOR_ATTITUDE
-            | self.horizontal_velocity * _HORIZONTAL_VELOCITY
-            | self.vertical_velocity * mav.ESTIMATOR_VELOCITY_VERT
-            | self.horizontal_position * _HORIZONTAL_POSITION
-            | self.height * mav.ESTIMATOR_POS_VERT_ABS
-            | self.gps_glitch * mav.ESTIMATOR_GPS_GLITCH
-            | (not (self.accelerometer and self.accel_bias)) * mav.ESTIMATOR_ACCEL_ERROR
-        )
-        return flags
+        return _flags(self)
+
+
+@lru_cache(maxsize=16)  # asked for at every control sample, and hardly ever another
+def _flags(health: Health) -> int:
+    flags: int = (
+        health.attitude * mav.ESTIMATOR_ATTITUDE
+        | health.horizontal_velocity * _HORIZONTAL_VELOCITY
+        | health.vertical_velocity * mav.ESTIMATOR_VELOCITY_VERT
+        | health.horizontal_position * _HORIZONTAL_POSITION
+        | health.height * mav.ESTIMATOR_POS_VERT_ABS
+        | health.gps_glitch * mav.ESTIMATOR_GPS_GLITCH
+        | (not (health.accelerometer and health.accel_bias)) * mav.ESTIMATOR_ACCEL_ERROR
+    )
+    return flags
 
 
 class Check(NamedTuple):

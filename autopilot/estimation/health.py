@@ -1,7 +1,7 @@
 """The estimator's health for people and telemetry: lines when it changes, reasons not to arm, ESTIMATOR_STATUS."""
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from math import hypot
 from typing import NamedTuple
 
@@ -51,6 +51,8 @@ _SENSORS: tuple[tuple[Callable[[Health], bool], int], ...] = (
     (lambda health: health.gps_lost_since_us is None, mav.MAV_SYS_STATUS_SENSOR_GPS),
 )
 
+_NO_RATIOS = (0.0,) * len(Ratio)
+
 
 class HealthWatch:
     """Notices what has ceased to be well, and what is well again."""
@@ -76,10 +78,10 @@ def not_known(health: Health) -> str:
 
 def estimator_state(estimate: Estimate) -> EstimatorState:
     """Return flags, test ratios and accuracy of an estimate for telemetry."""
-    health = estimate.health
+    health, tests = estimate.health, estimate.tests
     east, north, up = estimate.position_std_m
-    ratios = [0.0] * len(Ratio)
-    for kind, test in estimate.tests.items():
+    ratios = [*_NO_RATIOS]
+    for kind, test in tests.items():
         ratio = RATIOS[kind]
         ratios[ratio] = max(ratios[ratio], test.ratio)
     return EstimatorState(
@@ -87,6 +89,16 @@ def estimator_state(estimate: Estimate) -> EstimatorState:
         ratios=tuple(ratios),
         horizontal_accuracy_m=hypot(east, north),
         vertical_accuracy_m=up,
-        sensors=sum(row.bit for row in ROWS if row.name in estimate.tests),
-        failed_sensors=sum(bit for well, bit in _SENSORS if not well(health)),
+        sensors=_bits(tuple(tests)),
+        failed_sensors=_failed(health),
     )
+
+
+@lru_cache(maxsize=16)  # asked for at every control sample, and hardly ever another, as is what has failed
+def _bits(kinds: tuple[str, ...]) -> int:
+    return sum(row.bit for row in ROWS if row.name in kinds)
+
+
+@lru_cache(maxsize=16)
+def _failed(health: Health) -> int:
+    return sum(bit for well, bit in _SENSORS if not well(health))
