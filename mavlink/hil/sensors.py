@@ -31,6 +31,7 @@ _FIELDS = (
 _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *(FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"))}
 """With as many bytes of `fields_updated` as are not zero."""
+_GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")
 
 
 class Updated:
@@ -161,10 +162,19 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
 
 
 def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
-    """Read a datagram that is nothing but a HIL_SENSOR of `source`, with no other zeros left out; None of any other."""
-    layout = _BY_SIZE.get(len(datagram))
+    """Read a datagram that is nothing but a HIL_SENSOR of `source`, with no other zeros left out; None of any other.
+
+    A HIL_GPS may be behind it.
+    """
+    layout, fix = _BY_SIZE.get(len(datagram)), None
+    if layout is None:
+        layout = _BY_SIZE.get(len(datagram) - _GPS.size)
+        fields = layout and _GPS.read(datagram, layout.size, source)
+        if not fields:
+            return None
+        fix = _fix(*fields)
     numbers = layout and layout.read(datagram, 0, source)
-    return _measured(numbers) if numbers else None
+    return _measured(numbers, fix) if numbers else None
 
 
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
@@ -211,14 +221,33 @@ def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
 def decode_gps(message: Message) -> GpsFix:
     """Decode a HIL_GPS; accuracies that it does not know are nan."""
     g = message.fields
+    accuracies, speeds = (g.eph, g.epv), (g.vel, g.vn, g.ve, g.vd, g.cog)
+    return _fix(g.time_usec, g.lat, g.lon, g.alt, *accuracies, *speeds, g.fix_type, g.satellites_visible)
+
+
+def _fix(
+    time_us: int,
+    lat: int,
+    lon: int,
+    alt: int,
+    eph: int,
+    epv: int,
+    _vel: int,
+    vn: int,
+    ve: int,
+    vd: int,
+    _cog: int,
+    fix_type: int,
+    satellites: int,
+) -> GpsFix:
     return GpsFix(
-        time_us=g.time_usec,
-        fix_type=g.fix_type,
-        place=Geodetic(g.lat / 1e7, g.lon / 1e7, g.alt / 1e3),
-        velocity_enu_m_s=ned_from_enu((g.vn / 100.0, g.ve / 100.0, g.vd / 100.0)),
-        horizontal_accuracy_m=_accuracy_m(g.eph),
-        vertical_accuracy_m=_accuracy_m(g.epv),
-        satellites=g.satellites_visible,
+        time_us=time_us,
+        fix_type=fix_type,
+        place=Geodetic(lat / 1e7, lon / 1e7, alt / 1e3),
+        velocity_enu_m_s=ned_from_enu((vn / 100.0, ve / 100.0, vd / 100.0)),
+        horizontal_accuracy_m=_accuracy_m(eph),
+        vertical_accuracy_m=_accuracy_m(epv),
+        satellites=satellites,
     )
 
 

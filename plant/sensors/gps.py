@@ -72,13 +72,24 @@ class GpsReceiver:
 
 def _switched_on(part: Gps, setting: Setting, chance: Iterator[float]) -> Measure:
     receiver, rate = GpsReceiver(part, setting.origin, chance), Rate(part.rate_hz)
+    seen: list[World] = []
 
-    def measure(world: World) -> GpsFix | None:
-        if rate.is_due(world.time_us):
+    def catch_up() -> None:
+        """Measure what was seen: nobody hears of it for the receiver's delay."""
+        while seen:
+            world = seen.pop()
             u, v, w, _, _, _, x, y, z = world.state[:9]
             receiver.measure(world.time_us, (x, y, z), earth_from_body(attitude_of(world.state), (u, v, w)))
+
+    def measure(world: World) -> GpsFix | None:
+        catch_up()
+        if rate.is_due(world.time_us):
+            seen.append(world)
+            if part.delay_s == 0.0:
+                catch_up()
         return receiver.report(world.time_us)
 
+    setting.ahead.append(catch_up)
     return measure
 
 

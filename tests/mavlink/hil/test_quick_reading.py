@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.hil.sensors import Frame, SensorFrame
+from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.wire.fixed_frames import FixedFrame
 from tests.mavlink.hil.lockstep_ends import ADDRESS, STRANGER, call
@@ -26,7 +27,13 @@ def frame_of(random: Random, feedback: Feedback, time_us: int) -> Frame:
         return StateFrame(time_us, vector(random), vector(random), random.choice(ATTITUDES), vector(random))
     pressure_pa = random.uniform(9e4, 1e5)
     vectors = (vector(random), vector(random), vector(random))
-    return SensorFrame(time_us, random.choice(UPDATED), *vectors, pressure_pa, number(random))
+    fix = gps_of(random, time_us) if random.random() < 0.3 else None
+    return SensorFrame(time_us, random.choice(UPDATED), *vectors, pressure_pa, number(random), fix)
+
+
+def gps_of(random: Random, time_us: int) -> GpsFix:
+    place, velocity = Geodetic(random.uniform(-90.0, 90.0), random.uniform(-180.0, 180.0), 100.0), (1.0, -2.0, 0.5)
+    return GpsFix(time_us, 3, place, velocity, random.random(), random.choice((0.5, 700.0)), random.choice((0, 10)))
 
 
 def vector(random: Random) -> tuple[float, float, float]:
