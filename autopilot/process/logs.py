@@ -1,6 +1,7 @@
 """The autopilot's own logs of a flight."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,10 +73,15 @@ class AutopilotLog:
             kinds = kinds_of(vehicle.sensors) if vehicle and vehicle.sensors else []
             self._checks = CsvLog(folder / "filter.csv", check_columns(kinds))
         self.topics = FlightTopics(folder, setup) if ulog else None
+        self._untold: tuple[Step, tuple[float, ...]] | None = None
         self._rows = [log for log in (self._decisions, self._estimates, self._checks) if log is not None]
 
     def write(self, step: Step) -> None:
-        """Append a control sample; of a frame between two of them, only the check of the filter."""
+        """Append a control sample; of a frame between two of them, only the check of the filter.
+
+        Topics of a sample are written with the next frame: where that is between samples, there is time for it.
+        """
+        self._tell()
         if step.command.time_us < self._time_us and self.topics:
             self.topics.begin_again()
         self._time_us = step.command.time_us
@@ -98,7 +104,7 @@ class AutopilotLog:
         decided = (*step.decision.attitude_reference, *codes, *times_us, *counts)
         self._decisions.add((step.command.time_us / 1e6, *decided))
         if self.topics and not self._setup.ground:
-            self.topics.write(step, decided)
+            self._untold = (step, decided)
 
     def write_snapshot(self, snapshot: Snapshot) -> None:
         """Append what ground stations are told.
@@ -149,6 +155,7 @@ class AutopilotLog:
         Raises:
             LogError: It cannot be written.
         """
+        self._tell()
         for log in self._rows:
             log.flush()
         if self.topics:
@@ -156,10 +163,18 @@ class AutopilotLog:
 
     def close(self) -> None:
         """Close the files."""
+        with suppress(LogError):
+            self._tell()
         for log in (self._inputs, *self._rows):
             log.close()
         if self.topics:
             self.topics.close()
+
+    def _tell(self) -> None:
+        """Write the topics of the last sample, unless that is done."""
+        untold, self._untold = self._untold, None
+        if self.topics and untold:
+            self.topics.write(*untold)
 
     def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
         frame = estimate.frame
