@@ -3,6 +3,7 @@
 import numpy as np
 
 from colibri.common.compiled_rotations import quaternion_from_euler
+from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw, put_valid
@@ -43,12 +44,23 @@ _turned = Turned(
 _RATES, _PLACE, _REFERENCE = _turned.places.values()
 
 
+@compiled
+def _quaternions(euler: Array) -> Array:
+    """Return attitudes, wxyz, (n, 4), of phi, theta, psi, (n, 3)."""
+    quaternions = np.empty((euler.shape[0], 4))
+    for row in range(euler.shape[0]):
+        w, x, y, z = quaternion_from_euler(euler[row, 0], euler[row, 1], euler[row, 2])
+        quaternions[row, 0], quaternions[row, 1], quaternions[row, 2], quaternions[row, 3] = w, x, y, z
+    return quaternions
+
+
 class SampleBlocks(Blocks):
     """Encodes rows of `COLUMNS`."""
 
     def __init__(self) -> None:
-        """Have room for a block."""
+        """Have room for a block. What is compiled is loaded here."""
         super().__init__(len(COLUMNS))
+        _quaternions(np.zeros((1, 3)))
         self._records = Records(BLOCK_ROWS, *_TOPICS)
         put_valid(self._records, topics.POSITION)
         self._records[topics.MOTORS, "control"][:] = np.nan
@@ -68,8 +80,7 @@ class SampleBlocks(Blocks):
         trajectory[:count, 9], trajectory[:count, 10] = heading_from_yaw(yaw_rad), -yaw_rate_rad_s
         records[topics.POSITION_SETPOINT, "x"][:count] = trajectory[:count]
         steered = records[topics.ATTITUDE_SETPOINT, "q_d"]
-        angles = table[:, _ATTITUDE_REFERENCE].tolist()
-        steered[:count, :4] = attitude_ned(np.array([quaternion_from_euler(*each) for each in angles]))
+        steered[:count, :4] = attitude_ned(_quaternions(table[:, _ATTITUDE_REFERENCE].copy()))
         steered[:count, 6] = -0.25 * np.square(table[:, _CONTROLS]).sum(axis=1)
         records[topics.MPC, "solve_time_us"][:count] = table[:, _MPC]
         records[topics.MPC, "active_rotors"][:count] = table[:, _ACTIVE]

@@ -64,18 +64,20 @@ class Triad:
     def measure(self, truth: Vector) -> Vector:
         """Return the sample of `truth`, one interval after the one before."""
         limit = self._limit
-        self.draw()
+        if not self._drawn:
+            self.draw()
         bx, by, bz, dx, dy, dz = self._drawn.pop()
         x, y, z = bx + (truth[0] + dx), by + (truth[1] + dy), bz + (truth[2] + dz)
         if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
             return (x, y, z)
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
 
-    def draw(self) -> None:
-        """Have the bias and white noise of the next sample: those of many are drawn at once."""
-        if self._drawn:
+    def draw(self, left: int = 0) -> None:
+        """Have bias and white noise of samples to come, of many at once, where no more than `left` are still drawn."""
+        if len(self._drawn) > left:
             return
         drawn = np.fromiter(self._chance, np.float64, 6 * _DRAWN).reshape(_DRAWN, 6)
         biases = np.add.accumulate(np.concatenate([self._last[None], self._walk * drawn[:, :3]]))[1:]
         self._last = biases[-1]
-        self._drawn = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()
+        later: list[list[float]] = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()
+        self._drawn = later + self._drawn

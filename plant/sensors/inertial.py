@@ -1,6 +1,7 @@
 """The plant's accelerometer and gyroscope: they measure at every frame."""
 
 from collections.abc import Iterator
+from functools import partial
 
 from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
 from colibri.mavlink.hil.sensors import Updated
@@ -9,11 +10,15 @@ from colibri.plant.sensors.errors import Triad
 from colibri.plant.sensors.instrument import Instrument, Measure, Setting
 from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
+_ACCELEROMETER_LEFT, _GYROSCOPE_LEFT = 3, 5
+"""Samples left when errors of the next are drawn: of either at another frame, and where every second one is a control
+sample, at one of those, while the autopilot has most to do."""
+
 
 def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float]) -> Measure:
     walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
     errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
-    setting.ahead.append(errors.draw)
+    setting.ahead.append(partial(errors.draw, _ACCELEROMETER_LEFT))
     specific_force = setting.physics.specific_force
     return lambda world: errors.measure(specific_force(world))
 
@@ -21,7 +26,7 @@ def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float
 def _gyroscope(part: Gyroscope, setting: Setting, chance: Iterator[float]) -> Measure:
     walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
     errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
-    setting.ahead.append(errors.draw)
+    setting.ahead.append(partial(errors.draw, _GYROSCOPE_LEFT))
 
     def measure(world: World) -> tuple[float, float, float]:
         p, q, r = world.state[3:6]
