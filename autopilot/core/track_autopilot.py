@@ -54,6 +54,7 @@ class Autopilot:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self._time_us: int | None = None
+        self._acts_us: int | None = None
         self._landing, self._ground_m = Landing(), 0.0
         self.frame_interval_us = self._loop.frame_interval_us
         self._state_source = StateSource(estimator, self.frame_interval_us)
@@ -84,7 +85,7 @@ class Autopilot:
         decision = references = None
         if due:
             state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
-            acts_us = frame.time_us + self._delay.delay_us
+            acts_us = self._acts_us = frame.time_us + self._delay.delay_us
             references = self._planner.horizon_at(acts_us - self._loop.lag_us, self._loop.control_interval_us)
             sinks = is_below(float(references.position_enu_m[0, 2]), state)
             self._landing, _ = watch(self._landing, frame.time_us, state, sinks)
@@ -104,6 +105,10 @@ class Autopilot:
     def settle(self) -> None:
         """Do what need not be done before an answer, while the plant integrates; else the next step does it."""
         self._state_source.settle()
+        if self._acts_us is not None:
+            interval_us = self._loop.control_interval_us
+            self._planner.prepare(self._acts_us + interval_us - self._loop.lag_us, interval_us)
+            self._acts_us = None
 
     def _begin(self, frame: StateFrame) -> None:
         vehicle = self._loop.vehicle

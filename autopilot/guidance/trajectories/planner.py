@@ -39,6 +39,7 @@ class Planner:
         self._rest = _rest(track, preview.interval_us)
         self._length = _BLOCK_SAMPLES if self._rest is None else self._rest + 1
         self._block = 0
+        self._ahead: tuple[int, int, Horizon] | None = None
         self.table = self._tabulate(0)
 
     def horizon(self, time_us: int) -> Horizon:
@@ -52,9 +53,15 @@ class Planner:
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
         """Return the same for a time between two instants that are `grid_us` apart: each reference carried on."""
+        if self._ahead and self._ahead[:2] == (time_us, grid_us):
+            return self._ahead[2]
         past_us = time_us % grid_us
         horizon = self.horizon(time_us - past_us)
         return carried(horizon, past_us * 1e-6) if past_us else horizon
+
+    def prepare(self, time_us: int, grid_us: int) -> None:
+        """Do what `horizon_at` does before it is asked for that."""
+        self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
         """Tabulate a block and what follows; for the differences from one sample before, if there is one."""
