@@ -196,6 +196,7 @@ class Estimator:
         self._take_late()
         if self._estimate is not None and self._time_us is not None:
             self._take_until(self._time_us + self._interval_us)
+            self._note_tests()
 
     def _take_late(self) -> None:
         frame, self._late = self._late, None
@@ -326,8 +327,7 @@ class Estimator:
         self._output_smoothing.give_in(since_us * 1e-6)
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
         p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
-        if self._tests is None:
-            self._tests, self._resets = filter_.tests, filter_.resets
+        tests = self._note_tests()
         self._estimate = Estimate(
             StateFrame(
                 now_us,
@@ -342,13 +342,19 @@ class Estimator:
             (bx, by, bz),
             (ax, ay, az),
             self._health(now_us, sigma),
-            self._tests,
+            tests,
             self._rejected.counts,
             self._resets,
             (-de, -dn, -du),
             self._check(now_us, since_us),
         )
         return self._estimate
+
+    def _note_tests(self) -> Tests:
+        """Return the last tests; once for all that were made since."""
+        if self._tests is None:
+            self._tests, self._resets = self.filter.tests, self.filter.resets
+        return self._tests
 
     def _check(self, now_us: int, since_us: int) -> Check | None:
         at_us = now_us - _CHECK_AT_US

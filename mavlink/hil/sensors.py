@@ -9,6 +9,7 @@ judged here: an autopilot must cope with any number that a broken sensor sends.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from math import degrees, hypot, inf, isfinite, nan
 from typing import Any, NamedTuple, TypeAlias
 
@@ -32,6 +33,8 @@ _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *(FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"))}
 """With as many bytes of `fields_updated` as are not zero."""
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")
+_altitude_m = lru_cache(maxsize=1)(altitude_m)
+"""Pressure is measured less often than frames are sent."""
 
 
 class Updated:
@@ -148,7 +151,7 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
                 *frd_from_flu(frame.magnetic_field_flu_gauss),
                 frame.pressure_pa / 100.0,
                 0.0,
-                altitude_m(frame.pressure_pa),
+                _altitude_m(frame.pressure_pa),
                 frame.temperature_c,
                 frame.updated,
             ),
