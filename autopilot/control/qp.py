@@ -166,7 +166,9 @@ class _Clarabel:
         problem = (_filled("P", qp.H), qp.f, _filled("G", G), h, cones, self._settings)
         try:
             found = self._clarabel.DefaultSolver(*problem).solve()
-        except BaseException as error:  # Rust panics
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # where Rust panics, that is no Exception
             raise ValueError(str(error)) from error
         if found.status != self._clarabel.SolverStatus.Solved:
             return _Optimum(None, None, None, nan)
