@@ -19,7 +19,7 @@ from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.launcher import Launcher
 from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
-from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant, WallClock
+from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant, QuickClock
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.flight_figure import draw
@@ -70,7 +70,7 @@ class Flights:
         if self._launcher is None:
             return MemoryPlant(options)
         if not self._launcher.starts_plants:
-            return MemoryPlant(options, WallClock())
+            return MemoryPlant(options, QuickClock())
         return UdpPlant(self._launcher, options, state)
 
     def _autopilot(self, options: Sequence[str], state: Path) -> Autopilot:

@@ -30,6 +30,7 @@ from colibri.sitl.backends.setting import SettingError
 
 NEVER_LATE_S = 0.0
 _ADDRESS: Address = ("memory", 0)
+_QUICK = 10.0
 _SOON_S = 2e-4
 
 
@@ -59,16 +60,19 @@ class StoppedClock:
         self._now_s += timeout_s
 
 
-class WallClock:
-    """The clock of a plant whose autopilot is another process, which computes meanwhile."""
+class QuickClock:
+    """The clock of a plant whose autopilot is another process, which computes meanwhile: ten times the wall's.
+
+    What a bad link loses is repeated that much sooner; what is repeated too soon is dropped.
+    """
 
     def now_s(self) -> float:
         """Return the time, s."""
-        return perf_counter()
+        return _QUICK * perf_counter()
 
     def wait(self, timeout_s: float) -> None:
         """Sleep, and see soon whether there is something to do."""
-        sleep(min(timeout_s, _SOON_S))
+        sleep(min(timeout_s / _QUICK, _SOON_S))
 
 
 class MemoryPlant:

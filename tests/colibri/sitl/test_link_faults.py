@@ -101,6 +101,14 @@ def test_a_bad_link_between_plant_and_autopilot_changes_no_flight(forked: Launch
     assert flown(launcher, fly_badly, airborne=3.0) == flown(None, fly, airborne=3.0)
 
 
+def test_a_flight_over_a_link_that_carries_nothing_ends() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        sitl.link.plant.down = True
+        with pytest.raises(SessionError, match="nothing passes between plant and autopilot"):
+            sitl.step()
+
+
 def test_orders_pass_a_bad_link_to_the_ground() -> None:
     def fly(sitl: Sitl) -> None:
         sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
