@@ -85,6 +85,10 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
     raise SystemExit(code)
 
 
+_PARENT_EVERY = 8
+"""A process asks at each frame, or ten times a second."""
+
+
 class Stop:
     """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
 
@@ -97,13 +101,17 @@ class Stop:
         self._signalled = False
         self._starting = starting
         self._parent = parent
+        self._asked = 0
         signal.signal(signal.SIGINT, self._handle)
         signal.signal(signal.SIGTERM, self._handle)
 
     def __bool__(self) -> bool:
-        """Whether to end now."""
+        """Whether to end now; whether the parent lives is seen every few times."""
         self._starting = False
-        return self._signalled or (self._parent is not None and os.getppid() != self._parent)
+        self._asked += 1
+        if self._parent is not None and self._asked % _PARENT_EVERY == 1 and os.getppid() != self._parent:
+            self._signalled = True
+        return self._signalled
 
     def _handle(self, _signal: int, _frame: FrameType | None) -> None:
         if self._starting:
