@@ -1,5 +1,6 @@
 """Snippets of README and docs/: Python compiles, TOML is read; those of tutorials are run as they stand."""
 
+import os
 import re
 import subprocess
 import sys
@@ -19,8 +20,12 @@ def python_of(page: str) -> list[str]:
 
 
 def run(folder: Path, *command: str) -> str:
-    """Run a command of Python in a folder, which must go well; return what it says."""
-    done = subprocess.run([sys.executable, *command], cwd=folder, capture_output=True, text=True, check=False)
+    """Run a command of Python in a folder, as in a user's shell; it must go well; return what it says."""
+    shell = {
+        name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"
+    }  # commands of colibri set it
+    command = (sys.executable, *command)
+    done = subprocess.run(command, cwd=folder, env=shell, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
