@@ -18,8 +18,9 @@ from colibri.mavlink.parameters.file import write
 from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.launcher import Launcher
+from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
-from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant, QuickClock
+from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.flight_figure import draw

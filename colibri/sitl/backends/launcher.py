@@ -1,4 +1,4 @@
-"""Starts plant and autopilot as processes: each from scratch, or forked from one that has loaded everything."""
+"""Starts processes of a flight: both from scratch, or the autopilot, forked from one that has loaded everything."""
 
 import json
 import os

@@ -4,8 +4,8 @@ import io
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
-from time import perf_counter, sleep
-from typing import Any, Protocol
+from time import perf_counter
+from typing import Any
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.autopilot.control.registry import DecisionError
@@ -25,54 +25,12 @@ from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.vehicle.description import VehicleError
+from colibri.sitl.backends.link_clocks import LinkClock, StoppedClock
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import SettingError
 
 NEVER_LATE_S = 0.0
 _ADDRESS: Address = ("memory", 0)
-_QUICK = 10.0
-_SOON_S = 2e-4
-
-
-class LinkClock(Protocol):
-    """What links between plant and autopilot are late by. No flight depends on it."""
-
-    def now_s(self) -> float:
-        """Return the time, s."""
-
-    def wait(self, timeout_s: float) -> None:
-        """Let time pass, `timeout_s` at most."""
-
-
-class StoppedClock:
-    """The clock of a plant whose autopilot is in this process, too: it goes only while the plant waits."""
-
-    def __init__(self) -> None:
-        """Begin at 0."""
-        self._now_s = 0.0
-
-    def now_s(self) -> float:
-        """Return the time, s."""
-        return self._now_s
-
-    def wait(self, timeout_s: float) -> None:
-        """Let `timeout_s` pass at once."""
-        self._now_s += timeout_s
-
-
-class QuickClock:
-    """The clock of a plant whose autopilot is another process, which computes meanwhile: ten times the wall's.
-
-    What a bad link loses is repeated that much sooner; what is repeated too soon is dropped.
-    """
-
-    def now_s(self) -> float:
-        """Return the time, s."""
-        return _QUICK * perf_counter()
-
-    def wait(self, timeout_s: float) -> None:
-        """Sleep, and see soon whether there is something to do."""
-        sleep(min(timeout_s / _QUICK, _SOON_S))
 
 
 class MemoryPlant:

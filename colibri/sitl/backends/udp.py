@@ -1,4 +1,4 @@
-"""Plant and autopilot as two processes over UDP, this process in between."""
+"""Plant and autopilot as processes over UDP, either or both, this process in between."""
 
 import json
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from colibri.mavlink.hil.conductor import Gathering, StepMessage, packets
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
 from colibri.sitl.backends.launcher import Launcher, LoggedChild
+from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import SessionError, answers, parted
 
 SILENCE_S = 60.0
@@ -25,6 +26,7 @@ class UdpPlant:
         """Start it; `folder` takes its output."""
         self._child = LoggedChild(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
         self._link: UdpLink | None = None
+        self._clock = QuickClock()
         self._last = self._answer = b""
 
     @property
@@ -71,7 +73,7 @@ class UdpPlant:
 
     def clock_s(self) -> float:
         """Return the time that links are late by."""
-        return perf_counter()
+        return self._clock.now_s()
 
     def close(self) -> None:
         """End it."""
