@@ -13,7 +13,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.earth.home import DEFAULT_HOME, home
-from colibri.common.process.lifecycle import gc_frozen
+from colibri.common.process.lifecycle import freeze_once
 from colibri.mavlink.parameters.file import write
 from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
@@ -40,8 +40,8 @@ class Flights:
         """Fly by `setting`, in processes of a `launcher`, or in this one."""
         self.setting = setting
         self._launcher = launcher
+        freeze_once()  # a run of tests has a lot that is there to stay
         self._ends = ExitStack()
-        self._ends.enter_context(gc_frozen())  # a run of tests has a lot that is there to stay
         self._folder = Path(self._ends.enter_context(TemporaryDirectory(prefix="sitl-")))
         self.flown: list[Sitl] = []
 

@@ -3,10 +3,11 @@
 import gc
 import subprocess
 import sys
+from weakref import ref
 
 import pytest
 
-from colibri.common.process.lifecycle import gc_frozen, loading
+from colibri.common.process.lifecycle import freeze_once, gc_frozen, loading
 
 PROGRAM = """
 import atexit, gc
@@ -40,3 +41,13 @@ def test_what_somebody_else_has_frozen_stays_frozen() -> None:
     with gc_frozen():
         assert gc.get_freeze_count() <= frozen  # what is freed is counted no more
     assert 0 < gc.get_freeze_count() <= frozen
+
+
+def test_garbage_of_a_flight_is_collected_at_the_next() -> None:
+    class Flown:
+        def __init__(self) -> None:
+            self.itself = self
+
+    flown = ref(Flown())
+    freeze_once()
+    assert flown() is None
