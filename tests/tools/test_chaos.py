@@ -6,13 +6,8 @@ import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
 from tools.chaos.flights import SITUATIONS, Flown, airborne
-from tools.chaos.places import PLACES, Thrower, found
+from tools.chaos.places import Thrower
 from tools.harness.copter_flight import CopterFlight, in_the_air
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_a_place_is_where_it_is_said_to_be(place: str) -> None:
-    assert callable(found(place).method)
 
 
 def flown(flight: CopterFlight, situation: str, place: str, times: float) -> tuple[str, str]:
