@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.clients.support.plan_client import ACCEPTED, Item, PlanClient
-from tests.mavlink.mission.missions import some_item
+from tests.support.mission_ends import some_item
 from tools.harness.relay import BadLink
 from tools.harness.sitl_process import vehicle
 

@@ -12,7 +12,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
-from tests import sensor_source as source
+from tests.support import sensor_source as source
 
 FLIGHTS = 16
 DURATION_S = 30.0

@@ -9,7 +9,7 @@ from hypothesis import given
 from colibri.common import rotations
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.wire import ned
-from tests.strategies import ANGLES, TILTS, quaternions, vectors
+from tests.support.strategies import ANGLES, TILTS, quaternions, vectors
 
 
 def same_rotation(a: Quaternion, b: Quaternion) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.pages import PAGES, ROOT, blocks, prose
+from tests.support.pages import PAGES, ROOT, blocks, prose
 from tools.pages.reference.command_line import arguments_of, parsers
 
 FOREIGN = {

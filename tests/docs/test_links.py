@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.docs.pages import DOCS, PAGES, ROOT, anchors, links, prose
+from tests.support.pages import DOCS, PAGES, ROOT, anchors, links, prose
 
 README_LINES = 150
 _OPEN = ("https://", "http://127.0.0.1", "http://localhost")

@@ -8,7 +8,7 @@ from PIL import Image
 
 from colibri.autopilot.control.registry import controller_names
 from colibri.cli.shared.commands import COMMANDS
-from tests.docs.pages import DOCS
+from tests.support.pages import DOCS
 from tools.pages.__main__ import main
 from tools.pages.pictures import house
 from tools.pages.reference import command_line, files, keys, messages, python

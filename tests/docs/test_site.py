@@ -8,7 +8,7 @@ from shutil import copy, copytree
 
 import pytest
 
-from tests.docs.pages import DOCS, ROOT
+from tests.support.pages import DOCS, ROOT
 
 _ASKED_FOR = re.compile(r"<(?:script|link|img|iframe|source|object|embed)\b[^>]*(?:src|href|data)=[\"']?(?:https?:)?//")
 _ASKED_FOR_BY_STYLE = re.compile(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//")

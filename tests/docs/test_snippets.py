@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.pages import DOCS, ROOT, blocks
+from tests.support.pages import DOCS, ROOT, blocks
 
 
 def python_of(page: str) -> list[str]:

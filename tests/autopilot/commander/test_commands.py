@@ -22,7 +22,7 @@ from colibri.mavlink.services.command import (
 )
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
-from tests.autopilot.commander.cockpit import FLYING, GROUND, Cockpit, item
+from tests.support.cockpit import FLYING, GROUND, Cockpit, item
 
 FORCE = 21196.0
 CUSTOM = float(mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)

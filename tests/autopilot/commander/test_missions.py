@@ -9,7 +9,7 @@ from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, NO_MIS
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
 from colibri.mavlink.wire.refusal import Refusal
-from tests.autopilot.commander.cockpit import FLYING, Cockpit, at, item
+from tests.support.cockpit import FLYING, Cockpit, at, item
 
 PLAN = (
     item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)),

@@ -13,7 +13,7 @@ from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
-from tests.autopilot.commander.cockpit import FLYING, Cockpit, item
+from tests.support.cockpit import FLYING, Cockpit, item
 
 BEGINS = {
     Mode.STABILIZED: StabilizedTask,

@@ -16,7 +16,7 @@ from colibri.autopilot.guidance.tasks.position import HoldTask
 from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.mavlink.mission.items import MISSION
 from colibri.mavlink.setpoints.setpoints import Sticks
-from tests.autopilot.commander.cockpit import FLYING, Cockpit, at, item
+from tests.support.cockpit import FLYING, Cockpit, at, item
 
 STICKS = Steered(sticks=Sticks(0.0, 0.0, 0.5, 0.0))
 LEADS = {

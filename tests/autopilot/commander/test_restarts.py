@@ -35,7 +35,7 @@ from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import FENCE, MISSION, plan_of
 from colibri.mavlink.setpoints.setpoints import PositionSetpoint, Sticks, TargetState
-from tests.autopilot.commander.cockpit import Cockpit, item
+from tests.support.cockpit import Cockpit, item
 
 PLACE: Vector = (2.0, 0.0, 2.0)
 MISSION_ITEMS = (

@@ -15,7 +15,7 @@ from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
-from tests.autopilot.commander.failsafe_inputs import FULL, WELL
+from tests.support.failsafe_inputs import FULL, WELL
 
 HOLDING = Flight(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
 LOST: dict[Condition, FailsafeInputs] = {

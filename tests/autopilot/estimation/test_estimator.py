@@ -1,57 +1,20 @@
 """The estimator on synthetic flights: how it begins, how well it knows, and what it does when sensors fail."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from math import hypot, nan
 
 import numpy as np
 import pytest
 
 from colibri.autopilot.estimation.estimate import Estimate
-from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.sensing.rejection import Reason, Source
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.mavlink.wire.dialect import mav
-from colibri.plant.vehicle.description import load_vehicle
-from colibri.plant.vehicle.sensors import Sensors
-from tests import sensor_source as source
-from tests.sensor_source import GRAVITY_M_S2, INTERVAL_US, Faults, Recording
-
-Change = Callable[[SensorFrame, float], SensorFrame]
-
-
-def parts() -> Sensors:
-    sensors = load_vehicle("hummingbird").sensors
-    assert sensors is not None
-    return sensors
-
-
-def estimator() -> Estimator:
-    return Estimator(parts(), GRAVITY_M_S2, DEFAULT_ORIGIN, INTERVAL_US)
-
-
-@lru_cache(maxsize=4)
-def recorded(path: source.Path, seed: int, duration_s: float, faults: Faults | None = None) -> Recording:
-    return source.record(path, parts(), seed, duration_s, faults)
-
-
-def estimates(frames: Sequence[SensorFrame], change: Change | None = None) -> list[Estimate | None]:
-    seeing = estimator()
-    return [seeing.step(change(frame, frame.time_us * 1e-6) if change else frame) for frame in frames]
-
-
-def known(all_of_them: list[Estimate | None]) -> list[Estimate]:
-    return [one for one in all_of_them if one is not None]
-
-
-def error_m(flight: Recording, of: list[Estimate | None], at_s: float) -> float:
-    k = round(at_s * 1e6 / INTERVAL_US)
-    one = of[k]
-    assert one is not None
-    return float(np.linalg.norm(flight.motion.position[k] - one.frame.position_enu_m))
+from tests.support import sensor_source as source
+from tests.support.estimates import error_m, estimates, estimator, known, parts, recorded
+from tests.support.sensor_source import INTERVAL_US, Faults
 
 
 def max_jump_m(of: list[Estimate | None]) -> float:

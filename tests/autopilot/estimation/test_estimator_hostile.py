@@ -13,7 +13,7 @@ from colibri.autopilot.estimation.estimator import Estimator
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 from colibri.plant.vehicle.description import load_vehicle
-from tests import sensor_source as source
+from tests.support import sensor_source as source
 
 _SENSORS = load_vehicle("hummingbird").sensors
 assert _SENSORS is not None

@@ -22,7 +22,7 @@ from colibri.common.rotations import euler_from_quaternion, quaternion_from_eule
 from colibri.common.types import Quaternion
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
 from colibri.plant.vehicle.description import load_vehicle
-from tests.strategies import quaternions, reals, vectors
+from tests.support.strategies import quaternions, reals, vectors
 
 INTERVAL_S = 0.008
 REFERENCE = AttitudeReference(load_vehicle("hummingbird"), Preview(8_000, 22))

@@ -20,7 +20,7 @@ from colibri.autopilot.guidance.reference import (
     target_of,
 )
 from colibri.common.types import Array, Vector
-from tests.strategies import ANGLES, reals
+from tests.support.strategies import ANGLES, reals
 
 INTERVAL_S = 0.008
 SAMPLES = 3

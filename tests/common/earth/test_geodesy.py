@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from colibri.common.earth import compiled_geodesy
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, EARTH_RADIUS_M, Geodetic, enu_of, geodetic_of, is_on_earth
-from tests.strategies import reals
+from tests.support.strategies import reals
 
 ORIGINS = st.builds(Geodetic, st.floats(-89.0, 89.0), reals(180.0), reals(5000.0))
 DEGREE_M = radians(1.0) * EARTH_RADIUS_M

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace, home
-from tests.strategies import reals
+from tests.support.strategies import reals
 
 HOMES = st.builds(HomePlace, reals(90.0), reals(180.0), st.floats(-500.0, 10_000.0), reals(360.0))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from colibri.cli.main import main
-from tests.autopilot.guidance.trajectories.paths import DIPS
+from tests.support.paths import DIPS
 from tools.harness.processes import fly, rows
 
 

@@ -5,9 +5,7 @@ import pytest
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Tree
-from tests.mavlink.files.ftp_client import Client
-
-TEXT = bytes(range(256)) * 20
+from tests.support.ftp_client import TEXT, Client
 
 
 @pytest.fixture

@@ -10,8 +10,7 @@ from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.ftp_wire import DATA_BYTES, Error, Opcode
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.node.service import Peer
-from tests.mavlink.files.conftest import TEXT
-from tests.mavlink.files.ftp_client import Client
+from tests.support.ftp_client import TEXT, Client
 
 
 def test_a_file_is_read(client: Client) -> None:

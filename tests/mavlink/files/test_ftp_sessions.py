@@ -13,8 +13,7 @@ from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Tree
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import Codec
-from tests.mavlink.files.conftest import TEXT
-from tests.mavlink.files.ftp_client import HEADER, OTHER, PEER, Client, Reply, parsed
+from tests.support.ftp_client import HEADER, OTHER, PEER, TEXT, Client, Reply, parsed
 
 
 @pytest.mark.parametrize(

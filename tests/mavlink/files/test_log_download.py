@@ -12,7 +12,7 @@ from colibri.mavlink.files.log_download import BLOCK_BYTES, MESSAGES_A_POLL, Log
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
-from tests.mavlink.services.peers import GROUND, OTHER, message, on_the_wire
+from tests.support.messages import GROUND, OTHER, message, on_the_wire
 
 CHUNK = 128 * BLOCK_BYTES
 """What MAVSDK asks for at once."""

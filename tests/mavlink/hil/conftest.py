@@ -4,7 +4,7 @@ import pytest
 
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from tests.mavlink.hil.lockstep_ends import INTERVAL_US
+from tests.support.lockstep_ends import INTERVAL_US
 
 
 @pytest.fixture

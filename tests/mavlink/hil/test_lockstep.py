@@ -20,7 +20,7 @@ from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, encode_senso
 from colibri.mavlink.hil.state import encode_actuators
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from tests.mavlink.hil.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, answer_to, call, command_at, frame_at
+from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, answer_to, call, command_at, frame_at
 
 
 def test_the_call_sets_peer_and_frame_interval(plant: PlantEnd, autopilot: AutopilotEnd) -> None:

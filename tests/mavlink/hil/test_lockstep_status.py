@@ -10,7 +10,7 @@ from colibri.mavlink.hil.state import encode_actuators
 from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from tests.mavlink.hil.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, call, command_at, frame_at
+from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, call, command_at, frame_at
 
 BATTERY = PlantBattery(15.5, 12.25, 0.5, 0.75)
 LOST = Fault(MOTOR, OFF, 1)

@@ -13,7 +13,7 @@ from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from tests.mavlink.hil.lockstep_ends import ADDRESS, STRANGER, call
+from tests.support.lockstep_ends import ADDRESS, STRANGER, call
 
 INTERVAL_US = 4_000
 DATAGRAMS = 1_000

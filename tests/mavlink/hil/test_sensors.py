@@ -11,7 +11,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import FixType, GpsFix, SensorFrame, Updated, decode_sensors, encode_sensors
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
-from tests.strategies import reals, vectors
+from tests.support.strategies import reals, vectors
 
 FLOAT32 = 1e-6
 ZERO = (0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from colibri.mavlink.hil import state
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from tests.strategies import quaternions, vectors
+from tests.support.strategies import quaternions, vectors
 
 FLOAT32_RELATIVE = 1e-6
 LEVEL = (1.0, 0.0, 0.0, 0.0)

@@ -11,8 +11,7 @@ from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.mission.missions import FIRST, SECOND, VEHICLE, Ground, Link, Station, fielded, some_item
-from tests.mavlink.mission.test_service import bits
+from tests.support.mission_ends import FIRST, SECOND, VEHICLE, Ground, Link, Station, bits, fielded, some_item
 
 MINUTE_US = 60_000_000
 ITEMS_500 = [some_item(number) for number in range(500)]

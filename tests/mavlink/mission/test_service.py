@@ -1,7 +1,6 @@
 """The mission protocol, message by message: https://mavlink.io/en/services/mission.html."""
 
 from math import inf, nan
-from struct import pack
 from timeit import repeat
 from typing import Any
 
@@ -13,7 +12,7 @@ from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RAL
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import Codec, mav
-from tests.mavlink.mission.missions import (
+from tests.support.mission_ends import (
     CANCELLED,
     FIRST,
     ITEMS,
@@ -21,6 +20,7 @@ from tests.mavlink.mission.missions import (
     VEHICLE,
     Ground,
     asked,
+    bits,
     count,
     give,
     results,
@@ -29,10 +29,6 @@ from tests.mavlink.mission.missions import (
 )
 
 FLOATS = st.floats(width=32)
-
-
-def bits(items: Any) -> list[bytes]:
-    return [pack("<BHBffffiif", *item) for item in items]
 
 
 def download(ground: Ground, plan_type: int, name: str = "MISSION_REQUEST_INT") -> list[MissionItem]:

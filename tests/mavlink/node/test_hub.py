@@ -14,7 +14,7 @@ from colibri.mavlink.node.service import Peer, Send, to_all
 from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.signing import Signing
-from tests.mavlink.node.hub_ends import (
+from tests.support.hub_ends import (
     GCS,
     HEARTBEAT,
     SDK,

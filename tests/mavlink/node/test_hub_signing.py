@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import common
 from colibri.mavlink.node.hub import Hub
 from colibri.mavlink.node.service import to_all
 from colibri.mavlink.wire.signing import Signing
-from tests.mavlink.node.hub_ends import GCS, HEARTBEAT, SDK, Recorder, Station, frames_to
+from tests.support.hub_ends import GCS, HEARTBEAT, SDK, Recorder, Station, frames_to
 
 KEY = bytes(range(32))
 START = 3_600_000_000_000

@@ -6,7 +6,7 @@ from zlib import crc32
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Reading, Tree
 from colibri.mavlink.parameters.metadata import Metadata, checksum
-from tests.mavlink.services.peers import GROUND, on_the_wire
+from tests.support.messages import GROUND, on_the_wire
 
 PARAMETERS = b'{"version": 1, "parameters": []}'
 

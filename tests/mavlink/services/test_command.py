@@ -25,7 +25,7 @@ from colibri.mavlink.services.command import (
 )
 from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
-from tests.mavlink.services.peers import (
+from tests.support.messages import (
     ANY_LONG,
     BYTES,
     FLOATS,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.identity import GENERIC, IDENTITIES, PX4, autopilot_version, banner, version_of
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.services.peers import on_the_wire
+from tests.support.messages import on_the_wire
 
 
 def test_it_says_that_it_is_colibri() -> None:

@@ -10,7 +10,7 @@ from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.refusal import Refusal
-from tests.mavlink.services.peers import GROUND, message, on_the_wire
+from tests.support.messages import GROUND, message, on_the_wire
 
 Q = [1.0, 0.0, 0.0, 0.0]
 

@@ -7,7 +7,7 @@ from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services import shell
 from colibri.mavlink.services.shell import PROMPT, Shell
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.services.peers import GROUND, OTHER, message, on_the_wire
+from tests.support.messages import GROUND, OTHER, message, on_the_wire
 
 RESPOND = mav.SERIAL_CONTROL_FLAG_RESPOND
 REPLY = mav.SERIAL_CONTROL_FLAG_REPLY

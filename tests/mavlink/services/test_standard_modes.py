@@ -6,7 +6,7 @@ from hypothesis import given
 from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.command import ACCEPTED, DENIED, FAILED, Command, Outcome
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
-from tests.mavlink.services.peers import FLOATS, GROUND, NAN, on_the_wire
+from tests.support.messages import FLOATS, GROUND, NAN, on_the_wire
 
 MODES = (
     ModeInfo("Position", 3 << 16, standard_mode=1),

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.timesync import TimeService
-from tests.mavlink.services.peers import GROUND, message, on_the_wire
+from tests.support.messages import GROUND, message, on_the_wire
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 UINT64 = st.integers(0, 2**64 - 1)

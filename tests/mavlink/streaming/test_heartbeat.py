@@ -7,7 +7,7 @@ from colibri.mavlink.services.identity import GENERIC, PX4, Identity
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.services.peers import message, on_the_wire
+from tests.support.messages import message, on_the_wire
 
 AT_REST = Snapshot(time_us=0, base_mode=mav.MAV_MODE_FLAG_GUIDED_ENABLED, custom_mode=(4 << 16) | (3 << 24))
 

@@ -13,8 +13,8 @@ from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, S
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.services.peers import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
-from tests.mavlink.telemetry.snapshots import FLYING, TELEMETRY
+from tests.support.messages import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
+from tests.support.snapshots import FLYING, TELEMETRY
 
 FRAME_US = 4_000
 ATTITUDE, HOME, HEARTBEAT = 30, 242, 0

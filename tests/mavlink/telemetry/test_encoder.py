@@ -7,8 +7,8 @@ from hypothesis import assume, given
 
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Quaternion, Vector
-from tests.mavlink.telemetry.snapshots import FLYING, sent
-from tests.strategies import ANGLES, quaternions, vectors
+from tests.support.snapshots import FLYING, sent
+from tests.support.strategies import ANGLES, quaternions, vectors
 
 NORTH_EAST_DOWN = (0.2152, 0.0124, 0.4312)
 

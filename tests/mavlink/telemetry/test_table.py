@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.telemetry.snapshots import ARBITRARY, FLYING, TELEMETRY, sent
+from tests.support.snapshots import ARBITRARY, FLYING, TELEMETRY, sent
 
 METRES_A_DEGREE = radians(1.0) * 6371000.0
 LATITUDE_E7 = round((47.0 + 20.0 / METRES_A_DEGREE) * 1e7)

@@ -16,7 +16,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.process.options import wind
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
-from tests.strategies import quaternions, vectors
+from tests.support.strategies import quaternions, vectors
 from tools.harness.plant_flights import OFF, flight, hover, hummingbird, rpm, states
 
 VEHICLE = load_vehicle("hummingbird")

@@ -10,7 +10,7 @@ from colibri.autopilot.control.interface import VehicleState
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.wire.refusal import Refusal
-from tests.strategies import quaternions
+from tests.support.strategies import quaternions
 
 READY = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 INPUTS = ArmingInputs(READY, standing=True, charge=1.0, thrust_stick=None)

@@ -25,8 +25,8 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Kind, Reference, lead, still_target
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
-from tests.autopilot.commander import failsafe_inputs
-from tests.autopilot.commander.failsafe_inputs import FULL
+from tests.support import failsafe_inputs
+from tests.support.failsafe_inputs import FULL
 
 LIMITS = {number.name: float(number.default) for number in NUMBERS}
 NOW_US = 10_000_000

@@ -14,7 +14,7 @@ from colibri.autopilot.control.parts.error_dynamics import error_transition
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
-from tests.strategies import reals, vectors
+from tests.support.strategies import reals, vectors
 
 AIRFRAME = Airframe(0.698, 9.81, 0.025, 0.05, 0.06)
 NO_DRAG = Airframe(0.698, 9.81, 0.0, 0.0, 0.0)

@@ -10,7 +10,7 @@ from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priorit
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.plant.vehicle.description import load_vehicle
-from tests.strategies import quaternions, reals, vectors
+from tests.support.strategies import quaternions, reals, vectors
 
 VEHICLE = load_vehicle("hummingbird")
 FROM_THRUST, FROM_MOMENTS = squared_speeds_from(VEHICLE)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force
-from tests.strategies import vectors
+from tests.support.strategies import vectors
 
 LIMITS = ForceLimits(tan(1.0), 1.0, 18.0, 1.0)
 

@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete
 from colibri.autopilot.control.thesis.lpv_model import attitude_model, discretise
 from colibri.common.types import Vector
 from colibri.plant.physics.equations import angular_acceleration
-from tests.strategies import reals, vectors
+from tests.support.strategies import reals, vectors
 
 INERTIA = (0.0034, 0.0041, 0.006)
 

@@ -15,7 +15,7 @@ from colibri.common.types import Vector
 from colibri.plant.physics.equations import rotor_momentum, rotor_wrench
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
-from tests.strategies import reals, vectors
+from tests.support.strategies import reals, vectors
 
 VEHICLE = load_vehicle("hummingbird")
 WEIGHT_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2

@@ -8,7 +8,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.autopilot.control.whole_lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import rotation_matrix
-from tests.autopilot.control.whole_lpv_mpc.test_model import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
+from tests.support.whole_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
 
 
 @pytest.mark.parametrize("seed", range(4))

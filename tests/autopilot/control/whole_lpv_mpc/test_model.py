@@ -4,41 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from colibri.autopilot.control.whole_lpv_mpc import model
-from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance, Model
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Model
 from colibri.autopilot.control.whole_lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
-from colibri.common.rotations import quaternion_from_euler, rotation_matrix
+from colibri.common.rotations import rotation_matrix
 from colibri.plant.physics.equations import derivative
 from colibri.plant.physics.parameters import parameters_of
-from colibri.plant.vehicle.description import Vehicle, load_vehicle
-
-HUMMINGBIRD = load_vehicle("hummingbird").without(["battery", "ground"])
-INTERVAL_S = 0.008
-STARTS = np.array([0, 1, 3, 8])
-STEPS = 8
-CALM = Disturbance(np.zeros(3), np.zeros(3))
-
-
-def start(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a rigid body in mid-turn, rotor speeds and commands, the last two squared."""
-    rng = np.random.default_rng(seed)
-    rigid = np.concatenate(
-        [
-            rng.normal(size=3),
-            3.0 * rng.normal(size=3),
-            quaternion_from_euler(*rng.uniform(-0.8, 0.8, 3)),
-            rng.uniform(-3.0, 3.0, 3),
-        ]
-    )
-    return rigid, rng.uniform(0.2, 0.5, ROTORS), rng.uniform(0.2, 0.5, (STEPS, ROTORS))
-
-
-def rolled(vehicle: Vehicle, rigid: np.ndarray, squared: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, ...]:
-    motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
-    numbers, drive = packed(model_of(vehicle, INTERVAL_S)), model.empty_drive(STEPS)
-    model.roll_out(rigid, squared, commands, CALM, numbers, drive, motion, speeds)
-    return motion, speeds
+from tests.support.whole_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -17,7 +17,7 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.config import SettingsError
 from colibri.common.types import Array
 from colibri.plant.physics.start import Start
-from tests.autopilot.control.whole_lpv_mpc.test_law import TABLE, VEHICLE, Flight
+from tests.support.whole_mpc import TABLE, VEHICLE, Flight
 
 INTERVAL_S = 0.008
 STARTS = np.array([0, 2, 6, 20])

@@ -21,8 +21,7 @@ from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Return, 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.refusal import Refusal
-from tests.autopilot.guidance.mission.stand_in import HOME, STEP_US, Flight, from_home, item
-from tests.autopilot.guidance.mission.test_items import ITEMS
+from tests.support.mission_flight import HOME, ITEMS, STEP_US, Flight, from_home, item
 
 MINUTE_S = 60.0
 

@@ -12,7 +12,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
-from tests.strategies import reals
+from tests.support.strategies import reals
 
 IN, OUT, DISC_IN, DISC_OUT, BACK = 5001, 5002, 5003, 5004, 5000
 SQUARE = [(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)]

@@ -11,8 +11,9 @@ from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, RALLY_RULES, SKIPPED, places
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
-from colibri.mavlink.services.command import GLOBAL_FRAMES, NOT_GIVEN
+from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
+from tests.support.mission_flight import ITEMS
 
 P1, P2, P3, P4 = (getattr(mav, f"MAV_MISSION_INVALID_PARAM{number}") for number in (1, 2, 3, 4))
 P5, P6, P7 = mav.MAV_MISSION_INVALID_PARAM5_X, mav.MAV_MISSION_INVALID_PARAM6_Y, mav.MAV_MISSION_INVALID_PARAM7
@@ -131,23 +132,6 @@ def test_where_items_are() -> None:
     for (seq, place), (expected_seq, expected_place) in zip(places(items, home, DEFAULT_ORIGIN), expected, strict=True):
         assert seq == expected_seq
         assert place == pytest.approx(expected_place, abs=0.05)
-
-
-FLOATS = st.floats(width=32)
-INTS = st.integers(-(2**31), 2**31 - 1)
-COMMANDS = st.one_of(
-    st.sampled_from([*sorted(FLOWN | SKIPPED), 5000, 5001, 5002, 5003, 5004, 5100]), st.integers(0, 65535)
-)
-ITEMS = st.builds(
-    MissionItem,
-    st.one_of(st.sampled_from(sorted(GLOBAL_FRAMES)), st.integers(0, 255)),
-    COMMANDS,
-    st.integers(0, 255),
-    *[FLOATS] * 4,
-    INTS,
-    INTS,
-    FLOATS,
-)
 
 
 @given(st.lists(ITEMS, max_size=5))

@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position, thro
 from colibri.autopilot.guidance.trajectories.waypoint_file import MARGIN, Waypoints, read_waypoints
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
-from tests.autopilot.guidance.trajectories.paths import DIPS
+from tests.support.paths import DIPS
 
 UP_AND_DOWN = "x,y,z,t\n0,0,51,0\n0,0,70,2\n0,0,51,4\n0,0,70,6\n0,0,70,10\n"
 

@@ -12,7 +12,7 @@ from scipy.linalg import solve
 from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, SNAP, PiecewisePolynomial, minimise
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.common.types import Array
-from tests.strategies import reals
+from tests.support.strategies import reals
 
 TIMES_S = np.array([0.0, 1.5, 2.0, 5.0, 6.0])
 POINTS = np.array([[0.0, 1.0], [3.0, 1.0], [3.0, 4.0], [-2.0, 0.0], [0.0, 0.0]])

@@ -8,7 +8,7 @@ from hypothesis import given
 
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
 from colibri.common.types import Array
-from tests.strategies import reals
+from tests.support.strategies import reals
 
 ORDER = 5
 

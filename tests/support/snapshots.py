@@ -15,7 +15,6 @@ from colibri.mavlink.wire.dialect import Codec
 TELEMETRY = telemetry()
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
 YAW_NORTH = pi / 2
-
 FORECASTS = tuple(
     Forecast(0.1 * k, (k, 2.0 * k, 3.0 * k), (0.1 * k, 0.0, 0.0), (0.0, 0.1 * k, 0.0), YAW_NORTH, 0.5)
     for k in range(1, 11)

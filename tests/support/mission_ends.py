@@ -2,9 +2,16 @@
 
 import random
 from collections.abc import Callable, Iterable, Sequence
+from struct import pack
 from typing import Any
 
-from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, Plan
+from colibri.mavlink.mission.items import (
+    ACCEPTED,
+    MISSION,
+    PLAN_TYPES,
+    MissionItem,
+    Plan,
+)
 from colibri.mavlink.mission.service import MissionService, Progress, Vehicle
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Peer, Send
@@ -231,3 +238,7 @@ def upload(ground: Ground, items: Any = ITEMS, plan_type: int = MISSION) -> list
         assert asked(answers) == [("MISSION_REQUEST_INT", seq)]
         answers = give(ground, seq, item, plan_type=plan_type)
     return answers
+
+
+def bits(items: Any) -> list[bytes]:
+    return [pack("<BHBffffiif", *item) for item in items]

@@ -91,3 +91,6 @@ class Client:
                 return entries
             assert reply.data.endswith(b"\0")
             entries += reply.data[:-1].split(b"\0")
+
+
+TEXT = bytes(range(256)) * 20

@@ -2,6 +2,8 @@
 
 from math import atan2, cos, dist, nan, sin, tau
 
+from hypothesis import strategies as st
+
 from colibri.autopilot.guidance.mission.executor import (
     ACTIVE,
     COMPLETE,
@@ -9,12 +11,13 @@ from colibri.autopilot.guidance.mission.executor import (
     Reached,
     SetHome,
 )
-from colibri.autopilot.guidance.mission.items import MISSION_RULES
+from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.services.command import GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import mav
 
 STEP_US = 20_000
@@ -111,3 +114,21 @@ class Flight:
 def from_home(flight: Flight) -> Vector:
     x, y, z = (a - b for a, b in zip(flight.position, HOME, strict=True))
     return (x, y, z)
+
+
+FLOATS = st.floats(width=32)
+INTS = st.integers(-(2**31), 2**31 - 1)
+COMMANDS = st.one_of(
+    st.sampled_from([*sorted(FLOWN | SKIPPED), 5000, 5001, 5002, 5003, 5004, 5100]), st.integers(0, 65535)
+)
+
+ITEMS = st.builds(
+    MissionItem,
+    st.one_of(st.sampled_from(sorted(GLOBAL_FRAMES)), st.integers(0, 255)),
+    COMMANDS,
+    st.integers(0, 255),
+    *[FLOATS] * 4,
+    INTS,
+    INTS,
+    FLOATS,
+)

@@ -1,4 +1,4 @@
-"""A sudden bias of the accelerometer is found, and nothing that looks like one is taken for it."""
+"""A sudden bias of accelerometer or gyroscope is found, and nothing that looks like one is taken for it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,14 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from colibri.autopilot.estimation.sensing.rejection import Source
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
-from tests import sensor_source as source
-from tests.autopilot.estimation.test_estimator import error_m, estimates, known, recorded
-from tests.sensor_source import INTERVAL_US
+from tests.support import sensor_source as source
+from tests.support.estimates import Change, error_m, estimates, known, recorded
+from tests.support.sensor_source import INTERVAL_US
 
 BEGAN_S = 16.0
+LONG = pytest.mark.long
+PATHS = [source.circle, pytest.param(source.hover, marks=LONG)]
 GpsLie = Callable[[GpsFix, float], GpsFix]
 
 
@@ -22,28 +25,28 @@ def plus(vector: Vector, other: Vector, times: float = 1.0) -> Vector:
     return (x + times * a, y + times * b, z + times * c)
 
 
-def fails(change: Callable[[SensorFrame, float], SensorFrame]) -> Callable[[SensorFrame, float], SensorFrame]:
+def fails(change: Change) -> Change:
     """Have frames changed by (frame, s since it began)."""
     return lambda frame, t: frame if t < BEGAN_S else change(frame, t - BEGAN_S)
 
 
-def felt(bias: Vector) -> Callable[[SensorFrame, float], SensorFrame]:
+def felt(bias: Vector) -> Change:
     return fails(lambda frame, _: frame._replace(specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, bias)))
 
 
-def told(lie: GpsLie) -> Callable[[SensorFrame, float], SensorFrame]:
+def told(lie: GpsLie) -> Change:
     return fails(lambda frame, t: frame if frame.gps is None else frame._replace(gps=lie(frame.gps, t)))
 
 
-@pytest.mark.parametrize("path", [source.circle, pytest.param(source.hover, marks=pytest.mark.long)])
+@pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize(
     "bias",
     [
         *((0.0, 0.0, 2.0), (0.8, -0.6, 0.9), (-6.0, 0.0, 0.0)),
-        *(pytest.param(bias, marks=pytest.mark.long) for bias in ((0.0, 0.0, -2.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0))),
+        *(pytest.param(bias, marks=LONG) for bias in ((0.0, 0.0, -2.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0))),
     ],
 )
-def test_a_sudden_bias_is_found_before_it_is_far(path: source.Path, bias: Vector) -> None:
+def test_a_sudden_accelerometer_bias_is_found_in_time(path: source.Path, bias: Vector) -> None:
     flight = recorded(path, 3, 22.5)
     of = estimates(flight.frames, felt(bias))
     last = known(of)[-1]
@@ -79,16 +82,17 @@ def sliding(way: Vector) -> GpsLie:
 ALL_OF_GPS = {"all of it slides sideways": sliding((1.5, 0.0, 0.0)), "all of it slides up": sliding((0.0, 0.0, 2.0))}
 
 
-@pytest.mark.parametrize("path", [source.circle, pytest.param(source.hover, marks=pytest.mark.long)])
+@pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("lie", [*VELOCITY_ALONE.values(), *ALL_OF_GPS.values()], ids=[*VELOCITY_ALONE, *ALL_OF_GPS])
-def test_a_receiver_that_lies_is_not_taken_for_it(path: source.Path, lie: GpsLie) -> None:
+def test_a_receiver_that_lies_is_no_bias(path: source.Path, lie: GpsLie) -> None:
     of = known(estimates(recorded(path, 5, 22.0).frames, told(lie)))
     assert of[-1].health.gps_glitch
     assert of[-1].resets == 0
+    assert all(one.health.gyro_bias for one in of)
 
 
 @pytest.mark.parametrize("late_s", [0.2, 0.5, 1.0])
-def test_nor_is_one_that_is_late(late_s: float) -> None:
+def test_a_late_receiver_is_no_accelerometer_bias(late_s: float) -> None:
     """It goes from rest to its circle while all of GPS tells what was."""
     flight = recorded(source.circle, 4, 12.0)
     fixes = {frame.time_us: frame.gps for frame in flight.frames if frame.gps is not None}
@@ -105,7 +109,7 @@ def test_nor_is_one_that_is_late(late_s: float) -> None:
     assert all(one.health.accel_bias for one in of)
 
 
-def test_nor_is_a_gyroscope_that_errs() -> None:
+def test_a_gyroscope_that_errs_is_no_accelerometer_bias() -> None:
     def turning(frame: SensorFrame, _: float) -> SensorFrame:
         return frame._replace(rate_flu_rad_s=plus(frame.rate_flu_rad_s, (0.0, 0.06, 0.0)))
 
@@ -115,7 +119,7 @@ def test_nor_is_a_gyroscope_that_errs() -> None:
 
 
 @pytest.mark.parametrize("knock", [(0.0, 0.0, 200.0), (90.0, -60.0, 100.0), (-30.0, 20.0, -10.0)])
-def test_nor_is_a_knock(knock: Vector) -> None:
+def test_a_knock_is_no_accelerometer_bias(knock: Vector) -> None:
     """It is over before the next frame, and was measured wrong: velocity is off by up to half a metre a second."""
 
     def knocked(frame: SensorFrame, t: float) -> SensorFrame:
@@ -126,3 +130,77 @@ def test_nor_is_a_knock(knock: Vector) -> None:
     of = known(estimates(recorded(source.hover, 7, 19.0).frames, fails(knocked)))
     assert any(one.health.gps_glitch for one in of)
     assert all(one.health.accel_bias for one in of)
+
+
+def turned(bias: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
+    """Have the gyroscope be off by a bias, rad/s, that drifts, rad/s²."""
+    return fails(lambda frame, t: frame._replace(rate_flu_rad_s=plus(plus(frame.rate_flu_rad_s, bias), drift, t)))
+
+
+def magnetised(iron: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
+    """Put a field beside the magnetometer, gauss, that grows, gauss/s."""
+    return fails(
+        lambda frame, t: frame._replace(
+            magnetic_field_flu_gauss=plus(plus(frame.magnetic_field_flu_gauss, iron), drift, t)
+        )
+    )
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(
+    "bias",
+    [
+        *((0.02, 0.0, 0.0), (-0.1, 0.2, 0.1)),
+        *(pytest.param(bias, marks=LONG) for bias in ((0.0, -0.02, 0.0), (0.1, 0.0, 0.0), (0.0, 0.3, 0.0))),
+    ],
+)
+def test_a_sudden_gyroscope_bias_is_found_in_time(path: source.Path, bias: Vector) -> None:
+    flight = recorded(path, 3, 24.5)
+    of = estimates(flight.frames, turned(bias))
+    last = known(of)[-1]
+    learning = [one for one in known(of) if not one.health.gyro_bias]
+    assert learning[0].frame.time_us * 1e-6 - BEGAN_S < 3.0
+    assert last.resets == 1
+    assert last.health.gyro_bias
+    assert np.allclose(last.gyro_bias_rad_s, flight.gyro_bias[-1] + bias, atol=0.001)
+    assert max(error_m(flight, of, t) for t in np.arange(BEGAN_S, 24.4, 0.1)) < 0.7
+    assert all(one.health.accel_bias for one in known(of))
+    after = [one for one in known(of) if one.frame.time_us > learning[0].frame.time_us + 1_000_000]
+    assert not any(one.health.gps_glitch for one in after)
+    assert all(one.health.attitude for one in after)
+
+
+def test_a_gyroscope_drift_is_followed() -> None:
+    flight = recorded(source.hover, 3, 30.0)
+    of = estimates(flight.frames, turned((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)))
+    assert known(of)[-1].gyro_bias_rad_s[0] == pytest.approx(flight.gyro_bias[-1, 0] + 0.14, abs=0.02)
+    assert max(error_m(flight, of, t) for t in np.arange(BEGAN_S, 29.9, 0.1)) < 1.5
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(
+    "change",
+    [
+        magnetised((0.2, 0.0, 0.0)),
+        magnetised((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)),
+        pytest.param(magnetised((0.0, 0.03, 0.0)), marks=LONG),
+        pytest.param(magnetised((0.0, 0.0, 0.0), (0.0, 0.003, 0.0)), marks=LONG),
+    ],
+)
+def test_a_field_beside_the_magnetometer_is_no_gyroscope_bias(path: source.Path, change: Change) -> None:
+    of = known(estimates(recorded(path, 5, 25.0).frames, change))
+    assert any(Source.MAGNETOMETER in one.health.not_accepted for one in of)
+    assert all(one.health.gyro_bias for one in of)
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(
+    "bias",
+    [
+        *((0.0, 0.0, 2.0), (1.0, 0.0, 0.0)),
+        *(pytest.param(bias, marks=LONG) for bias in ((0.0, -0.5, 0.0), (0.2, 0.2, 0.0))),
+    ],
+)
+def test_an_accelerometer_that_errs_is_no_gyroscope_bias(path: source.Path, bias: Vector) -> None:
+    of = known(estimates(recorded(path, 3, 22.5).frames, felt(bias)))
+    assert all(one.health.gyro_bias for one in of)

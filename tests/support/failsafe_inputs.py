@@ -5,7 +5,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Diagnostics
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.mavlink.telemetry.snapshot import BatteryState
-from tests.autopilot.commander.cockpit import FLYING, at
+from tests.support.cockpit import FLYING, at
 
 FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
 WELL = FailsafeInputs(
