@@ -117,7 +117,7 @@ def test_there_are_kernels_on_both_sides() -> None:
 
 
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
-def test_kernels_are_exact_and_kept_on_disk_and_call_others_by_name(kernel: Dispatcher) -> None:
+def test_kernels_are_exact_and_cached_on_disk(kernel: Dispatcher) -> None:
     """By name and not through a module: so their files are known."""
     assert not kernel.targetoptions.get("fastmath", False)
     assert kernel.stats.cache_path is not None
@@ -140,7 +140,7 @@ def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedP
 
 
 @pytest.mark.long
-def test_kernels_of_all_kinds_are_the_same_from_disk_and_most_need_no_front_end_of_numba(tmp_path: Path) -> None:
+def test_cached_kernels_are_the_same_and_load_quickly(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(KINDS)
     first, second, third = (_run(tmp_path, *words).stdout.splitlines() for words in ((), (), ("caller",)))
     said = ["cannot assign slice of shape (2,) from input of shape (4,)", "0.0 1.0 2.0 3.0 2.0 2.0 True", "x = 1.0"]
@@ -155,7 +155,7 @@ def _write(folder: Path, factor: float, argument: str = "Number") -> None:
 
 
 @pytest.mark.long
-def test_machine_code_is_renewed_with_a_kernel_that_it_calls_and_with_the_types_of_its_arguments(
+def test_machine_code_is_renewed_with_callees_and_types(
     tmp_path: Path,
 ) -> None:
     said = []
@@ -166,7 +166,7 @@ def test_machine_code_is_renewed_with_a_kernel_that_it_calls_and_with_the_types_
 
 
 @pytest.mark.long
-def test_machine_code_of_one_version_is_not_run_by_the_index_of_another(tmp_path: Path) -> None:
+def test_machine_code_is_tied_to_its_version(tmp_path: Path) -> None:
     """As two processes leave it that write at once."""
     _write(tmp_path, 2.0)
     assert _run(tmp_path).stdout == "4.0 0\n"
@@ -181,9 +181,7 @@ def test_machine_code_of_one_version_is_not_run_by_the_index_of_another(tmp_path
 
 @pytest.mark.long
 @pytest.mark.parametrize("trusted", [True, False], ids=["private", "open to others"])
-def test_where_neither_package_nor_home_can_be_written_to_machine_code_is_kept_privately_or_not_at_all(
-    tmp_path: Path, *, trusted: bool
-) -> None:
+def test_machine_code_needs_a_private_writable_folder(tmp_path: Path, *, trusted: bool) -> None:
     _write(tmp_path, 2.0)
     (tmp_path / "__pycache__").touch()  # no folder can be made of this name, by root neither
     temporary = tmp_path / "temporary"

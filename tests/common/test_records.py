@@ -26,7 +26,7 @@ def outer() -> Outer:
     return Outer(0.5, Inner(2.0, np.arange(30.0).reshape(5, 6), np.arange(9)), np.array([1.0, 2.0]), np.arange(100.0))
 
 
-def test_a_record_has_the_numbers_that_were_packed_in_memory_of_its_own() -> None:
+def test_a_record_owns_the_numbers_packed_in_it() -> None:
     given = outer()
     record = packed(given)
     it = opened(record, Outer)
@@ -72,7 +72,7 @@ def _total(record: np.ndarray) -> float:
     return total
 
 
-def test_a_kernel_reads_and_writes_a_record_and_so_does_what_is_a_part_of_it() -> None:
+def test_kernels_read_and_write_nested_records() -> None:
     record = packed(outer())
     assert _total(record) == 0.5 + 2.0 * 29.0 + 2.0 * sum(range(100))
     assert opened(record, Outer).many[7] == 14.0

@@ -46,7 +46,7 @@ def test_every_page_is_in_the_navigation_once() -> None:
     ]
 
 
-def test_readme_is_short_and_shows_three_pictures_of_which_one_moves() -> None:
+def test_readme_is_short_and_shows_three_pictures() -> None:
     readme = ROOT / "README.md"
     assert len(readme.read_text(encoding="utf-8").splitlines()) <= README_LINES
     shown = [link for link in links(readme) if link.endswith((".png", ".gif"))]

@@ -93,7 +93,7 @@ def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixtu
     assert error.count("\n") == 1
 
 
-def test_environments_are_those_that_are_set_up_and_newer_than_lock_and_package_they_stay(tmp_path: Path) -> None:
+def test_current_environments_are_kept(tmp_path: Path) -> None:
     for name in ("requirements.lock", "pyproject.toml"):
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (0.0, 0.0))
@@ -109,6 +109,6 @@ def test_environments_are_those_that_are_set_up_and_newer_than_lock_and_package_
         set_up(tmp_path, "3.12", Path("/no/such/python"))
 
 
-def test_other_pythons_are_of_other_versions_that_can_run_the_project() -> None:
+def test_other_pythons_are_supported_versions() -> None:
     own = f"3.{sys.version_info.minor}"
     assert all(version != own and int(version[2:]) >= 11 for version in other_pythons())

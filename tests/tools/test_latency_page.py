@@ -20,7 +20,7 @@ def recording(x: float = 0.0, phi: float = 0.0, until_s: float = STEP.duration_s
     return Recording(table, counts, counts, none, none, none, np.zeros((99, 4), np.int64), none, None, "")
 
 
-def test_a_flight_that_is_off_or_ends_early_or_upside_down_is_lost() -> None:
+def test_flights_off_track_early_or_inverted_are_lost() -> None:
     assert merit(recording(), STEP) == Merit(0.0, 0.0, 0.0)
     for lost in (recording(x=6.0), recording(phi=2.0), recording(until_s=3.0)):
         assert merit(lost, STEP) is None
@@ -45,7 +45,7 @@ def test_what_is_told_is_never_below_zero() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_compensated_a_round_trip_is_flown_by_which_it_is_lost_else(law: str) -> None:
+def test_only_compensation_survives_a_long_round_trip(law: str) -> None:
     case = LEMNISCATE._replace(duration_s=4.0, judged_from_s=3.0)
     at_once, late = fly(Flight(law, case, 0.0, None)), fly(Flight(law, case, 40.0, None))
     assert at_once is not None

@@ -20,7 +20,7 @@ def test_the_page_of_faults_is_current() -> None:
     assert page == with_tables(page, faults.tables())
 
 
-def test_a_table_takes_the_place_of_the_next_with_the_same_headings() -> None:
+def test_a_table_replaces_the_one_with_its_headings() -> None:
     page = "a\n\n| x |\n|---|\n| 1 |\n\n| y |\n|---|\n| 2 |\n\n| x |\n|---|\n| 3 |\n"
     assert with_tables(page, ["| x |\n|---|", "| x |\n|---|\n| 4 |"]) == (
         "a\n\n| x |\n|---|\n\n| y |\n|---|\n| 2 |\n\n| x |\n|---|\n| 4 |\n"

@@ -265,7 +265,7 @@ ANYTHING = st.one_of(st.floats(width=32), st.sampled_from([0.0, 1.0, -1.0, nan, 
     st.one_of(st.none(), st.sampled_from([0, 2, 3, 5, 6])),
     st.booleans(),
 )
-def test_whatever_a_command_holds_it_is_answered_and_the_flight_goes_on(
+def test_any_command_is_answered_and_the_flight_goes_on(
     index: int, numbers: tuple[float, ...], frame: int | None, flies: bool
 ) -> None:
     cockpit = AIRBORNE if flies else AT_REST

@@ -59,7 +59,7 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     assert cockpit.pilot.state == FIRST
 
 
-def test_a_takeoff_item_leaves_the_ground_and_a_landing_item_stands_again() -> None:
+def test_takeoff_and_landing_items_are_flown() -> None:
     cockpit = Cockpit()
     cockpit.load(MISSION, item("NAV_TAKEOFF", place=(0.0, 0.0, 3.0)), item("NAV_LAND", place=(0.0, 0.0, 0.0)))
     cockpit.pilot.select(Mode.MISSION, ())
@@ -79,7 +79,7 @@ def test_a_mission_moves_home() -> None:
     assert cockpit.home.chosen
 
 
-def test_an_item_outside_the_fence_is_told_once_and_holds_the_mission_back() -> None:
+def test_an_item_outside_the_fence_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
     cockpit.load(MISSION, PLAN[0], item("NAV_WAYPOINT", place=(9.0, 0.0, 10.0)))
@@ -91,7 +91,7 @@ def test_an_item_outside_the_fence_is_told_once_and_holds_the_mission_back() -> 
     assert not cockpit.missions.leaves_fence
 
 
-def test_an_item_below_the_ground_is_told_by_its_number_and_holds_the_mission_back() -> None:
+def test_an_item_below_the_ground_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     low, high = item("NAV_WAYPOINT", place=(9.0, 0.0, -4.0)), item("NAV_WAYPOINT", place=(9.0, 0.0, 0.0))
     cockpit.load(MISSION, PLAN[0], high, low)
@@ -104,7 +104,7 @@ def test_an_item_below_the_ground_is_told_by_its_number_and_holds_the_mission_ba
     assert not cockpit.missions.leads_below_ground, "as low as home"
 
 
-def test_the_fence_around_home_moves_with_home_and_with_its_parameters() -> None:
+def test_the_home_fence_follows_home_and_parameters() -> None:
     cockpit = Cockpit()
     assert not cockpit.fence.exists
     cockpit.missions.adopt(Behaviour(max_distance_m=10.0, max_height_m=20.0))
@@ -139,7 +139,7 @@ def test_plans_that_were_kept_go_on_where_the_mission_stood() -> None:
     assert after.missions.progress().state == NO_MISSION
 
 
-def test_every_plan_counts_as_a_change_and_a_current_item_must_exist() -> None:
+def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     cockpit = Cockpit()
     for plan_type in (MISSION, FENCE, RALLY):
         cockpit.load(plan_type)

@@ -44,7 +44,7 @@ def test_a_law_that_takes_no_attitude_stops_instead(mode: Mode) -> None:
 
 
 @pytest.mark.parametrize("takes_attitude", [False, True])
-def test_who_does_not_know_the_place_sinks_level_where_the_law_can(takes_attitude: bool) -> None:
+def test_a_landing_without_position_is_level_if_the_law_can(takes_attitude: bool) -> None:
     cockpit = Cockpit(FLYING, takes_attitude=takes_attitude)
     cockpit.step(position_known=False)
     assert cockpit.pilot.context().blind
@@ -53,7 +53,7 @@ def test_who_does_not_know_the_place_sinks_level_where_the_law_can(takes_attitud
     )
 
 
-def test_a_track_from_time_0_begins_at_its_start_and_is_flown_once() -> None:
+def test_a_track_from_time_0_is_flown_once() -> None:
     cockpit = Cockpit((0.0, 0.0, 0.0), first=track("spiral"), mode=Mode.TRACK)
     task = cockpit.pilot.task
     assert isinstance(task, TrackTask)
@@ -99,7 +99,7 @@ def needs_of(
     return ModeNeeds(cockpit.pilot, cockpit.missions, *services, takes_attitude=True)
 
 
-def test_where_nobody_is_heard_and_nothing_is_loaded_most_needs_are_missing() -> None:
+def test_most_needs_are_missing_at_first() -> None:
     cockpit = Cockpit()
     missing = needs_of(cockpit).missing()
     assert set(missing) == {Need.STICKS, Need.SETPOINTS, Need.MISSION, Need.CIRCLE, Need.FLYING}

@@ -52,9 +52,7 @@ def test_in_flight_every_mode_follows_every_other(flying: Cockpit, source: Mode,
 
 
 @pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
-def test_a_mode_whose_need_nothing_meets_is_refused_and_what_is_flown_goes_on(
-    flying: Cockpit, mode: Mode, need: Need
-) -> None:
+def test_a_refused_mode_leaves_the_flight_as_it_is(flying: Cockpit, mode: Mode, need: Need) -> None:
     flying.pilot.select(Mode.LAND, ())
     task = flying.pilot.task
     refusal = flying.pilot.select(mode, (need,))
@@ -66,7 +64,7 @@ def test_a_mode_whose_need_nothing_meets_is_refused_and_what_is_flown_goes_on(
 
 @pytest.mark.parametrize("mode", Mode)
 @pytest.mark.parametrize("action", LEADS)
-def test_a_failsafe_leads_where_its_action_says_whatever_is_flown(action: Action, mode: Mode) -> None:
+def test_a_failsafe_action_sets_its_mode_from_any_mode(action: Action, mode: Mode) -> None:
     cockpit = in_the_air()
     cockpit.pilot.select(mode, ())
     cockpit.pilot.save(action)
@@ -90,7 +88,7 @@ def test_no_failsafe_moves_rotors_that_stand(action: Action) -> None:
 
 
 @pytest.mark.parametrize("mode", Mode)
-def test_on_the_ground_the_table_says_in_which_modes_rotors_are_armed(mode: Mode) -> None:
+def test_arming_is_allowed_in_the_modes_of_the_table(mode: Mode) -> None:
     cockpit = Cockpit()
     cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
     assert cockpit.pilot.select(mode, ()) is None
@@ -100,9 +98,7 @@ def test_on_the_ground_the_table_says_in_which_modes_rotors_are_armed(mode: Mode
 
 
 @pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
-def test_a_missing_need_holds_back_arming_but_for_the_position_which_is_checked_by_itself(
-    mode: Mode, need: Need
-) -> None:
+def test_a_missing_need_other_than_position_prevents_arming(mode: Mode, need: Need) -> None:
     cockpit = Cockpit()
     cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
     cockpit.pilot.select(mode, ())
@@ -175,7 +171,7 @@ def test_a_return_flies_home_and_lands() -> None:
     assert cockpit.state.position_enu_m == pytest.approx((0.0, 0.0, 0.0), abs=0.3)
 
 
-def test_home_is_where_the_rotors_were_armed_unless_somebody_chose_it() -> None:
+def test_home_is_set_at_arming_unless_it_was_chosen() -> None:
     cockpit = Cockpit()
     cockpit.state = at((3.0, 4.0, 0.0), yaw_rad=1.0)
     cockpit.step()
@@ -188,7 +184,7 @@ def test_home_is_where_the_rotors_were_armed_unless_somebody_chose_it() -> None:
 
 
 @pytest.mark.parametrize("mode", Mode)
-def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) -> None:
+def test_a_failed_rotor_prevents_mode_changes_and_arming(mode: Mode) -> None:
     cockpit = in_the_air()
     cockpit.pilot.readiness.lose_rotor(2)
     refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, HoldTask(), ())
@@ -200,7 +196,7 @@ def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) ->
     assert cockpit.pilot.readiness.rotor_failed == ""
 
 
-def test_who_asks_for_another_speed_gets_it_for_this_flight_and_no_more_than_is_allowed() -> None:
+def test_a_requested_speed_is_limited_and_ends_with_the_flight() -> None:
     cockpit = in_the_air()
     cockpit.pilot.fly_at(3.0)
     assert cockpit.pilot.context().behaviour.limits.speed_m_s == 3.0
@@ -282,7 +278,7 @@ def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
 
 @pytest.mark.parametrize("event", [Event.ARRIVED, Event.FINISHED, Event.RETURN_ITEM])
 @pytest.mark.parametrize("mode", Mode)
-def test_what_is_finished_ends_the_modes_that_the_table_names_alone(event: Event, mode: Mode) -> None:
+def test_finished_tasks_end_only_the_modes_of_the_table(event: Event, mode: Mode) -> None:
     ends = {
         (Event.ARRIVED, Mode.TAKEOFF): Mode.HOLD,
         (Event.FINISHED, Mode.MISSION): Mode.HOLD,

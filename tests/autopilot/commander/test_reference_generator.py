@@ -76,7 +76,7 @@ def another_place_of_the_same(lead: Lead) -> None:
 @pytest.mark.parametrize(
     "happens", [at_once, slower, set_elsewhere, set_where_it_is, another_place_of_the_same], ids=lambda it: it.__name__
 )
-def test_a_reference_that_stays_goes_on_as_if_nothing_were_remembered(happens: Callable[[Lead], None]) -> None:
+def test_a_cached_reference_equals_one_led_anew(happens: Callable[[Lead], None]) -> None:
     led = Lead()
     led.rest()
     happens(led)

@@ -50,7 +50,7 @@ def look(of: Supervisor, inputs: FailsafeInputs, flight: Flight = HOLDING, for_s
     return [action for action in begun if action is not Action.NONE]
 
 
-def test_of_a_flight_that_is_well_nothing_begins_and_nothing_is_said() -> None:
+def test_a_healthy_flight_triggers_no_failsafe() -> None:
     well, lines = supervisor()
     assert look(well, WELL) == []
     assert lines.take() == []
@@ -83,7 +83,7 @@ def nothing(row: Row) -> int:
 
 
 @pytest.mark.parametrize("condition", LOST)
-def test_what_is_lost_begins_once_and_is_remembered_over_a_restart(condition: Condition) -> None:
+def test_a_failsafe_begins_once_and_survives_a_restart(condition: Condition) -> None:
     first, _ = supervisor()
     begun = look(first, LOST[condition])
     assert look(first, LOST[condition]._replace(now_us=WELL.now_us + 100_000_000)) == []

@@ -154,7 +154,7 @@ def test_the_first_strategy_fails_as_the_thesis_says(tmp_path: Path, link: str) 
         ("crown", 1e-3),
     ],
 )
-def test_the_geometric_controller_follows_an_ideal_vehicle_exactly(tmp_path: Path, track: str, rms_m: float) -> None:
+def test_the_geometric_controller_tracks_an_ideal_vehicle(tmp_path: Path, track: str, rms_m: float) -> None:
     figures = fly(tmp_path, track, "--profile", "se3", "--link", "memory", "--duration", "30")
     assert figures["rmse_after_20s_m"] < rms_m
     assert figures["solver"] is None
@@ -255,9 +255,7 @@ def test_a_foreign_law_that_goes_wild_ends_in_words(fly_theirs: FlyTheirs, link:
 
 
 @pytest.mark.parametrize("link", ["memory", pytest.param("udp", marks=pytest.mark.long)])
-def test_a_foreign_law_that_raises_is_a_lost_flight_whose_traceback_is_kept(
-    tmp_path: Path, fly_theirs: FlyTheirs, link: str
-) -> None:
+def test_an_exception_of_a_foreign_law_loses_the_flight(tmp_path: Path, fly_theirs: FlyTheirs, link: str) -> None:
     raises = example().replace("        error =", "        time_us < 500_000 or {}['gain']\n        error =")
     done = fly_theirs(raises, "--controller", "their-name", "--link", link)
     out = tmp_path / "out"

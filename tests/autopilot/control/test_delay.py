@@ -84,7 +84,7 @@ def test_it_stays_on_the_ground_until_its_rotors_carry_it() -> None:
     assert ahead.velocity_enu_m_s[2] > 0.0
 
 
-def test_the_delay_that_is_measured_is_a_median_and_does_not_tremble() -> None:
+def test_the_measured_delay_is_a_steady_median() -> None:
     delay = DelayCompensation(VEHICLE)
     for delay_us in (20_000, 20_300, 90_000, 19_800, 20_600, 150_000, 20_400):
         delay.measure(delay_us)

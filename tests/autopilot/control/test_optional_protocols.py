@@ -50,7 +50,7 @@ def law(name: str) -> Controller[Any]:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_one_of_those_that_come_along_counts_its_charge_estimates_its_mass_and_plans_attitudes(name: str) -> None:
+def test_one_built_in_law_has_charge_mass_and_plan(name: str) -> None:
     controller = law(name)
     assert isinstance(controller, ChargeController) is (name in OF_FLIGHT)
     assert isinstance(controller, PlanController) is (name in OF_FLIGHT)
@@ -58,7 +58,7 @@ def test_one_of_those_that_come_along_counts_its_charge_estimates_its_mass_and_p
     assert isinstance(controller, PathController) is (name == "whole-lpv-mpc")
 
 
-def test_the_flight_profiles_law_remembers_the_charge_that_it_is_told() -> None:
+def test_the_flight_law_remembers_the_reported_charge() -> None:
     controller = law("lpv-mpc")
     assert isinstance(controller, ChargeController)
     memory = controller.initial(HUMMINGBIRD.hover_speed)
@@ -106,7 +106,7 @@ def loop_of(monkeypatch: pytest.MonkeyPatch, factory: Any) -> ControlLoop:
     return ControlLoop(own, HUMMINGBIRD, lambda: 0.0)
 
 
-def test_a_law_of_somebody_elses_goes_on_with_the_charge_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_foreign_law_continues_with_the_charge_left(monkeypatch: pytest.MonkeyPatch) -> None:
     loop = loop_of(monkeypatch, Counting)
     loop.begin(HUMMINGBIRD.hover_speed, 0.0)
     loop.decide(0, LEVEL, STAYING)
@@ -137,7 +137,7 @@ def test_a_law_begins_with_what_its_battery_has_told(monkeypatch: pytest.MonkeyP
     assert empty.record().memory != before
 
 
-def test_the_mass_goes_on_in_mid_flight_and_begins_anew_with_a_flight() -> None:
+def test_the_mass_estimate_continues_only_in_mid_flight() -> None:
     loop = ControlLoop(load_profile("flight"), HUMMINGBIRD, lambda: 0.0)
     assert isinstance(loop.controller, MassController)
     staying = Horizon(*(np.zeros((loop.preview.samples, 3)),) * 5, *(np.zeros(loop.preview.samples),) * 3)
@@ -179,7 +179,7 @@ class Waiting(Counting):
         return memory._replace(taken=float(lag_us))
 
 
-def test_what_path_time_falls_behind_is_told_and_only_on_the_clock_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_lag_of_path_time_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     loop = loop_of(monkeypatch, Waiting)
     loop.begin(HUMMINGBIRD.hover_speed, 0.0)
     assert (loop.take_waited_us(), loop.path_speed, loop.lag_us) == (0, 1.0, 0)
@@ -200,7 +200,7 @@ def test_a_law_that_keeps_to_the_clock_is_not_asked_otherwise(monkeypatch: pytes
     assert (loop.take_waited_us(), loop.lag_us) == (0, 0)
 
 
-def test_a_plan_is_shown_where_the_law_says_that_it_holds_the_attitude() -> None:
+def test_a_plan_is_shown_with_the_columns_of_the_law() -> None:
     plan, squared = np.zeros((21, 6)), np.full((20, 4), HUMMINGBIRD.hover_speed**2 / HUMMINGBIRD.rotors.max_speed**2)
     plan[:, 1] = 0.2
     how = Diagnostics(predicted=plan, planned_squared=squared)

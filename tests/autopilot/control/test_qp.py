@@ -62,9 +62,7 @@ def test_rows_and_bounds_together(name: str) -> None:
         ("clarabel", dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TOLERANCE)),
     ],
 )
-def test_a_solver_by_itself_gives_the_bits_that_it_gives_through_qpsolvers(
-    name: str, options: dict[str, Any], *, bounded: bool
-) -> None:
+def test_a_direct_solver_equals_qpsolvers_bit_for_bit(name: str, options: dict[str, Any], *, bounded: bool) -> None:
     solver = QpSolver(name, TOLERANCE)
     for seed in range(20):
         H, f = random_qp(seed, 12)

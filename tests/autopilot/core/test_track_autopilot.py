@@ -39,7 +39,7 @@ def test_between_two_control_samples_the_last_command_holds() -> None:
         assert held.command.controls == decided.command.controls
 
 
-def test_begun_between_two_control_samples_it_hovers_until_the_next() -> None:
+def test_it_hovers_until_the_next_control_sample() -> None:
     autopilot = build(flight())
     first, second = autopilot.step(frame(1_004_000)), autopilot.step(frame(1_008_000))
     assert first.decision is None
@@ -74,6 +74,6 @@ def test_frames_divide_the_control_interval(wanted_s: float | None, interval_us:
     assert build(flight(frame_interval_s=wanted_s)).frame_interval_us == interval_us
 
 
-def test_a_profile_without_numbers_for_a_control_law_says_for_which_it_has() -> None:
+def test_a_profile_without_the_law_names_those_it_has() -> None:
     with pytest.raises(ProfileError, match="profile flight has no numbers for controller cascade, only for lpv-mpc, "):
         build(msgspec.structs.replace(flight(), controller="cascade"))

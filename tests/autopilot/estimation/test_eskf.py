@@ -166,7 +166,7 @@ def test_a_quick_turn_keeps_its_length(interval_s: float) -> None:
     assert np.linalg.norm(x[6:10]) == pytest.approx(1.0, abs=1e-14)
 
 
-def test_unknown_force_and_rate_keep_velocity_and_attitude_and_widen_both() -> None:
+def test_unknown_force_and_rate_widen_the_covariance() -> None:
     x, P, sample = some_state(5), some_covariance(5), a_sample(5)
     sample[0, 7:9] = 1.0
     y, wide = x.copy(), P.copy()

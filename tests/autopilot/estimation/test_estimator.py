@@ -129,7 +129,7 @@ def test_a_stationary_covariance_is_not_too_small() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 5))])
-def test_without_gps_a_hover_drifts_little_says_so_and_comes_back_smoothly(seed: int) -> None:
+def test_a_hover_without_gps_drifts_and_recovers_smoothly(seed: int) -> None:
     flight = recorded(source.hover, seed, 70.0, Faults(gps_lost_s=(30.0, 50.0)))
     of = estimates(flight.frames)
     lost = of[round(49.9e6 / INTERVAL_US)]
@@ -262,7 +262,7 @@ def test_a_stuck_barometer_is_seen() -> None:
 
 
 @pytest.mark.parametrize("bad", [nan, float("inf"), 1e6, -1e6])
-def test_a_moment_of_nonsense_from_the_inertial_sensors_is_bridged(bad: float) -> None:
+def test_short_nonsense_of_inertial_sensors_is_bridged(bad: float) -> None:
     def nonsense(frame: SensorFrame, t: float) -> SensorFrame:
         if not 12.0 <= t < 12.02:
             return frame

@@ -115,7 +115,7 @@ def test_time_that_goes_back_is_another_flight() -> None:
     assert first[-1].armed
 
 
-def test_a_vehicle_that_stations_fly_is_there_with_the_first_estimate() -> None:
+def test_a_station_vehicle_starts_with_the_first_estimate() -> None:
     flown = copter()
     for time_us in range(0, ALIGNED_US, FRAME_US):
         assert not flown.step(sensors(time_us)).command.armed
@@ -127,7 +127,7 @@ def test_a_vehicle_that_stations_fly_is_there_with_the_first_estimate() -> None:
     assert not flown.stations.system.restart
 
 
-def test_a_vehicle_that_stations_fly_is_restarted_by_another_flight() -> None:
+def test_a_station_vehicle_is_restarted_by_a_new_flight() -> None:
     flown = copter()
     for time_us in (*range(0, ALIGNED_US + 1, FRAME_US), 0):
         flown.step(sensors(time_us))

@@ -25,7 +25,7 @@ def failures() -> Failures:
     return Failures(Feedback.SENSORS, relays=True)
 
 
-def test_a_fault_is_handed_on_once_and_answered_when_it_has_happened(failures: Failures) -> None:
+def test_a_fault_is_injected_once_and_then_acknowledged(failures: Failures) -> None:
     command = asked(MOTOR, WRONG, 2.0, 0.5)
     assert failures.inject(command, enabled=True) == Outcome(LATER)
     assert failures.take() == (Fault(MOTOR, WRONG, 2, (0.5, 0.0, 0.0, 0.0)),)
@@ -53,12 +53,12 @@ def test_a_plant_that_does_not_answer_is_not_waited_for(failures: Failures, now_
     assert ended[1] == Outcome(FAILED, "failure refused: the plant does not answer")
 
 
-def test_nothing_is_handed_on_where_the_parameter_does_not_allow_it(failures: Failures) -> None:
+def test_faults_need_the_permission_of_the_parameter(failures: Failures) -> None:
     assert failures.inject(asked(MOTOR, OFF), enabled=False).result == DENIED
     assert failures.take() == ()
 
 
-def test_sensors_do_not_fail_where_the_state_is_told_nor_anything_of_another_simulator() -> None:
+def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
     by_state, elsewhere = Failures(Feedback.STATE, relays=True), Failures(Feedback.SENSORS, relays=False)
     outcome = by_state.inject(asked(GPS, OFF), enabled=True)
     assert outcome == Outcome(UNSUPPORTED, "failure refused: flown by the state, not by sensors")

@@ -83,7 +83,7 @@ def test_there_is_one_from_arming_to_disarming(flight: Flight) -> None:
     assert names(flight) == ["00001.ulg", "00002.ulg"]
 
 
-def test_it_is_whole_at_every_instant_and_at_most_a_second_behind(flight: Flight) -> None:
+def test_the_onboard_log_is_complete_up_to_the_last_second(flight: Flight) -> None:
     for _ in range(60):
         flight.run(10)
         if flight.content("00001.ulg"):

@@ -69,7 +69,7 @@ def test_a_large_lean_does_not_overshoot_either() -> None:
     assert flown[-1, 0] == pytest.approx(55.0, abs=1e-3)
 
 
-def test_rates_and_accelerations_are_bounded_and_are_the_angles_derivatives() -> None:
+def test_rates_are_bounded_derivatives_of_the_angles() -> None:
     memory, _ = go(tilt_command(radians(-50.0), radians(25.0), -2.0, WEIGHT_N), 1.0)
     for _ in range(100):
         memory, demand = REFERENCE.step(

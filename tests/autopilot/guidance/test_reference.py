@@ -83,9 +83,7 @@ def long_enough_s(limits: Limits, place: Vector) -> float:
 
 @settings(max_examples=8, deadline=None)
 @given(LIMITS, PLACES, ANGLES)
-def test_from_rest_to_rest_within_the_limits_without_overshoot_to_the_last_bit(
-    limits: Limits, place: Vector, yaw_rad: float
-) -> None:
+def test_rest_to_rest_keeps_limits_and_does_not_overshoot(limits: Limits, place: Vector, yaw_rad: float) -> None:
     target = still_target(place, yaw_rad, SAMPLES)
     motions, headings, end = led(START, target, limits, long_enough_s(limits, place))
     assert within(limits, motions, headings)
@@ -126,7 +124,7 @@ def circling(since_s: float, samples: int = SAMPLES) -> Target:
     return Target(motion, ALL_BOUND, heading)
 
 
-def test_a_moving_target_is_reached_and_then_followed_to_the_last_bit() -> None:
+def test_a_moving_target_is_reached_and_followed_exactly() -> None:
     reference, sample = START, 0
     for sample in range(round(30.0 / INTERVAL_S)):
         horizon, reference = lead(reference, circling(sample * INTERVAL_S), Limits(), INTERVAL_S)
@@ -137,7 +135,7 @@ def test_a_moving_target_is_reached_and_then_followed_to_the_last_bit() -> None:
 
 
 @given(st.integers(-3, 3), st.floats(0.0, 20.0))
-def test_a_plan_that_is_reached_is_the_reference_whatever_the_turn(turns: int, since_s: float) -> None:
+def test_a_plan_that_is_reached_is_the_reference(turns: int, since_s: float) -> None:
     target = circling(since_s)
     start = Reference(target.motion[0, :4].copy(), target.heading[0, :2] + np.array([tau * turns, 0.0]))
     plan = Horizon(*(target.motion[:, order] for order in range(5)), *target.heading.T)
@@ -153,9 +151,7 @@ def test_a_plan_that_is_reached_is_the_reference_whatever_the_turn(turns: int, s
 
 @settings(max_examples=15, deadline=None)
 @given(LIMITS, PLACES, PLACES)
-def test_a_target_that_jumps_takes_the_reference_along_within_the_limits(
-    limits: Limits, place: Vector, jumped: Vector
-) -> None:
+def test_a_target_that_jumps_is_followed_within_the_limits(limits: Limits, place: Vector, jumped: Vector) -> None:
     """The reference is on a target, to the last bit; the target jumps; the reference may not."""
     on_it = at(place)
     for follow in (still_target(jumped, 2.0, SAMPLES), still_target(jumped, -2.0, SAMPLES)):

@@ -57,7 +57,7 @@ def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle
 
 
 @pytest.mark.parametrize("controller", DESCRIBED)
-def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter(controller: str) -> None:
+def test_every_changeable_profile_number_is_a_parameter(controller: str) -> None:
     table = FLIGHT.table(controller)
     there = {described(path) for path in paths(table)}
     numbers = law_numbers(controller, table)
@@ -65,7 +65,7 @@ def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter(contr
     assert there - {described(number.path) for number in numbers} == NOT_IN_FLIGHT[controller]
 
 
-def test_every_number_of_the_vehicle_but_the_ground_under_it_and_its_sensors_is_a_parameter() -> None:
+def test_vehicle_numbers_are_parameters() -> None:
     tree = msgspec.to_builtins(HUMMINGBIRD)
     there = {described(path) for path in paths(tree) if path[0] not in ("ground", "sensors")}
     assert there == {described(number.path) for number in vehicle_numbers(tree)}

@@ -59,7 +59,7 @@ def flight() -> Flight:
     return Flight(load_profile("flight").with_choices("lpv-mpc", None), load_vehicle("hummingbird"))
 
 
-def test_a_change_gives_a_new_law_that_goes_on_with_the_old_ones_memory(flight: Flight) -> None:
+def test_a_retuned_law_keeps_the_memory_of_the_old_one(flight: Flight) -> None:
     for _ in range(5):
         flight.step()
     assert flight.parameters.set("LPV_POLE1", -8.0) is None
@@ -112,7 +112,7 @@ def test_what_is_only_asked_about_is_not_kept(flight: Flight) -> None:
     assert flight.parameters.take_changes() is None
 
 
-def test_subscribers_are_handed_each_change_once_and_the_law_only_where_it_has_changed(flight: Flight) -> None:
+def test_subscribers_receive_each_change_once(flight: Flight) -> None:
     handed: list[str] = []
     subscribers = Subscribers(
         parameters=(lambda _: handed.append("parameters"),),

@@ -106,7 +106,7 @@ def test_what_comes_in_good_measure_is_heard_at_once(stations: Stations) -> None
     assert heard_in_a_frame(links, stations, clock, 1e-4) == {0: 20, 1: 20}
 
 
-def test_the_last_words_of_a_connection_are_heard_and_open_no_other(stations: Stations) -> None:
+def test_the_last_bytes_of_a_connection_are_processed(stations: Stations) -> None:
     clock = Clock()
     link = FakeLink(0, 3)
     links = GroundLinks([link], clock, clock)
@@ -118,7 +118,7 @@ def test_the_last_words_of_a_connection_are_heard_and_open_no_other(stations: St
     assert len(stations.hub.channels) == before
 
 
-def test_a_connection_that_ends_takes_what_there_was_no_time_for_with_it(stations: Stations) -> None:
+def test_a_connection_that_ends_drops_its_pending_data(stations: Stations) -> None:
     clock = Clock()
     link = FakeLink(0, 50)
     links = GroundLinks([link], clock, clock)
@@ -170,7 +170,7 @@ def test_who_is_silent_is_heard_no_more(stations: Stations) -> None:
     ("udpin:0.0.0.0:14550", ("192.0.2.1", 5), False),
     ("serial:/dev/ttyACM0:57600", ("/dev/ttyACM0", 57600), False),
 ])  # fmt: skip
-def test_what_comes_from_this_computer_by_a_network_counts_as_its_own(
+def test_this_computers_network_address_counts_as_loopback(
     stations: Stations, url: str, address: Address, loopback: bool
 ) -> None:
     clock, link = Clock(), FakeLink(0, 1)

@@ -136,7 +136,7 @@ def test_a_link_beyond_this_computer_without_a_key(capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize("allows", ["--insecure", "--signing-key"])
-def test_a_link_beyond_this_computer_with_a_key_or_in_so_many_words(tmp_path: Path, allows: str) -> None:
+def test_a_remote_link_needs_a_key_or_an_explicit_option(tmp_path: Path, allows: str) -> None:
     (tmp_path / "key").write_text("0f" * 32)
     value = (str(tmp_path / "key"),) if allows == "--signing-key" else ()
     assert start("--gcs", "udpin:0.0.0.0:0", allows, *value) == 130

@@ -19,7 +19,7 @@ sys.stdin.read()
 """
 
 
-def test_a_second_flight_is_refused_in_one_line_until_the_first_has_ended_however_it_does(tmp_path: Path) -> None:
+def test_a_second_flight_in_a_folder_is_refused(tmp_path: Path) -> None:
     command = [sys.executable, "-c", HOLDER, str(tmp_path / "out")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout is not None

@@ -25,7 +25,7 @@ def test_what_is_loaded_is_not_looked_through_at_the_end() -> None:
 
 
 @pytest.mark.parametrize("enabled", [True, False])
-def test_no_garbage_is_looked_for_while_loading_and_afterwards_as_before(*, enabled: bool) -> None:
+def test_garbage_collection_pauses_while_loading(*, enabled: bool) -> None:
     (gc.enable if enabled else gc.disable)()
     try:
         with loading():

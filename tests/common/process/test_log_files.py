@@ -54,7 +54,7 @@ def no_file_beyond(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def test_on_a_full_disk_the_rows_before_stay_whole_and_it_is_said_once(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_once_and_rows_stay_whole(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     log = CsvLog(path, ("a", "b"))
     with no_file_beyond(15):
@@ -67,7 +67,7 @@ def test_on_a_full_disk_the_rows_before_stay_whole_and_it_is_said_once(tmp_path:
     assert path.read_text(encoding="utf-8") == "a,b\n1.25,2.5\n"
 
 
-def test_logs_that_are_over_get_one_number_that_none_of_them_has_had(tmp_path: Path) -> None:
+def test_finished_logs_get_a_new_number(tmp_path: Path) -> None:
     names = ("plant.csv", "flight.tlog")
     for name in (*names, "flight-1.tlog"):
         (tmp_path / name).write_text(name, encoding="utf-8")

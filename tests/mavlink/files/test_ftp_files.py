@@ -86,7 +86,7 @@ def test_a_burst_ends_with_its_session(client: Client, opcode: int) -> None:
     assert client.poll() == []
 
 
-def test_a_new_burst_replaces_the_old_one_and_gaps_are_filled_meanwhile(client: Client) -> None:
+def test_a_new_burst_replaces_the_old_one(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.send(Opcode.BURST, size=1)
     client.poll()
@@ -110,7 +110,7 @@ def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory
     assert client.poll() == []
 
 
-def test_a_file_that_grows_ends_where_it_ended_when_it_was_opened(client: Client, memory: Memory) -> None:
+def test_a_growing_file_keeps_its_size_while_open(client: Client, memory: Memory) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     memory.write(("text",), len(TEXT), b"more")
     assert b"".join(reply.data for reply in client.burst()) == TEXT

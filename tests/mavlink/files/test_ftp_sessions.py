@@ -54,7 +54,7 @@ def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Mem
     assert memory.open(("new",)).size == 5  # type: ignore[union-attr]
 
 
-def test_a_new_client_with_the_numbers_of_the_old_one_is_served_anew(client: Client) -> None:
+def test_a_new_client_reusing_sequence_numbers_is_served(client: Client) -> None:
     for _ in range(2):
         client.sequence = 0
         client.do(Opcode.CREATE, b"new")
@@ -110,7 +110,7 @@ def test_an_idle_session_ends(client: Client) -> None:
     assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
 
 
-def test_a_session_that_its_client_lost_is_taken_over_but_not_one_in_use(client: Client) -> None:
+def test_only_an_idle_session_is_taken_over(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.do(Opcode.OPEN_TO_READ, b"text")  # the answer was lost, and MAVSDK asks with another number
     assert client.ask(Opcode.OPEN_TO_READ, b"@PARAM/param.pck").error == Error.NO_SESSIONS

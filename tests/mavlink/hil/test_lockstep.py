@@ -90,7 +90,7 @@ def test_no_silence_makes_another_frame_than_the_first_begin_one(
     assert autopilot.receive(outgoing.datagram, 10.0 * CALL_AFTER_S) is None
 
 
-def test_a_heartbeat_in_mid_flight_does_not_make_the_plant_run_freely(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+def test_a_heartbeat_in_flight_does_not_end_lockstep(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     answer_to(plant, autopilot, 0)
     forged = encode_heartbeat(Codec(1, dialect.PLANT_COMPONENT), 0, 0, armed=False, custom_mode=FREE_RUNNING)

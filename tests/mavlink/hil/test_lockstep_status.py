@@ -56,7 +56,7 @@ def test_the_world_changes_with_the_answer_where_it_can_be_so(plant: PlantEnd, a
     assert plant.dropped["invalid"] == len(impossible)
 
 
-def test_what_became_of_it_comes_with_the_next_frame_however_often(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+def test_a_fault_result_comes_once_with_the_next_frame(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     results = (FaultResult(MOTOR, OFF, 0), FaultResult(MOTOR, WRONG, 2))
     datagram = offered(plant, 0, PlantStatus(None, results))
@@ -86,9 +86,7 @@ def test_the_battery_is_told_twice_a_second_and_to_who_is_new(plant: PlantEnd, a
     assert ReceivedFrame(frame_at(11 * INTERVAL_US), PlantStatus(BATTERY)) in frames
 
 
-def test_a_delay_travels_with_its_frame_and_where_there_is_none_nothing_does(
-    plant: PlantEnd, autopilot: AutopilotEnd
-) -> None:
+def test_a_delay_is_sent_with_its_frame(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     without, late = offered(plant, 0), offered(plant, 0, PlantStatus(delay_us=16_123))
     assert len(late) > len(without)

@@ -63,7 +63,7 @@ def test_it_calls_until_it_is_served_and_goes_on_with_heartbeats() -> None:
     assert heartbeat.fields.base_mode == mav.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def test_time_is_counted_from_the_first_frame_and_answered_as_it_came() -> None:
+def test_time_counts_from_the_first_frame() -> None:
     simulator = Simulator()
     got = simulator.send(frame(0), frame(1))
     assert [sensors.time_us for sensors in got] == [0, 4000]

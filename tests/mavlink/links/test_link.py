@@ -140,7 +140,7 @@ def test_a_malformed_url_of_a_ground_station_is_refused(url: str) -> None:
             function(url)
 
 
-def test_what_reaches_beyond_loopback_is_refused_unless_signed_or_asked_for() -> None:
+def test_a_remote_link_must_be_signed_or_requested() -> None:
     urls = ("udpin:127.0.0.1:0", "udpin:0.0.0.0:0")
     check_reach(urls, signed=True, insecure=False)
     check_reach(urls, signed=False, insecure=True)

@@ -168,9 +168,7 @@ def test_frames_in_pieces_between_noise_are_all_heard(device: Device, link: Seri
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_noise_has_broken_is_dropped_and_what_follows_is_heard(
-    device: Device, link: SerialLink, seed: int
-) -> None:
+def test_broken_frames_are_dropped_and_later_ones_received(device: Device, link: SerialLink, seed: int) -> None:
     rng = random.Random(seed)
     sent = [text(number) for number in range(20)]
     frames: list[bytes] = []
@@ -236,7 +234,7 @@ def test_one_that_was_away_unnoticed_keeps_its_channel(device: Device, link: Ser
     assert heard(link, 1) == [text(2)]
 
 
-def test_a_line_that_takes_nothing_loses_whole_frames_and_holds_nobody_up(device: Device, link: SerialLink) -> None:
+def test_a_blocked_line_drops_whole_frames(device: Device, link: SerialLink) -> None:
     sent = [text(number) for number in range(400)]
     for frame in sent:
         link.send(frame)

@@ -77,7 +77,7 @@ def test_several_clients_are_told_apart(server: GroundLink) -> None:
         assert one.recv(1000) == HEARTBEAT
 
 
-def test_half_a_frame_waits_for_the_other_half_of_the_same_client(server: GroundLink) -> None:
+def test_half_a_frame_waits_for_its_own_client(server: GroundLink) -> None:
     with caller(server) as one, caller(server) as two:
         one.sendall(b"noise" + TEXT[:20])
         two.sendall(HEARTBEAT[:5])
@@ -89,7 +89,7 @@ def test_half_a_frame_waits_for_the_other_half_of_the_same_client(server: Ground
         assert awaited(server.receive_now) == [(TEXT, one.getsockname()), (HEARTBEAT, one.getsockname())]
 
 
-def test_a_client_that_says_nothing_is_noticed_and_can_be_spoken_to(server: GroundLink) -> None:
+def test_a_silent_client_can_be_sent_to(server: GroundLink) -> None:
     with caller(server) as client:
 
         def opened() -> list[Address]:
@@ -213,7 +213,7 @@ class Listener(socket.socket):
         return super().accept()
 
 
-def test_a_server_with_clients_looks_for_others_now_and_then_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_with_clients_accepts_only_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     """A look costs a system call and an exception: too much for each of the polls between two frames."""
     now_s = [10.0]
     monkeypatch.setattr(tcp, "perf_counter", lambda: now_s[0])
@@ -245,7 +245,7 @@ def test_a_server_with_clients_looks_for_others_now_and_then_only(monkeypatch: p
         assert listener.asked > asked  # nobody is there: whoever comes is served at once
 
 
-def test_a_server_that_sleeps_is_woken_by_another_client_and_serves_it_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sleeping_server_is_woken_by_a_new_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "perf_counter", lambda: 10.0)
     with closing(open_ground_link("tcpin:127.0.0.1:0")) as server, caller(server) as one:
         one.sendall(HEARTBEAT)

@@ -18,7 +18,7 @@ ITEMS_500 = [some_item(number) for number in range(500)]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_500_items_up_and_down_over_a_link_that_loses_a_fifth_each_way(seed: int) -> None:
+def test_500_items_survive_20_percent_loss(seed: int) -> None:
     ground, station = Ground(), Station(FIRST)
     link = Link(ground, [station], seed, loss=0.2, unruly=0.0)
     station.upload(0, ITEMS_500, 0)

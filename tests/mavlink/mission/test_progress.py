@@ -21,7 +21,7 @@ def test_the_current_item_is_marked() -> None:
     assert [reply.fields.current for reply in replies] == [0, 1, 0]
 
 
-def test_where_the_mission_stands_is_told_once_a_second_and_at_once_on_change() -> None:
+def test_progress_is_sent_once_a_second_and_on_change() -> None:
     ground = Ground()
     (first,) = ground.poll()
     assert list(first.fields)[:4] == [0, 0xFFFF, mav.MISSION_STATE_NO_MISSION, 2]

@@ -98,7 +98,7 @@ def test_an_old_reader_sees_the_later_fields_cut_off() -> None:
     assert (decoded.target_system, decoded.type, decoded.mission_type) == (255, 0, 1)
 
 
-def test_a_lost_item_is_asked_for_again_every_quarter_of_a_second() -> None:
+def test_a_lost_item_is_requested_again_every_250_ms() -> None:
     ground = Ground()
     count(ground, 3)
     give(ground, 0, ITEMS[0])
@@ -110,7 +110,7 @@ def test_a_lost_item_is_asked_for_again_every_quarter_of_a_second() -> None:
     assert asked(give(ground, 1, ITEMS[1])) == [("MISSION_REQUEST_INT", 2)]
 
 
-def test_an_upload_that_stops_is_cancelled_and_the_old_plan_stays() -> None:
+def test_an_abandoned_upload_keeps_the_old_plan() -> None:
     ground = Ground()
     upload(ground, ITEMS)
     plan = ground.service.plans[MISSION]
@@ -124,7 +124,7 @@ def test_an_upload_that_stops_is_cancelled_and_the_old_plan_stays() -> None:
     assert results(upload(ground, ITEMS[:1])) == [ACCEPTED]
 
 
-def test_an_upload_given_up_for_a_download_is_not_cancelled_aloud() -> None:
+def test_an_upload_followed_by_a_download_ends_silently() -> None:
     """MAVSDK ends its download at any MISSION_ACK."""
     ground = Ground()
     count(ground, 2)
@@ -164,7 +164,7 @@ def test_a_repeated_count_begins_again() -> None:
     assert bits(ground.service.plans[MISSION].items) == bits(ITEMS[:2])
 
 
-def test_a_lost_acknowledgement_is_repeated_for_the_last_item_alone() -> None:
+def test_a_lost_ack_is_repeated_for_the_last_item_only() -> None:
     ground = Ground()
     upload(ground)
     assert give(ground, 2, ITEMS[2]) == []  # a copy that the link made
@@ -215,7 +215,7 @@ def test_partial_lists_are_unsupported() -> None:
         assert results(ground.hear(FIRST, name, *VEHICLE, 0, 1, 0)) == [mav.MAV_MISSION_UNSUPPORTED]
 
 
-def test_an_item_that_is_refused_ends_the_upload_and_the_old_plan_stays() -> None:
+def test_a_refused_item_keeps_the_old_plan() -> None:
     picky = Rules(lambda item: 9 if item.p1 == 0.5 else ACCEPTED, lambda items: 13 if len(items) == 1 else ACCEPTED)
     ground = Ground(picky)
     count(ground, 3)
@@ -262,7 +262,7 @@ def test_a_station_that_knows_only_the_old_messages() -> None:
     ]
 
 
-def test_a_station_that_nacks_the_old_request_is_asked_by_the_new() -> None:
+def test_a_nack_of_the_old_request_switches_to_the_new_one() -> None:
     """As MAVSDK."""
     ground = Ground()
     count(ground, 1)

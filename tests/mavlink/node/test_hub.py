@@ -53,7 +53,7 @@ def test_an_answer_takes_the_channel_that_the_question_came_on(ours: Hub) -> Non
     assert sent(ours) == [(1, SDK, ["PING"])]
 
 
-def test_what_is_for_all_goes_to_every_channel_with_its_own_numbers(ours: Hub) -> None:
+def test_a_broadcast_is_numbered_per_channel(ours: Hub) -> None:
     ours.open(0, GCS)
     ours.send([Send("PING", (1, 2, 0, 0), 0)])
     ours.open(1, SDK)
@@ -197,7 +197,7 @@ def unknown_frame() -> bytes:
     return bytes(frame)
 
 
-def test_messages_that_nobody_here_knows_are_forwarded_but_open_nothing(ours: Hub, service: Recorder) -> None:
+def test_unknown_messages_are_forwarded_but_open_no_channel(ours: Hub, service: Recorder) -> None:
     ours.receive(unknown_frame(), 0, GCS, 0)
     assert ours.channels == ()
     assert ours.dropped == {"stranger": 1}
@@ -248,7 +248,7 @@ def test_a_fixed_channel_is_the_one_that_its_target_is_heard_on(ours: Hub) -> No
     assert [channel.number for channel in ours.channels] == [number]
 
 
-def test_a_fixed_channel_without_an_address_takes_in_all_of_its_link(ours: Hub) -> None:
+def test_a_fixed_channel_without_address_takes_its_whole_link(ours: Hub) -> None:
     number = ours.open(0, None)
     ours.receive(Station().says(), 0, GCS, 0)
     ours.receive(Station(245).says(), 0, SDK, 0)
@@ -282,7 +282,7 @@ def test_fixed_channels_leave_no_room(ours: Hub, service: Recorder) -> None:
     assert ours.dropped == {"no room": 1}
 
 
-def test_a_channel_silent_for_long_is_forgotten_a_fixed_one_never(ours: Hub) -> None:
+def test_a_silent_channel_is_forgotten_unless_it_is_fixed(ours: Hub) -> None:
     ours.open(0, GCS)
     ours.receive(Station().says(), 1, SDK, 0)
     ours.poll(FORGET_AFTER_US)
@@ -291,7 +291,7 @@ def test_a_channel_silent_for_long_is_forgotten_a_fixed_one_never(ours: Hub) -> 
     assert [channel.address for channel in ours.channels] == [GCS]
 
 
-def test_a_connection_that_has_ended_is_forgotten_and_its_number_never_used_again(service: Recorder) -> None:
+def test_the_number_of_a_closed_channel_is_not_used_again(service: Recorder) -> None:
     observer = Observer()
     ours = Hub(1, 1, [service], observers=[observer])
     ours.open(0, GCS)

@@ -57,7 +57,7 @@ def test_unsigned_wrong_and_repeated_messages_change_nothing(service: Recorder) 
     assert ours.dropped == {"unsigned": 1, "bad signature": 1, "replayed": 2, "stranger": 1}
 
 
-def test_a_signed_message_keeps_its_signature_when_it_is_forwarded(service: Recorder) -> None:
+def test_a_forwarded_message_keeps_its_signature(service: Recorder) -> None:
     ours = Hub(1, 1, [service], signing=Signing(KEY, START))
     sdk = signed(245)
     ours.receive(packed(sdk), 0, SDK, 0)
@@ -92,7 +92,7 @@ def test_signing_is_set_up_over_loopback_and_told_to_nobody(service: Recorder) -
 
 
 @pytest.mark.parametrize("target", [(0, 0), (2, 1), (1, 7), (0, 1)])
-def test_signing_is_set_up_by_nothing_that_is_not_addressed_to_us(service: Recorder, target: tuple[int, int]) -> None:
+def test_signing_setup_must_be_addressed_to_us(service: Recorder, target: tuple[int, int]) -> None:
     signing = Signing(None, START)
     ours = Hub(1, 1, [service], signing=signing)
     ours.receive(Station(2).says(), 0, SDK, 0)
@@ -103,7 +103,7 @@ def test_signing_is_set_up_by_nothing_that_is_not_addressed_to_us(service: Recor
 
 
 @pytest.mark.parametrize(("loopback", "initial"), [(False, START), (True, 2**64 - 1)])
-def test_signing_is_not_set_up_from_beyond_nor_with_an_impossible_time(loopback: bool, initial: int) -> None:
+def test_signing_setup_is_refused_from_remote_or_at_a_bad_time(loopback: bool, initial: int) -> None:
     signing = Signing(None, START)
     ours = Hub(1, 1, [], signing=signing)
     ours.receive(setup(initial=initial), 0, GCS, 0, loopback=loopback)

@@ -144,7 +144,7 @@ def test_who_is_refused_hears_why_and_what_holds(name: str, value: Any, kind: in
     assert parameters[name] == held
 
 
-def test_an_integer_as_a_float_is_obeyed_where_it_can_mean_but_one() -> None:
+def test_an_integer_sent_as_float_is_accepted_if_exact() -> None:
     """As MAVProxy sets one after it has read the packed file, and DroneKit always."""
     parameters = parameters_of()
     for value in (-7.0, 16777215.0, 0.0):

@@ -82,7 +82,7 @@ def test_changes_are_counted_and_handed_out_once(parameters: Parameters) -> None
     assert parameters.take_changes() is None
 
 
-def test_what_was_made_for_a_change_is_handed_out_with_it_and_only_for_one_that_is_made(parameters: Parameters) -> None:
+def test_a_prepared_value_is_returned_with_its_change(parameters: Parameters) -> None:
     def prepare(name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
         return (
             ParamError.PERMISSION_DENIED

@@ -131,7 +131,7 @@ def test_the_mission_frame_names_no_place(vehicle: Vehicle) -> None:
     assert isnan(vehicle.obeyed[0].x)
 
 
-def test_a_command_without_a_place_takes_any_frame_and_plain_numbers(vehicle: Vehicle) -> None:
+def test_a_command_without_a_place_takes_any_frame(vehicle: Vehicle) -> None:
     receive(service_of({CALIBRATE: vehicle}), command_int(CALIBRATE, frame=1, x=2))
     assert vehicle.obeyed[0].x == 2.0
 

@@ -100,7 +100,7 @@ def test_memory_is_bounded() -> None:
 
 
 @given(st.lists(st.tuples(st.binary(max_size=70), st.integers(0, 255), st.integers(0, 31)), max_size=10))
-def test_nothing_that_is_typed_raises_or_comes_back_as_a_control_sequence(typed: list[tuple[bytes, int, int]]) -> None:
+def test_typed_text_never_raises_or_returns_control_bytes(typed: list[tuple[bytes, int, int]]) -> None:
     service = new()
     for text, count, flags in typed:
         type_in(service, text, count=count, flags=flags)

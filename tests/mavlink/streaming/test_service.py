@@ -268,7 +268,7 @@ def test_a_data_stream_is_a_group_of_messages(group: int) -> None:
     assert fly(stream, 10_000_000, 11_000_000) == []
 
 
-def test_asking_again_and_again_for_a_slow_stream_does_not_put_it_off() -> None:
+def test_repeated_requests_do_not_delay_a_slow_stream() -> None:
     stream = flying()
     told: Counter[str] = Counter()
     for start_us in range(0, 10_000_000, 500_000):

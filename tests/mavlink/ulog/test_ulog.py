@@ -102,7 +102,7 @@ def test_attitudes_keep_their_angles(phi: float, theta: float, psi: float) -> No
         assert abs(np.dot(found, expected)) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_the_truth_is_at_most_125_times_a_second_with_rotors_and_battery() -> None:
+def test_the_truth_is_logged_at_125_hz_at_most() -> None:
     blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0))
     east = dict.fromkeys(truth.COLUMNS, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
     east |= {"x": 1.0, "y": 2.0, "z": 3.0, "omega2": 5000.0, "voltage_v": 12.0}
@@ -119,7 +119,7 @@ def test_the_truth_is_at_most_125_times_a_second_with_rotors_and_battery() -> No
     assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 130.0, 0.935])
 
 
-def test_without_a_battery_there_is_none_and_numbers_beyond_all_bounds_are_written() -> None:
+def test_extreme_numbers_and_a_missing_battery_are_written() -> None:
     blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=1.0, capacity_ah=0.0))
     blocks.add([0.0, *[1e300] * (len(truth.COLUMNS) - 1)])
     log = read(blocks.take())
@@ -167,7 +167,7 @@ def snapshot(time_us: int, **changes: Any) -> Snapshot:
     return Snapshot(time_us=time_us, battery=battery, **(seen | changes))
 
 
-def test_a_vehicle_of_ground_stations_is_recorded_with_what_changes() -> None:
+def test_a_vehicle_of_ground_stations_is_recorded() -> None:
     parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
     recorder = Recorder("Test", 1, parameters, with_battery=True)
     content = recorder.begin()
@@ -204,7 +204,7 @@ def whole_messages(content: bytes) -> int:
     return whole
 
 
-def test_a_file_that_was_cut_off_anywhere_has_all_messages_before() -> None:
+def test_a_truncated_file_has_all_messages_before_the_cut() -> None:
     blocks = samples.SampleBlocks()
     for number in range(2):
         blocks.add(list(sample(8000 * number).values()))
@@ -217,7 +217,7 @@ def test_a_file_that_was_cut_off_anywhere_has_all_messages_before() -> None:
         assert ULog(BytesIO(BEGINNING[:end])).data_list == []
 
 
-def test_a_reader_that_has_lost_its_place_finds_it_at_the_next_block() -> None:
+def test_a_reader_resynchronises_at_the_next_block() -> None:
     blocks = samples.SampleBlocks()
     content = b"".join(blocks.add(list(sample(8000 * number).values())) for number in range(3 * BLOCK_ROWS))
     block = len(content) // 3

@@ -140,7 +140,7 @@ def test_every_bit_of_a_parameter_survives(pattern: int) -> None:
 
 
 @pytest.mark.parametrize("pattern", SIGNALLING)
-def test_the_bits_of_a_parameter_are_what_other_software_reads_in_place(pattern: int) -> None:
+def test_parameter_bits_are_read_in_place_by_other_software(pattern: int) -> None:
     frame = Codec(7, 9).encode("PARAM_SET", 1, 1, b"A", Bits(pattern), 6)
     assert int.from_bytes(frame[10:14], "little") == pattern
 
@@ -158,7 +158,7 @@ def test_a_parameter_may_still_be_a_float_and_come_in_mavlink_1() -> None:
 
 
 @given(st.binary(max_size=4))
-def test_the_bits_of_a_parameter_need_no_zeros_at_the_end_of_the_payload(value: bytes) -> None:
+def test_parameter_bits_survive_truncated_zeros(value: bytes) -> None:
     codec = Codec(7, 9)
     whole = value.ljust(4, b"\0")
     (message,) = codec.decode(codec.encode("PARAM_SET", 0, 0, b"", Bits(int.from_bytes(whole, "little")), 0))
@@ -187,7 +187,7 @@ def test_text_and_mavlink_1_are_messages_too() -> None:
 
 
 @given(st.lists(st.sampled_from(range(6)), max_size=5), st.binary(max_size=12))
-def test_a_good_frame_among_noise_is_found_and_the_noise_is_counted(order: list[int], noise: bytes) -> None:
+def test_a_good_frame_among_noise_is_found(order: list[int], noise: bytes) -> None:
     parts = [heartbeat(), noise, heartbeat()[:-1], b"\xfd", b"\xfd\x00\xff", heartbeat()[:-1] + b"\0"]
     datagram = b"".join(parts[i] for i in order)
     fast, slow = Codec(1, 1), Codec(1, 1)
@@ -205,7 +205,7 @@ def sealed_heartbeat() -> bytes:
     return codec.encode("HEARTBEAT", *HEARTBEAT)
 
 
-def test_what_is_sealed_is_the_whole_frame_that_says_that_it_is_signed() -> None:
+def test_the_signature_covers_the_whole_frame() -> None:
     codec, sealed = Codec(7, 9), []
     codec.seal = lambda frame: sealed.append(frame) or SIGNATURE  # type: ignore[func-returns-value]
     frame = codec.encode("HEARTBEAT", *HEARTBEAT)

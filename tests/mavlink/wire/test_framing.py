@@ -72,7 +72,7 @@ def test_noise_hides_frames_for_no_longer_than_a_frame_lasts(noise: bytes) -> No
     assert found.count(heartbeat) >= 40 - MAX_FRAME_BYTES // len(heartbeat) - 1
 
 
-def test_a_frame_with_a_wrong_checksum_does_not_take_its_neighbour_with_it() -> None:
+def test_a_bad_checksum_does_not_drop_the_next_frame() -> None:
     broken = FRAMES[0][:-1] + bytes([FRAMES[0][-1] ^ 1])
     framer = Framer()
     assert framer.take(broken + FRAMES[1]) == [FRAMES[1]]

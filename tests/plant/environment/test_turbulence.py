@@ -110,7 +110,7 @@ def test_seeds_differ() -> None:
     assert (blow(10, 0.004, 1) == blow(10, 0.004, 1)).all()
 
 
-def test_who_stands_in_the_wind_meets_the_eddies_of_who_flies_through_calm_air() -> None:
+def test_turbulence_depends_on_airspeed_alone() -> None:
     standing, flying = (Air(Weather(wind(text), turbulence="light", seed=5)) for text in ("8@270", "0@0"))
     velocity_0, eddies_0 = standing.begin(HEIGHT_M)
     velocity_1, eddies_1 = flying.begin(HEIGHT_M)

@@ -68,7 +68,7 @@ def test_torque_free_motion_conserves_energy_and_momentum(
 
 @settings(max_examples=25)
 @given(quaternions(), vectors(6.0), SPEEDS, SPEEDS)
-def test_rotors_that_change_their_speed_turn_the_body_the_other_way(
+def test_rotor_acceleration_turns_the_body_the_other_way(
     attitude: Quaternion, rate: Vector, speeds: Speeds, target: Speeds
 ) -> None:
     x = x_of(CALM, rate, CALM, attitude, speeds)

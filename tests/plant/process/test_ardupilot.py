@@ -44,7 +44,7 @@ def turned(bearings_deg: tuple[float, ...], directions: str) -> Rotors:
     return msgspec.structs.replace(VEHICLE.rotors, position_m=places, direction=turns)
 
 
-def test_a_stranger_flies_the_vehicle_from_the_ground_to_a_point_and_holds_it() -> None:
+def test_a_foreign_autopilot_takes_off_and_holds_a_point() -> None:
     end = standing()
     told = read(answered(end, request(0)))
     for count in range(1, 400 * 15):
@@ -83,7 +83,7 @@ def test_a_repeated_request_is_answered_from_memory() -> None:
     assert read(answered(end, request(1)))["timestamp"] == 2 / 400
 
 
-def test_an_ardupilot_that_starts_again_finds_the_vehicle_at_its_start() -> None:
+def test_a_restarted_ardupilot_finds_the_vehicle_at_its_start() -> None:
     end = standing()
     first = answered(end, request(0))
     for count in range(1, 200):
@@ -93,7 +93,7 @@ def test_an_ardupilot_that_starts_again_finds_the_vehicle_at_its_start() -> None
     assert end.restarts == 1
 
 
-def test_a_plant_that_starts_again_goes_on_with_whatever_it_is_asked_for() -> None:
+def test_a_restarted_plant_continues_at_the_time_requested() -> None:
     end = standing()
     assert read(answered(end, request(123456)))["timestamp"] == 1 / 400
     assert read(answered(end, request(123457)))["timestamp"] == 2 / 400
@@ -181,7 +181,7 @@ def plant(tmp_path: Path) -> Iterator[Process]:
 
 
 @begins_as_recorded
-def test_the_process_answers_whoever_asks_and_keeps_what_was_flown(plant: Process, tmp_path: Path) -> None:
+def test_the_process_answers_and_keeps_its_log(plant: Process, tmp_path: Path) -> None:
     with closing(open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))) as link:
         frame = plant.wait_for("frame")
         assert (frame["frame_type"], frame["thrust_expo"]) == (6, pytest.approx(0.739, abs=1e-3))

@@ -66,7 +66,7 @@ def test_answers_are_obeyed_alike_alone_and_among_others(answers: list[tuple[int
     assert alone.dropped == among.dropped
 
 
-def test_it_begins_when_it_is_called_and_waits_for_nobody_before_the_first_answer() -> None:
+def test_it_begins_with_the_first_call() -> None:
     for hello in (Px4().hello(), Px4().hello()[::-1]):  # two threads of PX4 say these
         end = SimulatorEnd(system_id=1)
         end.receive(Px4().answer(), PX4)
@@ -133,7 +133,7 @@ def test_controls_that_no_motor_could_follow(controls: tuple[float, ...], motors
     assert end.motors.controls == pytest.approx(motors)
 
 
-def test_a_second_autopilot_is_not_heard_until_the_first_has_gone() -> None:
+def test_a_second_autopilot_waits_for_the_first_to_end() -> None:
     end, px4 = connected()
     heartbeat = px4.hello()[1]
     end.receive(heartbeat, OTHER)
@@ -175,7 +175,7 @@ def test_nothing_that_comes_breaks_it(datagrams: list[bytes]) -> None:
     assert end.motors == STOPPED
 
 
-def test_the_controls_of_a_stranger_are_thrust_or_speed_in_the_order_of_the_vehicle_file() -> None:
+def test_foreign_controls_are_mapped_to_our_rotors() -> None:
     for name, wanted in {"jmavsim": (0.5, 0.6, 0.7, 0.8), "iris": (0.25, 0.36, 0.49, 0.64)}.items():
         rotors = load_vehicle(name).rotors
         controls = rotors.numbering().to_vehicle((0.25, 0.36, 0.49, 0.64))
@@ -221,7 +221,7 @@ def flown(px4: Px4, link: GroundLink) -> None:
     assert px4.known.position_m == pytest.approx(px4.target_ned_m, abs=0.05)
 
 
-def test_a_px4_takes_off_and_hovers_over_tcp_and_so_does_the_next(tmp_path: Path) -> None:
+def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
     with plant(tmp_path, "tcpin:127.0.0.1:0") as process:
         url = process.wait_for("listening")["url"].replace("tcpin", "tcp")
         sensors = process.wait_for("sensors")

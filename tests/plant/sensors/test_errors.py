@@ -38,7 +38,7 @@ def test_white_noise_has_its_density_at_every_interval() -> None:
         assert noise.mean(axis=0) == pytest.approx(0.0, abs=4.0 * 0.3 / (20_000 * interval_s) ** 0.5)
 
 
-def test_allan_deviation_falls_by_the_noise_and_rises_by_the_walk() -> None:
+def test_allan_deviation_shows_noise_and_walk() -> None:
     density, walk = 1.0, 0.05
     values = samples(Triad(density, walk, 0.0, 1e9, INTERVAL_S, chance(3)), 200_000)
     short_s, long_s = 0.1, 100.0

@@ -111,7 +111,7 @@ def test_hover_feels_like_standing() -> None:
     assert PHYSICS.specific_force(world) == pytest.approx(GRAVITY, abs=1e-3)
 
 
-def test_specific_force_is_the_change_of_velocity_without_gravity() -> None:
+def test_specific_force_is_acceleration_without_gravity() -> None:
     """Turned into the earth frame, over a flight that turns, falls and drags."""
     fast = Start(z=50.0, phi=20.0, theta=-10.0, vx=8.0, vy=-3.0, p=2.0, q=-1.0, r=1.0, rotors=rpm(HUMMINGBIRD, 400.0))
     order = command(500.0, 450.0, 520.0, 480.0, vehicle=HUMMINGBIRD)
@@ -164,7 +164,7 @@ def test_noise_of_those_that_are_read_at_every_frame() -> None:
         assert force.mean(axis=0) == pytest.approx(GRAVITY, abs=2e-3)
 
 
-def test_level_towards_true_north_the_field_points_ahead_right_and_down() -> None:
+def test_the_field_points_north_with_declination_and_dip() -> None:
     north = standing(quaternion_from_euler(0.0, 0.0, pi / 2))
     x, y, z = suite(flawless()).measure(north).magnetic_field_flu_gauss
     east, true_north, up = field_enu_gauss(DEFAULT_ORIGIN)

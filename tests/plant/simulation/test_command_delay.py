@@ -28,7 +28,7 @@ def test_the_last_that_has_arrived_is_followed() -> None:
     assert list(actuation.spans(16, 24)) == [(third, 8)]
 
 
-def test_a_command_for_now_is_followed_at_once_and_one_that_is_overtaken_never() -> None:
+def test_an_overtaken_command_is_never_followed() -> None:
     actuation = Actuation(command(0.0))
     actuation.arrive(0, command(0.1))
     actuation.arrive(0, command(0.2))

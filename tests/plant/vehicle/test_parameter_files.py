@@ -123,7 +123,7 @@ def test_a_fix_is_as_old_as_px4_and_ardupilot_are_told(name: str) -> None:
     assert fixes > 3
 
 
-def test_px4_is_told_of_a_delay_that_its_buffers_do_not_hold_and_of_a_rangefinder_without_one() -> None:
+def test_px4_parameters_warn_of_delay_and_rangefinder() -> None:
     vehicle = load_vehicle("hummingbird-rangefinder")
     assert px4_parameters(vehicle)["EKF2_RNG_DELAY"] == 0.0
     assert "EKF2_DELAY_MAX" not in px4_parameters(vehicle)
@@ -143,7 +143,7 @@ def test_the_file_for_px4_is_one_of_qgroundcontrol(name: str) -> None:
     assert list(found.values()) == pytest.approx(list(wanted.values()), rel=1e-6, abs=1.01e-6)
 
 
-def test_px4_is_given_no_value_that_it_begins_with_and_its_airframe_changes() -> None:
+def test_px4_parameters_leave_out_defaults() -> None:
     """It would pass over that, and fly by its airframe's: seen with PX4, whose '+' had the rotors of an 'x'."""
     lines = px4_file(load_vehicle("hummingbird").replace("sensors.gps.delay_s", 0.11), "by a test").splitlines()
     texts = {fields[2]: fields[3] for fields in (line.split("\t") for line in lines if not line.startswith("#"))}

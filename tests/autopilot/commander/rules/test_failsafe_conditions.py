@@ -88,7 +88,7 @@ def test_what_is_silent_is_so_since_it_was_heard_last(condition: Condition, inpu
 
 
 @pytest.mark.parametrize("condition", [Condition.STICKS_LOST, Condition.SETPOINTS_LOST])
-def test_a_stream_that_no_mode_asks_for_is_missed_only_if_it_was_lost_before(condition: Condition) -> None:
+def test_an_unneeded_stream_stays_lost_only_if_lost_before(condition: Condition) -> None:
     inputs = WELL._replace(sticks_us=HEARD_US, setpoint=PositionSetpoint(time_us=HEARD_US))
     assert condition not in Conditions().look(inputs, LIMITS, ())
     assert Conditions().look(inputs, LIMITS, (condition,))[condition] == HEARD_US
@@ -134,7 +134,7 @@ def test_who_is_steered_by_attitude_needs_no_position() -> None:
 
 
 @given(st.floats(0.0, 12.0), st.floats(0.5, 10.0), st.floats(1.0, 60.0))
-def test_the_way_to_rest_is_that_of_bounded_acceleration_and_jerk(speed: float, maximum: float, jerk: float) -> None:
+def test_stopping_distance_has_bounded_acceleration_and_jerk(speed: float, maximum: float, jerk: float) -> None:
     """Integrated: the acceleration rises to its bound, or to half of the change, and falls again."""
     peak = min(maximum, sqrt(speed * jerk))
     rise_s, flat_s = peak / jerk, (speed / peak - peak / jerk) if peak > 0.0 else 0.0

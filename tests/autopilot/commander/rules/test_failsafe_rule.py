@@ -39,7 +39,7 @@ def begun(wanted: Mapping[Condition, Action], flight: Flight = IN_FLIGHT) -> Ver
     return following(ARMED, NOW_US, dict.fromkeys(wanted, NOW_US - SECOND_US), set_to, flight)
 
 
-def test_every_condition_has_one_row_whose_default_is_among_its_choices() -> None:
+def test_every_condition_has_one_row_with_a_valid_default() -> None:
     assert sorted(row.condition for row in TABLE) == sorted(Condition)
     for row in TABLE:
         assert row.default in dict(row.choices)
@@ -49,7 +49,7 @@ def test_every_condition_has_one_row_whose_default_is_among_its_choices() -> Non
         assert len({row.default for row in rows}) == 1
 
 
-def test_every_parameter_of_the_table_exists_and_none_is_left_over() -> None:
+def test_the_table_and_the_parameters_match() -> None:
     known = {parameter.name for parameter in definitions(load_profile("flight"), load_vehicle("hummingbird"))}
     in_table = {name for row in TABLE for name in (*row.limits, row.delay, row.parameter) if name}
     assert in_table <= known
@@ -135,7 +135,7 @@ def run(memory: Memory, seconds: float, since: Mapping[Condition, int], action: 
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
-def test_what_is_over_is_said_once_unless_the_rotors_must_stop_first(row: Row) -> None:
+def test_the_end_of_a_condition_is_reported_once(row: Row) -> None:
     memory = begun({row.condition: Action.HOLD}).memory
     assert run(memory, 3.0, {}, Action.HOLD, IN_FLIGHT) == ([] if row.kept else [f"{row.condition}: cleared"])
 
@@ -152,7 +152,7 @@ def test_a_link_that_comes_and_goes_is_lost_once() -> None:
     assert CLEAR_AFTER_US == SECOND_US
 
 
-def test_a_pilot_who_chooses_is_obeyed_until_something_else_is_lost() -> None:
+def test_a_pilots_choice_holds_until_another_condition_begins() -> None:
     memory = begun({Condition.BATTERY_CRITICAL: Action.LAND}).memory
     since = {Condition.BATTERY_CRITICAL: 0}
     chosen = IN_FLIGHT._replace(mode=Mode.HOLD)
@@ -170,7 +170,7 @@ def test_on_the_ground_the_rotors_stop(condition: Condition, action: Action) -> 
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
-def test_with_the_rotors_standing_nothing_is_done_and_little_said(row: Row) -> None:
+def test_disarmed_only_grounded_rows_are_reported(row: Row) -> None:
     lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
     _, done, said = following(Memory(), NOW_US, {row.condition: 0}, everything(Action.LAND), lying)
     assert done is Action.NONE
@@ -186,7 +186,7 @@ def test_all_that_holds_begins_anew_at_arming() -> None:
     assert following(memory, NOW_US + 8000, since, set_to, lying._replace(armed=True)).action is Action.TERMINATE
 
 
-def test_the_flight_takes_with_it_what_is_watched_in_flight_alone() -> None:
+def test_in_flight_conditions_end_with_the_flight() -> None:
     memory = begun({Condition.STATION_LOST: Action.LAND, Condition.GPS_LOST: Action.HOLD}).memory
     lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
     after = following(memory, NOW_US + 8000, dict.fromkeys(Condition, 0), everything(Action.LAND), lying)

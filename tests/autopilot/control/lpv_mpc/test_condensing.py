@@ -74,7 +74,7 @@ def test_the_cost_is_the_sum_over_the_horizon(rng: np.random.Generator) -> None:
     assert (H == H.T).all()
 
 
-def test_rotor_rows_hold_just_where_every_rotor_is_within_its_limits(rng: np.random.Generator) -> None:
+def test_rotor_rows_hold_iff_rotors_are_within_limits(rng: np.random.Generator) -> None:
     u = rng.normal(size=3) * 0.05
     thrust = rng.uniform(4.0, 12.0, STEPS)
     rows = 2 * condensing.ROTORS * len(STARTS)
@@ -96,7 +96,7 @@ def tilt_of(phi: float, theta: float) -> float:
     return float(np.arccos(np.cos(phi) * np.cos(theta)))
 
 
-def test_motion_rows_hold_just_where_the_slacks_cover_what_is_exceeded(rng: np.random.Generator) -> None:
+def test_motion_rows_hold_iff_slacks_cover_the_excess(rng: np.random.Generator) -> None:
     u = rng.normal(size=3) * 0.05
     responses = responses_of(rng, u)
     schedule = np.zeros((STEPS, len(prediction.SCHEDULE)))  # without a tilt: no tangent

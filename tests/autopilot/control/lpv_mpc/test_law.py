@@ -55,9 +55,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> No
 
 
 @pytest.mark.parametrize("status", [QpStatus.INFEASIBLE, QpStatus.TIME_OUT, QpStatus.NOT_ACCURATE])
-def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
-    monkeypatch: pytest.MonkeyPatch, status: QpStatus
-) -> None:
+def test_fallbacks_are_shifted_plan_then_lqr_then_descent(monkeypatch: pytest.MonkeyPatch, status: QpStatus) -> None:
     controller, planner = build()
     failing(monkeypatch, status, after=3)
     decisions = steps(controller, planner, ON_SPIRAL, 40)
@@ -150,7 +148,7 @@ def test_the_plan_itself_respects_the_rotors(max_speed: float) -> None:
 
 
 @pytest.mark.parametrize("u", [(3.0, 0.0, 0.0), (-2.0, 2.0, 0.5), (0.0, 0.0, -1.0)])
-def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[float, float, float]) -> None:
+def test_the_qp_after_any_fallback_moments_is_feasible(u: tuple[float, float, float]) -> None:
     """Moments that no rotor could make, further from what one can than the largest increment."""
     controller, planner = build()
     memory = controller.initial(VEHICLE.hover_speed)._replace(moments=np.array(u))
@@ -193,7 +191,7 @@ def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
     assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)
 
 
-def test_thrust_gives_way_where_it_leaves_too_little_to_stop_a_tilt() -> None:
+def test_thrust_gives_way_to_stop_a_tilt() -> None:
     """Turning fast towards the limit under full thrust: the rotors make half of it, and moments with the rest."""
     controller, _ = build()
     planner = Planner(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is

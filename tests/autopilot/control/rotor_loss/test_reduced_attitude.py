@@ -135,7 +135,7 @@ def test_rotors_that_do_not_turn_in_two_pairs_are_refused() -> None:
     assert not rotor_loss.look(HOVER, (0.5, 0.5, 0.5, 0.5), 0.0, airborne=True, ground_m=-1.0)
 
 
-def test_a_change_that_costs_the_landing_on_three_rotors_is_refused() -> None:
+def test_a_change_that_prevents_rotor_loss_landing_is_refused() -> None:
     rotor_loss = RotorLoss(HUMMINGBIRD, 8000)
     with pytest.raises(ThreeRotorsError, match="no landing on three rotors"):
         rotor_loss.try_out(with_rotors(direction=("ccw", "ccw", "ccw", "cw")))

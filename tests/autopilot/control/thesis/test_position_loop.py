@@ -23,7 +23,7 @@ AT_REST = (0.0, 0.0, 0.0)
 
 
 @given(vectors(3.0), vectors(3.0), reals(10.0))
-def test_the_thrust_makes_the_acceleration_that_the_poles_ask_for(error: Vector, speed: Vector, yaw: float) -> None:
+def test_the_thrust_gives_the_acceleration_of_the_poles(error: Vector, speed: Vector, yaw: float) -> None:
     """Feedback linearisation: on the nonlinear body the closed loop is e'' = -k1 e - k2 e' on every axis."""
     controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -1.5)), VEHICLE)
     demand = controller.step(AT_REST, speed, error, AT_REST, yaw)

@@ -25,7 +25,7 @@ def followed(true_kg: float, thrust_n: float, seconds: float, model: MassModel =
 
 @pytest.mark.parametrize("thrust_n", [5.0, 14.0])
 @pytest.mark.parametrize("ratio", [0.8, 1.2])
-def test_the_specific_thrust_follows_as_a_lag_whatever_the_thrust_is(ratio: float, thrust_n: float) -> None:
+def test_the_specific_thrust_follows_as_a_lag_at_any_thrust(ratio: float, thrust_n: float) -> None:
     after_s = 1.0 / SETTINGS.rate_1_s
     specific = NOMINAL_KG / followed(ratio * NOMINAL_KG, thrust_n, after_s)
     assert (specific - 1.0) / (1.0 / ratio - 1.0) == pytest.approx(1.0 - np.exp(-1.0), abs=1e-3)

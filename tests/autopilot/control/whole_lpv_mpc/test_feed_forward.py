@@ -70,7 +70,7 @@ def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> No
     assert np.abs(motion[1:, 10:] - asked.rates).max() < 0.05
 
 
-def test_the_thrust_points_along_the_force_and_the_nose_where_yaw_says() -> None:
+def test_the_thrust_points_along_the_force_at_the_yaw() -> None:
     attitude = np.empty((3, 3))
     force = np.array([2.0, -1.0, 6.0])
     feed_forward.point(force, 2.2, attitude)
@@ -105,7 +105,7 @@ def test_near_references_are_taken_as_they_are() -> None:
     assert all((one == other).all() for one, other in zip(references, near, strict=True))
 
 
-def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -> None:
+def test_a_slow_motion_leads_back_from_far_away() -> None:
     """At the approach speed of 3 m/s, 50 m away: neither the place nor the speed of the reference is asked for."""
     _, near = approached(np.array([53.0, 0.0, 0.0]), np.array([-3.0, 0.0, 0.0]))
     assert np.abs(np.diff(near[0], axis=0) / INTERVAL_S - near[1][:-1]).max() < 0.2
@@ -114,7 +114,7 @@ def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -
     assert np.abs(near[2][0]).max() < 1.6
 
 
-def test_the_way_back_is_one_motion_and_keeps_to_its_acceleration() -> None:
+def test_the_approach_is_smooth_and_within_its_acceleration() -> None:
     """A vehicle that falls at 6 m/s, 1 m off a place that stands."""
     still = np.zeros((STEPS + 2, 3))
     p, v, a = near = (still.copy(), still.copy(), still.copy())

@@ -62,7 +62,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_without_a_solution_the_last_plan_goes_on_and_then_the_recovery_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fallbacks_are_shifted_plan_then_recovery(monkeypatch: pytest.MonkeyPatch) -> None:
     flight = Flight(HOVERING._replace(x=0.3))
     flight.follow("hover:height=20", 0.04)
     failing(monkeypatch)

@@ -37,7 +37,7 @@ def test_the_nominal_motion_is_the_plants(seed: int) -> None:
     assert abs(motion[-1, 6:10] @ x[9:]) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_squared_speeds_follow_as_one_linear_lag_and_spinning_up_turns_the_body_back() -> None:
+def test_rotor_lag_is_linear_and_spin_up_turns_the_body() -> None:
     rigid = np.array([0.0] * 6 + [1.0, 0.0, 0.0, 0.0] + [0.0] * 3)
     commands = np.tile([0.5, 0.3, 0.5, 0.3], (STEPS, 1))
     motion, speeds = rolled(HUMMINGBIRD.without(["drag"]), rigid, np.full(ROTORS, 0.4), commands)

@@ -61,14 +61,14 @@ def test_references_at_a_changing_speed_move_as_they_say() -> None:
     assert np.abs((v[2:] - v[:-2]) / (2.0 * INTERVAL_S) - a[1:-1])[within].max() < 5e-3
 
 
-def test_speeds_are_carried_over_linear_in_each_block_and_within_their_bounds() -> None:
+def test_path_speeds_are_carried_over_within_their_bounds() -> None:
     speeds, last = np.empty(SAMPLES), np.linspace(1.0, 0.2, 12)
     path.carry_speeds(last, STARTS, 0.3, 0.9, speeds)
     assert speeds[STARTS].tolist() == pytest.approx([1.0, last[2], last[6], 0.3])
     assert speeds == pytest.approx(np.interp(np.arange(SAMPLES), STARTS, speeds[STARTS]))
 
 
-def test_what_each_speed_changes_is_the_derivative_of_the_deviation() -> None:
+def test_speed_effects_are_derivatives_of_the_deviation() -> None:
     references, nominal = horizon(), speeds_of(SPEEDS)
     (p, v, _, _), slopes, _ = slid(references, nominal)
     responses = np.zeros((SAMPLES - 1, DEVIATIONS, (ROTORS + 1) * len(SPEEDS)))
@@ -81,7 +81,7 @@ def test_what_each_speed_changes_is_the_derivative_of_the_deviation() -> None:
 
 
 @pytest.mark.parametrize("reward", [100.0, -100.0])
-def test_a_minimum_with_speeds_at_their_upper_bounds_is_free_where_the_cost_falls_towards_them(reward: float) -> None:
+def test_a_minimum_with_speeds_at_their_bounds_can_be_free(reward: float) -> None:
     rng = np.random.default_rng(1)
     root, n = rng.normal(size=(10, 10)), 10
     lower, upper = np.full(n, -20.0), np.full(n, 20.0)

@@ -37,7 +37,7 @@ def test_what_is_beyond_a_bound_or_has_no_minimum_is_not_free(spoil: str) -> Non
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_bounds_hold_the_nominal_plan_and_keep_every_command_within_its_limits(seed: int) -> None:
+def test_bounds_keep_the_commands_within_their_limits(seed: int) -> None:
     rng = np.random.default_rng(seed)
     limits = np.stack([np.full(6, 0.01), rng.uniform(0.6, 1.0, 6)], axis=1)
     commands = rng.uniform(limits[:, :1], limits[:, 1:], (6, ROTORS))
@@ -51,14 +51,14 @@ def test_bounds_hold_the_nominal_plan_and_keep_every_command_within_its_limits(s
         assert (held <= limits[:, 1:] + 1e-12).all()
 
 
-def test_the_last_plan_is_carried_over_as_its_mean_beyond_what_references_ask_for() -> None:
+def test_the_last_plan_is_carried_over_as_block_means() -> None:
     last, commands = np.arange(1.0, 5.0)[:, None] * np.ones(ROTORS), np.full((6, ROTORS), 0.5)
     corrections = np.zeros((4, ROTORS))
     planning.carry_over(last, commands, STARTS, corrections)
     assert corrections[:, 0].tolist() == pytest.approx([0.5, 0.5, 2.0, 3.5])
 
 
-def test_commands_that_ask_for_both_ends_of_the_range_in_a_block_leave_it_a_correction() -> None:
+def test_a_block_of_extreme_commands_keeps_a_correction() -> None:
     limits = np.tile([0.0, 1.0], (6, 1))
     commands = np.tile(np.array([0.4, 0.6, 0.5, 0.0, 1.0, 1.0])[:, None], ROTORS)
     planning.ease(commands, STARTS, limits)

@@ -21,7 +21,7 @@ def test_an_attitude_turns_at_its_rates() -> None:
     assert euler_from_quaternion(still) == pytest.approx(euler_from_quaternion(attitude))
 
 
-def test_attitude_height_and_speed_stay_right_for_as_long_as_a_landing_takes() -> None:
+def test_the_inertial_estimate_lasts_for_a_landing() -> None:
     flight = airborne(Feedback.SENSORS)
     thrower = Thrower("autopilot.estimation.estimator:Estimator.step")
     thrower.arm()

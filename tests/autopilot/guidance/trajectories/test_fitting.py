@@ -97,7 +97,7 @@ def test_paths_that_begin_and_end_on_the_floor(tmp_path: Path, seed: int) -> Non
     assert heights(track).min() >= -ROUNDING_M
 
 
-def test_what_is_far_too_fast_is_slowed_down_to_what_can_be_flown(tmp_path: Path) -> None:
+def test_a_track_that_is_too_fast_is_slowed_down(tmp_path: Path) -> None:
     track, changed = fit(waypoints(tmp_path, DIPS, 30.0), reach(), 0.0)
     assert excess(track, MARGIN) <= 1.0
     assert changed.endswith("7 legs stretched by 3.34 to 4.12: thrust")
@@ -119,7 +119,7 @@ def test_what_may_not_be_changed_is_refused_by_its_leg(tmp_path: Path, text: str
     assert str(refused.value) == f"{tmp_path / 'points.csv'}: {why}"
 
 
-def test_a_start_in_motion_at_twenty_hertz_is_no_reason_to_refuse(tmp_path: Path) -> None:
+def test_a_start_in_motion_at_20_hz_is_accepted(tmp_path: Path) -> None:
     """It asks for 103 N for some milliseconds; the vehicle cuts that short and is a centimetre off."""
     rows = [f"{0.05 * k:.2f},{0.005 * k:.4f},0,2\n" for k in range(200)]
     track, changed = fit(waypoints(tmp_path, "t,x,y,z\n" + "".join(rows)), reach(), 0.0)

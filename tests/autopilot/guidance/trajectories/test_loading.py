@@ -174,7 +174,7 @@ def test_the_example_of_the_docs_flies(tmp_path: Path) -> None:
     assert rows["z_ref"] == pytest.approx(1.0 + 0.2 * rows["t"])
 
 
-def test_a_foreign_track_may_give_numbers_for_what_does_not_change(theirs: FlyTheirs) -> None:
+def test_a_foreign_track_may_return_constants(theirs: FlyTheirs) -> None:
     level = example().replace("1.0 + self.climb * t", "2").replace("duration_s=60.0", "lambda t: 0.5, 60.0")
     assert theirs(level, "helix", "--link", "direct", "--duration", "1") == (0, "")
 

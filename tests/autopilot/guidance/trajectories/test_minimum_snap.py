@@ -56,7 +56,7 @@ def test_it_passes_every_point_in_time_and_rests_at_both_ends(
 
 
 @pytest.mark.parametrize("order", [SNAP, ACCELERATION])
-def test_every_derivative_up_to_twice_its_order_less_two_is_continuous(order: int) -> None:
+def test_derivatives_are_continuous_up_to_twice_the_order(order: int) -> None:
     """Up to the third by construction, and from there to the sixth because it is the minimum."""
     curve = minimise(order, TIMES_S, POINTS)
     inner = TIMES_S[1:-1]

@@ -69,7 +69,7 @@ def differences(values: Array) -> Array:
 
 @pytest.mark.parametrize("begin_us", [0, 1_500_000, 20_000_000])
 @pytest.mark.parametrize("name", [*THESIS_TRACKS, *ENDLESS, "waypoints"])
-def test_by_formula_each_quantity_is_the_derivative_of_the_one_before(tmp_path: Path, name: str, begin_us: int) -> None:
+def test_formulas_are_derivatives_of_each_other(tmp_path: Path, name: str, begin_us: int) -> None:
     """Between the samples where a path leaves its first point and comes to its last, and its yaw is held."""
     flown = track(waypoint_file(tmp_path)) if name == "waypoints" else track(name)
     horizon = Planner(flown, "by-formula", Preview(round(FINE_S * 1e6), 2000)).horizon(begin_us)
@@ -127,7 +127,7 @@ def test_after_waypoints_it_rests_at_the_last(tmp_path: Path, interval_us: int, 
 
 @pytest.mark.parametrize("name", [*THESIS_TRACKS, *ENDLESS, "waypoints"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_reference_of_an_instant_is_what_the_planner_hands_out(tmp_path: Path, name: str, kind: References) -> None:
+def test_the_planner_returns_the_reference_of_an_instant(tmp_path: Path, name: str, kind: References) -> None:
     flown = track(waypoint_file(tmp_path)) if name == "waypoints" else track(name)
     planner = Planner(flown, kind, Preview(100_000, 1))
     times_us = range(0, 130_000_000, 700_000)

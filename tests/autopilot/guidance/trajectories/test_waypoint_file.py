@@ -30,9 +30,7 @@ def test_columns_in_any_order(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("speed", "times_s"), [(None, [0.0, 3.0, 5.0, 9.0]), (1.0, [0.0, 6.0, 10.0, 18.0])])
-def test_times_from_the_speed_the_first_and_last_leg_at_half_of_it(
-    tmp_path: Path, speed: float | None, times_s: list[float]
-) -> None:
+def test_times_from_a_speed_halve_it_on_the_end_legs(tmp_path: Path, speed: float | None, times_s: list[float]) -> None:
     waypoints = read(tmp_path, "x,y,z\n0,0,0\n3,0,0\n3,4,0\n3,4,4\n", speed)
     assert waypoints.times_s == pytest.approx(times_s)
     assert waypoints.yaw_rad is None
@@ -67,7 +65,7 @@ def test_what_cannot_be_flown_is_one_line(tmp_path: Path, text: str, line: str) 
         track(f"waypoints:{tmp_path / 'points.csv'}")
 
 
-def test_times_at_twenty_hertz_are_not_refused_for_their_rounding(tmp_path: Path) -> None:
+def test_rounded_times_at_20_hz_are_accepted(tmp_path: Path) -> None:
     """0.15 - 0.1 is a little less than 0.05."""
     rows = [f"{0.05 * k:.2f},{0.001 * k},0,1\n" for k in range(100)]
     assert len(read(tmp_path, "t,x,y,z\n" + "".join(rows)).times_s) == 100

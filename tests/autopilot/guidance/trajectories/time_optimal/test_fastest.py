@@ -57,7 +57,7 @@ def bang_bang(distance_m: float, acceleration_m_s2: float, drag_1_s: float) -> f
 
 
 @pytest.mark.long
-def test_a_straight_line_is_flown_nearly_as_fast_as_thrust_and_tilt_allow(tmp_path: Path) -> None:
+def test_a_straight_line_is_flown_near_the_thrust_limit(tmp_path: Path) -> None:
     """Rotors that need no time to turn the vehicle over would be 12 % faster."""
     flown = loaded(tmp_path, LINE)
     motion = exact_motion(flown.track)
