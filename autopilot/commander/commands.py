@@ -9,14 +9,10 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.mavlink.services.command import (
-    ACCEPTED,
-    DENIED,
     FAILED,
     UNSUPPORTED,
     Command,
     Handler,
-    Outcome,
-    outcome_of,
 )
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -36,7 +32,6 @@ class Commands:
     """
 
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
-        """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""
         self._pilot = pilot
         self._needs = needs
         self._home = pilot.home
@@ -48,10 +43,10 @@ class Commands:
             **self.motion.handlers(),
             mav.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mav.MAV_CMD_DO_SET_MODE: self._set_mode,
-            mav.MAV_CMD_NAV_LAND: lambda _: self._select(Mode.LAND),
-            mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self._select(Mode.RETURN),
-            mav.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self._select(Mode.HOLD),
-            mav.MAV_CMD_MISSION_START: lambda _: self._select(Mode.MISSION),
+            mav.MAV_CMD_NAV_LAND: lambda _: self.select(Mode.LAND),
+            mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self.select(Mode.RETURN),
+            mav.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self.select(Mode.HOLD),
+            mav.MAV_CMD_MISSION_START: lambda _: self.select(Mode.MISSION),
             mav.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_or_go_on,
             mav.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
             mav.MAV_CMD_DO_SET_HOME: self._set_home,
@@ -65,60 +60,58 @@ class Commands:
             return Refusal("this vehicle has no such mode", UNSUPPORTED)
         return self._pilot.select(mode, self._needs.missing())
 
-    def _select(self, mode: Mode) -> Outcome:
-        return outcome_of(self.select(mode))
-
-    def _arm_disarm(self, command: Command) -> Outcome:
+    def _arm_disarm(self, command: Command) -> Refusal | None:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
-            return outcome_of(self._pilot.arm(self._needs.missing(), force=force))
+            return self._pilot.arm(self._needs.missing(), force=force)
         if command.p1 == 0.0:
-            return outcome_of(self._pilot.disarm(force=force))
-        return Outcome(DENIED, "arm with 1, disarm with 0")
+            return self._pilot.disarm(force=force)
+        return Refusal("arm with 1, disarm with 0")
 
-    def _set_mode(self, command: Command) -> Outcome:
+    def _set_mode(self, command: Command) -> Refusal | None:
+        self._needs.engage(command.peer, command.now_us)
         numbers = (command.p1, command.p2, 0.0 if isnan(command.p3) else command.p3)
         if not all(0.0 <= number < 256.0 and number == int(number) for number in numbers):
-            return Outcome(DENIED, "mode refused: not a PX4 main and sub mode")
+            return Refusal("mode refused: not a PX4 main and sub mode")
         base, main, sub = map(int, numbers)
         if not base & _CUSTOM:
-            return Outcome(UNSUPPORTED, "mode refused: only custom modes are known")
-        return outcome_of(self.select(mode_of(main, sub)))
+            return Refusal("mode refused: only custom modes are known", UNSUPPORTED)
+        return self.select(mode_of(main, sub))
 
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
         """Change the mode by a SET_MODE message; return why not."""
         return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
 
-    def _pause_or_go_on(self, command: Command) -> Outcome:
+    def _pause_or_go_on(self, command: Command) -> Refusal | None:
         if command.p1 == 0.0:
-            return self._select(Mode.HOLD)
-        return self._select(Mode.MISSION) if command.p1 == 1.0 else Outcome(DENIED, "pause with 0, go on with 1")
+            return self.select(Mode.HOLD)
+        return self.select(Mode.MISSION) if command.p1 == 1.0 else Refusal("pause with 0, go on with 1")
 
-    def _change_speed(self, command: Command) -> Outcome:
+    def _change_speed(self, command: Command) -> Refusal | None:
         """Set the speed over ground; -1 leaves it, -2 is the parameters'."""
         kind, speed, _, relative = command[1:5]
         if kind not in _OVER_GROUND and not isnan(kind):
-            return Outcome(UNSUPPORTED, "speed refused: only that over ground can be set")
+            return Refusal("speed refused: only that over ground can be set", UNSUPPORTED)
         if relative == 1.0:
-            return Outcome(UNSUPPORTED, "speed refused: only absolute ones can be set")
+            return Refusal("speed refused: only absolute ones can be set", UNSUPPORTED)
         if speed == _DEFAULT_SPEED:
             self._pilot.fly_at(None)
         elif self.motion.may_fly_at(speed):
             self._pilot.fly_at(speed)
         elif speed != _SAME_SPEED:
             return denied("speed", f"{speed:g} m/s")
-        return Outcome()
+        return None
 
-    def _set_home(self, command: Command) -> Outcome:
+    def _set_home(self, command: Command) -> Refusal | None:
         if command.p1 == 1.0:
             state = self._pilot.context().state
             self._home.move(state.position_enu_m, state.euler[2])
-            return Outcome()
+            return None
         if command.p1 != 0.0 and not isnan(command.p1):
             return denied("home", "1 is here, 0 is there")
         if not is_on_earth(command.x, command.y) or not isfinite(command.z):
             return denied("home", "not a latitude, longitude and altitude")
-        return outcome_of(self.move_home(Geodetic(command.x, command.y, command.z)))
+        return self.move_home(Geodetic(command.x, command.y, command.z))
 
     def move_home(self, place: Geodetic) -> Refusal | None:
         """Set home to a place on earth; return why not."""
@@ -129,12 +122,12 @@ class Commands:
         self._home.move(home, self._home.yaw_rad)
         return None
 
-    def _terminate(self, command: Command) -> Outcome:
+    def _terminate(self, command: Command) -> Refusal | None:
         if command.p1 == 1.0:
-            return outcome_of(self._pilot.disarm(force=True))
-        return Outcome(DENIED, "flight terminated by 1 alone, and never undone")
+            return self._pilot.disarm(force=True)
+        return Refusal("flight terminated by 1 alone, and never undone")
 
-    def _check(self, command: Command) -> Outcome:
+    def _check(self, command: Command) -> Refusal | None:
         del command
         reasons = self._pilot.readiness.refusals()
-        return Outcome(FAILED, "not ready: " + "; ".join(reasons)) if reasons else Outcome(ACCEPTED)
+        return Refusal("not ready: " + "; ".join(reasons), FAILED) if reasons else None

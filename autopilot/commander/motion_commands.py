@@ -14,13 +14,11 @@ from colibri.autopilot.guidance.tasks.task import FlightTask
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
+from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import (
-    DENIED,
     TEMPORARILY_REJECTED,
     Command,
     Handler,
-    Outcome,
-    outcome_of,
 )
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -45,12 +43,15 @@ class Needs(Protocol):
         """Return the needs that nothing meets now."""
         ...
 
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Let `peer`, which requests a mode that is steered, be the one that steers."""
+        ...
+
 
 class MotionCommands:
     """Handlers of the commands to move: a method a command."""
 
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
-        """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""
         self._pilot = pilot
         self._fence = fence
         self._needs = needs
@@ -83,7 +84,7 @@ class MotionCommands:
     def _fly(self, mode: Mode, task: FlightTask) -> Refusal | None:
         return self._pilot.fly(mode, task, self._needs.missing())
 
-    def _take_off(self, command: Command) -> Outcome:
+    def _take_off(self, command: Command) -> Refusal | None:
         """Climb to z, or to the parameter's height: QGC sends it above sea level, others above home."""
         pilot = self._pilot
         height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
@@ -96,16 +97,14 @@ class MotionCommands:
         refusal = self._fence.refusal((x, y, height_m))
         if refusal is not None:
             return denied("take-off", refusal.reason)
-        return outcome_of(
-            self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
-        )
+        return self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
 
     def _height_of_takeoff(self, command: Command) -> float:
         """Return the height, m: z is above home, but above sea level from QGC, which sends a pitch of -1."""
         above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
         return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
 
-    def _reposition(self, command: Command) -> Outcome:
+    def _reposition(self, command: Command) -> Refusal | None:
         """Fly to a place, or stop where none is given. The flag that requests a mode change is not needed."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return denied("reposition", f"a flag of {command.p2:g} is not known")
@@ -115,9 +114,9 @@ class MotionCommands:
         if not (isnan(speed) or self.may_fly_at(speed)):
             return denied("reposition", f"a speed of {speed:g} m/s")
         if all(map(isnan, (command.x, command.y, command.z, command.p4))):
-            return outcome_of(self._fly(Mode.HOLD, HoldTask()))
+            return self._fly(Mode.HOLD, HoldTask())
         frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
-        return outcome_of(self._go(command.x, command.y, command.z, frame, command.p4, speed))
+        return self._go(command.x, command.y, command.z, frame, command.p4, speed)
 
     def _go(self, x: float, y: float, z: float, frame: int, yaw_ned: float, speed: float) -> Refusal | None:
         pilot = self._pilot
@@ -142,7 +141,7 @@ class MotionCommands:
     def _flies(self) -> bool:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
-    def _orbit(self, command: Command) -> Outcome:
+    def _orbit(self, command: Command) -> Refusal | None:
         """Fly around; z is above sea level whatever the frame, as MAVSDK and PX4 take it."""
         pilot = self._pilot
         if not self._flies:
@@ -162,10 +161,9 @@ class MotionCommands:
         refusal = self._no_circle(circle)
         if refusal is not None:
             return denied("orbit", refusal.reason)
-        return outcome_of(self._fly(Mode.ORBIT, OrbitTask(circle, context)))
+        return self._fly(Mode.ORBIT, OrbitTask(circle, context))
 
     def _no_circle(self, circle: Circle) -> Refusal | None:
-        """Return why the vehicle may not fly a circle; None if it may."""
         (x, y, z), radius, speed, yaw_behaviour = circle
         if not MIN_RADIUS_M <= abs(radius) <= MAX_DISTANCE_M:
             return Refusal(f"a radius of {radius:g} m")
@@ -177,7 +175,7 @@ class MotionCommands:
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
         return self._home.refusal(z) or next(filter(None, map(self.unreachable, around)), None)
 
-    def _turn(self, command: Command) -> Outcome:
+    def _turn(self, command: Command) -> Refusal | None:
         """Turn on the spot; the angle counts clockwise from north, or from the heading now where p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):
@@ -185,13 +183,13 @@ class MotionCommands:
         if relative not in (0.0, 1.0):
             return denied("turn", "1 counts from the heading, 0 from north")
         if not self._flies:
-            return Outcome(TEMPORARILY_REJECTED, "turn refused: the vehicle is not flying")
+            return Refusal("turn refused: the vehicle is not flying", TEMPORARILY_REJECTED)
         context = self._pilot.context()
         zero_rad = context.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
-        return outcome_of(self._fly(Mode.HOLD, GoToTask(GoTo(context.place, yaw), context)))
+        return self._fly(Mode.HOLD, GoToTask(GoTo(context.place, yaw), context))
 
 
-def denied(what: str, reason: str) -> Outcome:
+def denied(what: str, reason: str) -> Refusal:
     """Return that a command is denied, with the status text."""
-    return Outcome(DENIED, f"{what} refused: {reason}")
+    return Refusal(f"{what} refused: {reason}")

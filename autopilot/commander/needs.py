@@ -6,6 +6,7 @@ from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Need
 from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.mavlink.node.service import Peer
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 
 _TARGET_LOST_US = 10_000_000
@@ -17,6 +18,10 @@ class Latest(Protocol[_T]):
 
     def latest(self, now_us: int, timeout_us: int) -> _T | None:
         """Return the newest, if it is no older than `timeout_us`."""
+        ...
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Let `peer` be the one whose messages count."""
         ...
 
 
@@ -33,7 +38,6 @@ class ModeNeeds:
         *,
         takes_attitude: bool,
     ) -> None:
-        """Judge by these parts; `takes_attitude`: whether the control law takes attitude setpoints."""
         self._pilot, self._missions = pilot, missions
         self._manual, self._offboard, self._follow = manual, offboard, follow
         self._takes_attitude = takes_attitude
@@ -42,6 +46,11 @@ class ModeNeeds:
     def at(self, now_us: int) -> None:
         """Set the time of the messages that come next."""
         self._now_us = now_us
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Let `peer`, which requests a mode that is steered, be the one that steers."""
+        for service in (self._offboard, self._manual, self._follow):
+            service.engage(peer, now_us)
 
     def missing(self) -> tuple[Need, ...]:
         """Return the needs that nothing meets now; any message may change that."""

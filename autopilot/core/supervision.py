@@ -82,7 +82,7 @@ class Supervision:
     def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
         """Return the inputs of the failsafes' conditions."""
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
-        sticks = stations.setpoints.manual.latest(now_us, _EVER_US)
+        sticks = stations.manual.latest(now_us, _EVER_US)
         decision = parts.actuation.decision
         return FailsafeInputs(
             now_us=now_us,
@@ -91,7 +91,7 @@ class Supervision:
             mode=pilot.state.mode,
             standing=pilot.ground.standing,
             estimate=parts.state_source.estimate,
-            setpoint=stations.setpoints.offboard.latest(now_us, _EVER_US),
+            setpoint=stations.offboard.latest(now_us, _EVER_US),
             sticks_us=None if sticks is None else sticks.time_us,
             listening_us=self._listening_us,
             station_us=stations.station_us,

@@ -29,7 +29,6 @@ class BatteryMonitor:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Begin with a full battery."""
         self._model = BatteryModel(vehicle)
         self._battery = vehicle.battery
         self._cells = 0 if vehicle.battery is None else max(1, round(vehicle.battery.full_voltage_v / _CELL_V))

@@ -3,7 +3,8 @@
 MAV_CMD_PREFLIGHT_CALIBRATION, and the lines "[cal] ..." by which PX4 reports progress: ground stations read them.
 """
 
-from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Command
+from colibri.mavlink.wire.refusal import Refusal
 
 _STEP_US = 100_000
 _STEPS = 10
@@ -14,27 +15,26 @@ class Calibration:
     """Goes through one calibration at a time."""
 
     def __init__(self) -> None:
-        """Calibrate nothing yet."""
         self._kind = ""
         self._step = 0
         self._due_us = 0
 
-    def begin(self, command: Command, *, armed: bool) -> Outcome:
+    def begin(self, command: Command, *, armed: bool) -> Refusal | None:
         """Obey a command: calibrate what its parameters choose, or stop where they choose nothing."""
         if armed:
-            return Outcome(DENIED, "calibration refused: the rotors are armed")
+            return Refusal("calibration refused: the rotors are armed")
         chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
         kind = _kind_of(chosen)
         if kind is None:
-            return Outcome(UNSUPPORTED, "calibration refused: only gyro, mag, accel and level are known")
+            return Refusal("calibration refused: only gyro, mag, accel and level are known", UNSUPPORTED)
         if kind and self._kind:
-            return Outcome(TEMPORARILY_REJECTED, "calibration refused: another one is under way")
+            return Refusal("calibration refused: another one is under way", TEMPORARILY_REJECTED)
         if not kind:
             cancelled, self._kind = self._kind, ""
             self._step = -1 if cancelled else 0
         else:
             self._kind, self._step, self._due_us = kind, 0, command.now_us
-        return Outcome()
+        return None
 
     def poll(self, now_us: int) -> list[str]:
         """Return the lines that are due."""

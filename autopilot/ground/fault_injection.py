@@ -7,7 +7,7 @@ acknowledged: what is accepted has happened.
 from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
-from colibri.mavlink.services.command import DENIED, FAILED, LATER, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, Command
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -19,27 +19,27 @@ class Failures:
     """Hands faults on to the plant, and its answers back."""
 
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        """Have none; what flies by `feedback` has them at all where the other end `relays` them."""
+        """`relays`: whether the plant takes faults; those of sensors exist with feedback of sensors only."""
         self._relays = relays
         self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []
         self._pending: tuple[Fault, Command] | None = None
 
-    def inject(self, command: Command, *, enabled: bool) -> Outcome:
+    def inject(self, command: Command, *, enabled: bool) -> Refusal | None:
         """Obey a command, or say why not; what became of it comes by `poll`."""
         if not enabled:
-            return Outcome(DENIED, "failure refused: parameter SYS_FAILURE_EN is 0")
+            return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
         if not self._relays:
-            return Outcome(UNSUPPORTED, "failure refused: this simulator takes none")
+            return Refusal("failure refused: this simulator takes none", UNSUPPORTED)
         fault = fault_from(command.p1, command.p2, command.p3, (command.p4, command.x, command.y, command.z))
         if fault is None:
-            return Outcome(DENIED, "failure refused: unit, type and instance must be whole numbers")
+            return Refusal("failure refused: unit, type and instance must be whole numbers")
         judgement = judged(fault, self._parts)
         if isinstance(judgement, Refusal):
-            return Outcome(judgement.result, f"failure refused: {judgement.reason}")
+            return Refusal(f"failure refused: {judgement.reason}", judgement.result)
         self._to_send.append(judgement)
         self._pending = (judgement, command)
-        return Outcome(LATER)
+        return PENDING
 
     def take(self) -> tuple[Fault, ...]:
         """Return the faults to hand on with the next answer, and forget them."""
@@ -48,7 +48,7 @@ class Failures:
         faults, self._to_send = tuple(self._to_send), []
         return faults
 
-    def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Outcome] | None:
+    def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Refusal | None] | None:
         """Take in the plant's results of faults; return the command that has come to its end, and how."""
         if self._pending is None:
             return None
@@ -59,12 +59,12 @@ class Failures:
                 return command, _outcome(reported.result)
         if not 0 <= now_us - command.now_us < ANSWERED_WITHIN_US:
             self._pending = None
-            return command, Outcome(FAILED, "failure refused: the plant does not answer")
+            return command, Refusal("failure refused: the plant does not answer", FAILED)
         return None
 
 
-def _outcome(result: int) -> Outcome:
+def _outcome(result: int) -> Refusal | None:
     if result == RESULT_ACCEPTED:
-        return Outcome()
+        return None
     why = "impossible numbers" if result == RESULT_DENIED else "it has no such part"
-    return Outcome(result, f"failure refused by the plant: {why}")
+    return Refusal(f"failure refused by the plant: {why}", result)

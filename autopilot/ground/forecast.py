@@ -21,7 +21,7 @@ class Forecaster:
     """Integrates the plans of one vehicle's control law."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
-        """Take plans whose steps are `interval_s` apart, and hold the attitude in `columns`; None: they hold none."""
+        """Take plans whose steps are `interval_s` apart; `columns` None: they hold no attitude."""
         self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg

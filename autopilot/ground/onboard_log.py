@@ -17,7 +17,6 @@ class OnboardLog:
     """Records snapshots and status texts while the rotors are armed."""
 
     def __init__(self, recorder: Recorder, files: Files) -> None:
-        """Write what `recorder` makes of them into folder `logs` of `files`."""
         self._recorder = recorder
         self._log = FlightLog(files, (LOGS,))
         self._snapshot: Snapshot | None = None

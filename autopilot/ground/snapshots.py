@@ -48,7 +48,6 @@ class SnapshotBuilder:
     """Takes the snapshots of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
-        """Expect a control sample every `interval_s`; `columns` say where the law's plan holds the attitude."""
         self._interval_s = interval_s
         self._columns = columns
         self.adopt(vehicle)
@@ -77,18 +76,7 @@ class SnapshotBuilder:
     ) -> Snapshot:
         """Return the vehicle as it is now.
 
-        Args:
-            now_us: Simulated time.
-            state: The vehicle.
-            pilot: Who flies it.
-            guidance: What the control law was given.
-            decision: What it made of that; None while the rotors stand or idle.
-            duration_s: How long it took.
-            controls: Rotor commands, parts of the largest speed.
-            battery: Its battery; None without one.
-            fence: Where it may be.
-            state_source: How the state is known.
-            breached: Whether it is where it must not be.
+        `decision` took `duration_s`, and is None while the rotors rest; `controls` are parts of the largest speed.
         """
         sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
         mode, armed = pilot.state

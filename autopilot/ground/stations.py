@@ -13,7 +13,6 @@ from colibri.autopilot.commander.rules.modes import MODES, custom_mode, mode_of_
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, OnboardLog
-from colibri.autopilot.ground.setpoint_sources import SetpointSources
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
@@ -33,11 +32,8 @@ from colibri.mavlink.parameters.pack import packed
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import (
-    Command,
     CommandService,
     Handler,
-    Outcome,
-    outcome_of,
 )
 from colibri.mavlink.services.identity import IDENTITIES
 from colibri.mavlink.services.origin import OriginService, Setters
@@ -96,7 +92,8 @@ class Stations:
 
     Attributes:
         hub: Where the links meet.
-        setpoints: The setpoint sources.
+        offboard: Setpoints of companions.
+        manual: Sticks of a pilot.
         plans: The uploaded plans, and the protocol about them.
         missions: Flies the plans.
         fence: Keeps the vehicle inside.
@@ -119,29 +116,15 @@ class Stations:
         takes_attitude: bool,
         caught: Caught | None = None,
     ) -> None:
-        """Serve for `pilot` and the `missions` that it flies.
-
-        Args:
-            settings: Towards ground stations.
-            pilot: Obeys commands.
-            missions: Take the plans.
-            fence: Rules out places.
-            lines: Status texts of these parts.
-            parameters: All numbers that can be changed.
-            recorder: Makes the log that is downloaded.
-            takes_attitude: Whether the control law takes attitude setpoints.
-            caught: Is told of exceptions of a service; None: they are raised.
-        """
+        """`caught` receives exceptions of a service; None: they are raised."""
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._caught = lines, pilot, caught
         self._text = StatusText()
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
-        self.setpoints = sources = SetpointSources(Offboard(), Manual(settings.system_id), Follow())
+        self.offboard, self.manual, self._follow = Offboard(), Manual(settings.system_id), Follow()
         self.missions, self.fence = missions, fence
-        self.needs = ModeNeeds(
-            pilot, missions, sources.manual, sources.offboard, sources.follow, takes_attitude=takes_attitude
-        )
+        self.needs = ModeNeeds(pilot, missions, self.manual, self.offboard, self._follow, takes_attitude=takes_attitude)
         self.system = SystemCommands(
             pilot, missions, parameters, identity=settings.identity, system_id=settings.system_id
         )
@@ -152,7 +135,7 @@ class Stations:
         self._streams = StreamService(telemetry(settings.boot_unix_us))
         modes = StandardModes(
             [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES],
-            lambda number, _: outcome_of(commands.select(mode_of_custom(number))),
+            lambda number, _: commands.select(mode_of_custom(number)),
         )
         metadata = Metadata(metadata_json(parameters))
         files = _files(settings, metadata, parameters)
@@ -167,9 +150,9 @@ class Stations:
             TimeService(),
             ParameterService(parameters),
             self.plans,
-            sources.offboard,
-            sources.manual,
-            sources.follow,
+            self.offboard,
+            self.manual,
+            self._follow,
             OriginService(setters, self._text),
             Ftp(files),
             Logs(files, (LOGS,), lambda: self.log.name),
@@ -206,7 +189,8 @@ class Stations:
         self.snapshot = snapshot
         self._heartbeat.update(snapshot)
         self._streams.update(snapshot)
-        self.setpoints.update(snapshot, vehicle.euler[2])
+        self.offboard.update(snapshot.position_enu_m, vehicle.euler[2], snapshot.origin, snapshot.home)
+        self._follow.update(snapshot.origin)
 
     def go_on(self) -> None:
         """Send the mode at least, where the vehicle's state could not be taken in."""
@@ -242,7 +226,6 @@ class Stations:
         return self.take_outbox()
 
     def _tell(self, now_us: int) -> None:
-        """Report the progress of the mission, and of commands to the system."""
         for seq in self.missions.take_reached():
             self.plans.reached(seq)
         for text in self.system.poll(now_us):
@@ -279,7 +262,6 @@ class Stations:
         return said
 
     def _provide(self, modes: StandardModes, metadata: Metadata) -> None:
-        """Have the streams answer requests for messages that are not streamed."""
         provide, version = self._streams.provide, self.system.version
         provide("AUTOPILOT_VERSION", lambda command: [to(command.peer, "AUTOPILOT_VERSION", *version)])
         provide("AVAILABLE_MODES", modes.available_modes)
@@ -288,27 +270,16 @@ class Stations:
         provide("MISSION_CURRENT", lambda command: [to(command.peer, "MISSION_CURRENT", *self.plans.current())])
 
     def _handlers(self, commands: Commands, modes: StandardModes) -> Mapping[int, Handler]:
-        flight = commands.handlers()
         return {
-            **flight,
+            **commands.handlers(),
             **self._streams.handlers(),
             **modes.handlers(),
             **self.system.handlers(),
             mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.plans.do_set_mission_current,
-            mav.MAV_CMD_DO_SET_MODE: self._engaging(flight[mav.MAV_CMD_DO_SET_MODE]),
             mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
                 command, enabled=self._pilot.behaviour.inject_failures
             ),
         }
-
-    def _engaging(self, handler: Handler) -> Handler:
-        """Let the client that requests a steered mode be the one that steers."""
-
-        def obey(command: Command) -> Outcome:
-            self.setpoints.engage(command.peer, command.now_us)
-            return handler(command)
-
-        return obey
 
 
 def _files(settings: StationSettings, metadata: Metadata, parameters: Parameters) -> Files:

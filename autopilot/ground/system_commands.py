@@ -10,7 +10,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.ground.calibration import Calibration
 from colibri.common.earth.geodesy import Geodetic, is_on_earth
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import ACCEPTED, DENIED, Command, Handler, Outcome, outcome_of
+from colibri.mavlink.services.command import Command, Handler
 from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
 from colibri.mavlink.wire.dialect import mav
@@ -32,7 +32,6 @@ class SystemCommands:
     def __init__(
         self, pilot: Pilot, missions: Missions, parameters: Parameters, *, identity: str, system_id: int
     ) -> None:
-        """Obey for `pilot`, its `missions` and `parameters`; `identity` is a name of `identity.IDENTITIES`."""
         self._pilot, self._missions, self._parameters = pilot, missions, parameters
         self._calibration = Calibration()
         self.banner = banner(IDENTITIES[identity], VERSION)
@@ -45,9 +44,7 @@ class SystemCommands:
             mav.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
             mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
-            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: outcome_of(
-                self.set_origin(Geodetic(command.x, command.y, command.z))
-            ),
+            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: self._set_origin,
         }
 
     def shell(self) -> Mapping[str, ShellCommand]:
@@ -72,24 +69,27 @@ class SystemCommands:
         self._missions.moved_origin()
         return None
 
-    def _calibrate(self, command: Command) -> Outcome:
+    def _set_origin(self, command: Command) -> Refusal | None:
+        return self.set_origin(Geodetic(command.x, command.y, command.z))
+
+    def _calibrate(self, command: Command) -> Refusal | None:
         return self._calibration.begin(command, armed=self._pilot.state.armed)
 
-    def _restart(self, command: Command) -> Outcome:
+    def _restart(self, command: Command) -> Refusal | None:
         if self._pilot.state.armed:
-            return Outcome(DENIED, "restart refused: the rotors are armed")
+            return Refusal("restart refused: the rotors are armed")
         if command.p1 not in (REBOOT, SHUT_DOWN):
-            return Outcome(DENIED, "restart with 1, shut down with 2")
+            return Refusal("restart with 1, shut down with 2")
         self.restart = command.p1
-        return Outcome()
+        return None
 
-    def _storage(self, command: Command) -> Outcome:
+    def _storage(self, command: Command) -> Refusal | None:
         """Obey PREFLIGHT_STORAGE: parameters are stored as they change, so only the reset does anything."""
         if command.p1 == 2.0:
             if self._pilot.state.armed:
-                return Outcome(DENIED, "parameters refused: the rotors are armed")
+                return Refusal("parameters refused: the rotors are armed")
             self._parameters.reset()
-        return Outcome(ACCEPTED) if command.p1 in (0.0, 1.0, 2.0) else Outcome(DENIED, "storage: 0, 1 or 2")
+        return None if command.p1 in (0.0, 1.0, 2.0) else Refusal("storage: 0, 1 or 2")
 
     def _status(self) -> str:
         mode, armed = self._pilot.state

@@ -24,7 +24,7 @@ from colibri.mavlink.mission.items import (
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
-from colibri.mavlink.services.command import DEGREES, DENIED, GLOBAL_FRAMES, Command, Outcome, outcome_of
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, Command
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -201,17 +201,17 @@ class MissionService:
         self._announce()
         return plan
 
-    def do_set_mission_current(self, command: Command) -> Outcome:
+    def do_set_mission_current(self, command: Command) -> Refusal | None:
         """Obey MAV_CMD_DO_SET_MISSION_CURRENT."""
         seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
         if not (-1.0 <= seq <= 0xFFFF and seq == int(seq)):
-            return Outcome(DENIED, "mission: not a sequence number")
+            return Refusal("mission: not a sequence number")
         if reset not in (0.0, 1.0):
-            return Outcome(DENIED, "mission: reset is 0 or 1")
+            return Refusal("mission: reset is 0 or 1")
         refusal = self._vehicle.set_current(int(seq), reset == 1.0)
         if refusal is None:
             self._announce()
-        return outcome_of(refusal)
+        return refusal
 
     def _announce(self) -> None:
         """Have the next poll send where the mission stands, changed or not."""

@@ -22,8 +22,8 @@ IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 UNSUPPORTED_MAV_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out."""
 
-LATER = -1
-"""The result of a command that is obeyed within a few frames: its sender receives nothing before `finish`."""
+PENDING = Refusal(result=-1)
+"""The answer to a command that is obeyed within a few frames: its sender receives nothing before `finish`."""
 
 PROGRESS_UNKNOWN = 0xFF
 """COMMAND_ACK.progress of a command that is obeyed later."""
@@ -50,7 +50,6 @@ PROGRESS_EVERY_US = 1_000_000
 REMEMBERED_FOR_US = 10_000_000
 MAX_REMEMBERED = 64
 SAME_REASON_AFTER_US = 1_000_000
-_REFUSED = (TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED)
 
 
 class Command(NamedTuple):
@@ -76,20 +75,8 @@ class Command(NamedTuple):
     now_us: int
 
 
-class Outcome(NamedTuple):
-    """What became of a command; where it was refused, why, for the STATUSTEXT that goes with the COMMAND_ACK."""
-
-    result: int = ACCEPTED
-    reason: str = ""
-
-
-def outcome_of(refusal: Refusal | None) -> Outcome:
-    """Return what became of a command that was refused, or done at once."""
-    return Outcome() if refusal is None else Outcome(refusal.result, refusal.reason)
-
-
-Handler: TypeAlias = Callable[[Command], Outcome]
-"""Obeys one kind of command. Must check every parameter that it uses: they may be anything."""
+Handler: TypeAlias = Callable[[Command], Refusal | None]
+"""Obeys one kind of command, or refuses it. Must check every parameter that it uses: they may be anything."""
 
 
 @dataclass(slots=True)
@@ -102,7 +89,7 @@ class _Answered(NamedTuple):
     parameters: tuple[str, ...]
     confirmation: int
     at_us: int
-    outcome: Outcome
+    refusal: Refusal | None
 
 
 class CommandService:
@@ -129,17 +116,17 @@ class CommandService:
         fields = message.fields
         if message.name == "COMMAND_CANCEL":
             # Nothing can be cancelled: what is in progress goes on. "If it has already completed [it] can be ignored".
-            return [_ack(fields.command, peer, Outcome(IN_PROGRESS))] if fields.command in self._running else []
+            return [_ack(fields.command, peer, IN_PROGRESS)] if fields.command in self._running else []
         if self.closed:
-            return [_ack(fields.command, peer, Outcome(DENIED)), *self._reason(Outcome(DENIED, self.closed), now_us)]
+            return [_ack(fields.command, peer, DENIED), *self._reason(Refusal(self.closed), now_us)]
         handler = self._handlers.get(fields.command)
         if handler is None:
-            return [_ack(fields.command, peer, Outcome(UNSUPPORTED))]
+            return [_ack(fields.command, peer, UNSUPPORTED)]
         if message.name == "COMMAND_LONG":
             return self._obey(handler, _from_long(fields, peer, now_us), fields.confirmation)
         goes_to_a_place = _goes_to_a_place(fields.command)
         if goes_to_a_place and fields.frame not in PLACES:
-            return [_ack(fields.command, peer, Outcome(UNSUPPORTED_MAV_FRAME))]
+            return [_ack(fields.command, peer, UNSUPPORTED_MAV_FRAME)]
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -152,11 +139,11 @@ class CommandService:
         for number, running in self._running.items():
             if not 0 < running.report_at_us - now_us <= PROGRESS_EVERY_US:
                 running.report_at_us = now_us + PROGRESS_EVERY_US
-                sends.append(_ack(number, running.command.peer, Outcome(IN_PROGRESS)))
+                sends.append(_ack(number, running.command.peer, IN_PROGRESS))
         self._schedule()
         return sends
 
-    def finish(self, command_id: int, peer: Peer, outcome: Outcome) -> list[Send]:
+    def finish(self, command_id: int, peer: Peer, refusal: Refusal | None) -> list[Send]:
         """Return the last COMMAND_ACK of the command of `peer` that was in progress; nothing if none was."""
         running = self._running.get(command_id)
         if running is None or running.command.peer != peer:
@@ -164,8 +151,7 @@ class CommandService:
         del self._running[command_id]
         self._schedule()
         now_us = running.command.now_us
-        self._remember(running.command, 0, outcome, now_us)
-        return [_ack(command_id, peer, outcome), *self._reason(outcome, now_us)]
+        return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
     def _obey(self, handler: Handler, command: Command, confirmation: int) -> list[Send]:
         """Obey a command unless it was sent again only because its answer got lost, or another is in progress.
@@ -175,39 +161,40 @@ class CommandService:
         running = self._running.get(command.id)
         if running is not None:
             if running.command.peer == command.peer and _parameters(running.command) == _parameters(command):
-                return [_ack(command.id, command.peer, Outcome(IN_PROGRESS))]
-            return [_ack(command.id, command.peer, Outcome(TEMPORARILY_REJECTED))]
+                return [_ack(command.id, command.peer, IN_PROGRESS)]
+            return [_ack(command.id, command.peer, TEMPORARILY_REJECTED)]
         before = self._answered.get((command.peer, command.id))
         if before is not None and _is_sent_again(command, confirmation, before):
-            self._remember(command, confirmation, before.outcome, before.at_us)
-            return [_ack(command.id, command.peer, before.outcome)]
-        outcome = handler(command)
-        if outcome.result == LATER:
+            return [self._answered_with(command, confirmation, before.refusal, before.at_us)]
+        refusal = handler(command)
+        if refusal is PENDING:
             self._running[command.id] = _Running(command, command.now_us + PROGRESS_EVERY_US)
             self._schedule()
             return []
-        self._remember(command, confirmation, outcome, command.now_us)
-        return [_ack(command.id, command.peer, outcome), *self._reason(outcome, command.now_us)]
+        ack = self._answered_with(command, confirmation, refusal, command.now_us)
+        return [ack, *self._reason(refusal, command.now_us)]
 
     def _schedule(self) -> None:
         self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
 
-    def _remember(self, command: Command, confirmation: int, outcome: Outcome, at_us: int) -> None:
+    def _answered_with(self, command: Command, confirmation: int, refusal: Refusal | None, at_us: int) -> Send:
+        """Remember the answer to a command, and return its COMMAND_ACK."""
         key = (command.peer, command.id)
         self._answered.pop(key, None)
         if len(self._answered) >= MAX_REMEMBERED:
             del self._answered[next(iter(self._answered))]
-        self._answered[key] = _Answered(_parameters(command), confirmation, at_us, outcome)
+        self._answered[key] = _Answered(_parameters(command), confirmation, at_us, refusal)
+        return _ack(command.id, command.peer, ACCEPTED if refusal is None else refusal.result)
 
-    def _reason(self, outcome: Outcome, now_us: int) -> list[Send]:
+    def _reason(self, refusal: Refusal | None, now_us: int) -> list[Send]:
         """Send to all why a command was refused, the same reason not more than once a second."""
-        if not outcome.reason or outcome.result not in _REFUSED:
+        if refusal is None or not refusal.reason:
             return []
         reason, at_us = self._said
-        if reason == outcome.reason and 0 <= now_us - at_us < SAME_REASON_AFTER_US:
+        if reason == refusal.reason and 0 <= now_us - at_us < SAME_REASON_AFTER_US:
             return []
-        self._said = (outcome.reason, now_us)
-        return self._text.say(ERROR if outcome.result == FAILED else WARNING, outcome.reason)
+        self._said = (refusal.reason, now_us)
+        return self._text.say(ERROR if refusal.result == FAILED else WARNING, refusal.reason)
 
 
 def _goes_to_a_place(number: int) -> bool:
@@ -241,7 +228,7 @@ def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bo
     return recent and confirmation > before.confirmation and before.parameters == _parameters(command)
 
 
-def _ack(command_id: int, peer: Peer, outcome: Outcome) -> Send:
+def _ack(command_id: int, peer: Peer, result: int) -> Send:
     """Return the COMMAND_ACK to the sender. Only a command in progress has a progress."""
-    progress = PROGRESS_UNKNOWN if outcome.result == IN_PROGRESS else 0
-    return to(peer, "COMMAND_ACK", command_id, outcome.result, progress, 0, peer.system, peer.component)
+    progress = PROGRESS_UNKNOWN if result == IN_PROGRESS else 0
+    return to(peer, "COMMAND_ACK", command_id, result, progress, 0, peer.system, peer.component)

@@ -8,8 +8,9 @@ from math import isnan
 from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import DENIED, FAILED, Command, Handler, Outcome
+from colibri.mavlink.services.command import FAILED, Command, Handler
 from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.refusal import Refusal
 
 NAME_BYTES = 34
 """Of AVAILABLE_MODES.mode_name, which ends with a zero."""
@@ -31,7 +32,7 @@ class ModeInfo(NamedTuple):
     advanced: bool = False
 
 
-SetMode: TypeAlias = Callable[[int, Command], Outcome]
+SetMode: TypeAlias = Callable[[int, Command], Refusal | None]
 """Flies the custom mode of the first argument, as the command asks."""
 
 
@@ -53,14 +54,14 @@ class StandardModes:
         """Return who obeys the commands of this service."""
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
 
-    def available_modes(self, command: Command) -> list[Send] | Outcome:
+    def available_modes(self, command: Command) -> list[Send] | Refusal:
         """Answer REQUEST_MESSAGE of AVAILABLE_MODES: param2 is an index from 1, or 0 for all modes."""
         index = 0.0 if isnan(command.p2) else command.p2
         numbers = range(1, len(self._modes) + 1)
         if index == 0.0:
             return [to(command.peer, "AVAILABLE_MODES", *self._fields(number)) for number in numbers]
         if index not in numbers:
-            return Outcome(DENIED)
+            return Refusal()
         return [to(command.peer, "AVAILABLE_MODES", *self._fields(int(index)))]
 
     def monitor(self, command: Command) -> list[Send]:
@@ -74,9 +75,9 @@ class StandardModes:
         name = mode.name.encode()[:NAME_BYTES]
         return (len(self._modes), index, mode.standard_mode, mode.custom_mode, properties, name)
 
-    def _set_standard_mode(self, command: Command) -> Outcome:
+    def _set_standard_mode(self, command: Command) -> Refusal | None:
         """MAV_CMD_DO_SET_STANDARD_MODE (262): "MAV_RESULT_FAILED if the mode is not supported by the vehicle"."""
         for mode in self._modes:
             if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
                 return self._set_mode(mode.custom_mode, command)
-        return Outcome(FAILED, "There is no such standard mode")
+        return Refusal("There is no such standard mode", FAILED)

@@ -8,14 +8,15 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Handler, Outcome
+from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Handler
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SILENT
 from colibri.mavlink.streaming.schedule import Schedule
 from colibri.mavlink.telemetry.encoder import Encoder
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.refusal import Refusal
 
-Provider: TypeAlias = Callable[[Command], list[Send] | Outcome]
+Provider: TypeAlias = Callable[[Command], list[Send] | Refusal]
 """Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or refuses."""
 
 MIN_INTERVAL_US = 1_000
@@ -128,12 +129,12 @@ class StreamService:
             commands[getattr(mav, command)] = self._request_of(name)
         return commands
 
-    def _set_message_interval(self, command: Command) -> Outcome:
+    def _set_message_interval(self, command: Command) -> Refusal | None:
         """511: param1 message id, param2 interval in µs: -1 none, 0 the default."""
         message_id, interval_us = _whole(command.p1), command.p2
         name = self._names.get(message_id)
         if name is None:
-            return Outcome(DENIED if self._is_known(message_id) else UNSUPPORTED)
+            return Refusal(result=DENIED if self._is_known(message_id) else UNSUPPORTED)
         if interval_us == DISABLED:
             self._set(command.peer.channel, name, None, command.now_us)
         elif interval_us == DEFAULT:
@@ -142,19 +143,18 @@ class StreamService:
             whole_us = max(MIN_INTERVAL_US, round(interval_us))
             self._set(command.peer.channel, name, whole_us, command.now_us)
         else:
-            return Outcome(DENIED)
-        return Outcome()
+            return Refusal()
+        return None
 
-    def _get_message_interval(self, command: Command) -> Outcome:
+    def _get_message_interval(self, command: Command) -> Refusal | None:
         """510: param1 message id; answered by MESSAGE_INTERVAL."""
         return self._report_interval(_whole(command.p1), command.peer)
 
-    def _interval_requested(self, command: Command) -> list[Send] | Outcome:
+    def _interval_requested(self, command: Command) -> list[Send] | Refusal:
         """REQUEST_MESSAGE of MESSAGE_INTERVAL: param2 is the message whose interval is asked for."""
-        outcome = self._report_interval(_whole(command.p2), command.peer)
-        return [] if outcome == Outcome() else outcome
+        return self._report_interval(_whole(command.p2), command.peer) or []
 
-    def _report_interval(self, message_id: int, peer: Peer) -> Outcome:
+    def _report_interval(self, message_id: int, peer: Peer) -> Refusal | None:
         """Send the interval: -1 means that the message is not streamed."""
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
             interval_us = HEARTBEAT_US
@@ -163,10 +163,10 @@ class StreamService:
         elif self._is_known(message_id):
             interval_us = -1
         else:
-            return Outcome(UNSUPPORTED)
+            return Refusal(result=UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 
-    def _request_message(self, command: Command) -> Outcome:
+    def _request_message(self, command: Command) -> Refusal | None:
         """512: param1 message id, the rest is the message's. It goes to whoever asks."""
         return self._request(_whole(command.p1), command)
 
@@ -174,23 +174,23 @@ class StreamService:
         message_id = _message_id(name)
         return lambda command: self._request(message_id, command._replace(p1=float(message_id), p2=0.0))
 
-    def _request(self, message_id: int, command: Command) -> Outcome:
+    def _request(self, message_id: int, command: Command) -> Refusal | None:
         provider = self._providers.get(message_id)
         if provider is not None:
             answer = provider(command)
-            return answer if isinstance(answer, Outcome) else self._post(answer)
+            return answer if isinstance(answer, Refusal) else self._post(answer)
         name = self._names.get(message_id)
         if name is None:
-            return Outcome(UNSUPPORTED)
+            return Refusal(result=UNSUPPORTED)
         sends = [to(command.peer, name, *fields) for fields in self._encode(name)]
-        return self._post(sends) if sends else Outcome(TEMPORARILY_REJECTED)
+        return self._post(sends) if sends else Refusal(result=TEMPORARILY_REJECTED)
 
-    def _post(self, sends: list[Send]) -> Outcome:
+    def _post(self, sends: list[Send]) -> Refusal | None:
         """Send behind the COMMAND_ACK: with what is due next."""
         if len(self._waiting) + len(sends) > MAX_WAITING:
-            return Outcome(TEMPORARILY_REJECTED)
+            return Refusal(result=TEMPORARILY_REJECTED)
         self._waiting.extend(sends)
-        return Outcome()
+        return None
 
     def _encode(self, name: str) -> list[Fields]:
         """Return the fields of the messages `name` of this frame, worked out once however many channels want them."""

@@ -13,5 +13,5 @@ class Refusal(NamedTuple):
         result: MAV_RESULT.
     """
 
-    reason: str
+    reason: str = ""
     result: int = RESULT_DENIED

@@ -26,8 +26,9 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem, plan_of
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import Command, Outcome
+from colibri.mavlink.services.command import ACCEPTED, Command
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.vehicle.description import load_vehicle
 
 PREVIEW = Preview(20_000, 5)
@@ -66,6 +67,7 @@ class Cockpit:
         pilot: Flies it.
         commands: Obey.
         unmet: The needs of modes that nothing meets.
+        engaged: Who requested a mode that is steered, and when.
         state: The vehicle.
         steered: What clients ask for.
         guidance: The last.
@@ -92,6 +94,7 @@ class Cockpit:
         self.tasks = ModeTasks(self.missions, attitude, vehicle, PREVIEW, planned_at, references, first)
         self.pilot = Pilot(planned_at, behaviour, self.tasks.begin, self.home, self.lines)
         self.unmet: tuple[Need, ...] = (Need.CIRCLE,)
+        self.engaged: list[tuple[Peer, int]] = []
         self.commands = Commands(self.pilot, self.fence, self)
         self.now_us = 0
         self.state = at(place)
@@ -103,6 +106,10 @@ class Cockpit:
     def missing(self) -> tuple[Need, ...]:
         """Return the needs that nothing meets."""
         return self.unmet
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Take note of the client that steers."""
+        self.engaged.append((peer, now_us))
 
     def step(self, samples: int = 1, *, position_known: bool = True) -> Guidance:
         """Fly on; return the last guidance."""
@@ -125,12 +132,13 @@ class Cockpit:
         """Fly on for a while."""
         self.step(round(duration_s * 1e6 / PREVIEW.interval_us))
 
-    def do(self, command: str, *params: float, frame: int | None = None, **places: float) -> Outcome:
-        """Obey a command; parameters that are not given are nan."""
+    def do(self, command: str, *params: float, frame: int | None = None, **places: float) -> Refusal:
+        """Obey a command; return why not, or an accepted result. Parameters that are not given are nan."""
         p1, p2, p3, p4 = (*params, *(nan,) * (4 - len(params)))
         number = getattr(mav, f"MAV_CMD_{command}")
         x, y, z = (places.get(axis, nan) for axis in "xyz")
-        return self.commands.handlers()[number](Command(number, p1, p2, p3, p4, x, y, z, frame, GROUND, self.now_us))
+        asked = Command(number, p1, p2, p3, p4, x, y, z, frame, GROUND, self.now_us)
+        return self.commands.handlers()[number](asked) or Refusal(result=ACCEPTED)
 
     def load(self, plan_type: int, *items: MissionItem) -> None:
         """Take a plan."""

@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.tasks.position import HoldTask, TakeoffTask, Tas
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.mission.items import FENCE, MISSION
+from colibri.mavlink.node.service import Peer
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 from tests.support.cockpit import FLYING, Cockpit, item
 
@@ -77,6 +78,9 @@ class Nobody:
     def latest(self, now_us: int, timeout_us: int) -> None:
         """Return nothing."""
 
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Take no note of who steers."""
+
 
 class Somebody:
     """A service that is heard, with sticks, until an age."""
@@ -86,6 +90,9 @@ class Somebody:
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
         return self.sticks if now_us - self.sticks.time_us <= timeout_us else None
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Take no note of who steers."""
 
 
 def needs_of(

@@ -9,8 +9,9 @@ from colibri.mavlink.hil.faults import COMMAND, GPS, MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import DENIED, FAILED, LATER, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.services.command import DENIED, FAILED, PENDING, UNSUPPORTED, Command
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED
+from colibri.mavlink.wire.refusal import Refusal
 
 PEER = Peer(0, 255, 190)
 
@@ -27,12 +28,12 @@ def failures() -> Failures:
 
 def test_a_fault_is_injected_once_and_then_acknowledged(failures: Failures) -> None:
     command = asked(MOTOR, WRONG, 2.0, 0.5)
-    assert failures.inject(command, enabled=True) == Outcome(LATER)
+    assert failures.inject(command, enabled=True) == PENDING
     assert failures.take() == (Fault(MOTOR, WRONG, 2, (0.5, 0.0, 0.0, 0.0)),)
     assert failures.take() == ()
     assert failures.poll((), 8000) is None
     assert failures.poll((FaultResult(GPS, OFF, RESULT_ACCEPTED),), 8000) is None
-    assert failures.poll((FaultResult(MOTOR, WRONG, RESULT_ACCEPTED),), 16000) == (command, Outcome())
+    assert failures.poll((FaultResult(MOTOR, WRONG, RESULT_ACCEPTED),), 16000) == (command, None)
     assert failures.poll((FaultResult(MOTOR, WRONG, RESULT_ACCEPTED),), 24000) is None
 
 
@@ -41,8 +42,10 @@ def test_what_the_plant_refuses_is_refused(failures: Failures, result: int) -> N
     failures.inject(asked(MOTOR, OFF), enabled=True)
     ended = failures.poll((FaultResult(MOTOR, OFF, result),), 8000)
     assert ended is not None
-    assert ended[1].result == result
-    assert ended[1].reason.startswith("failure refused by the plant: ")
+    refusal = ended[1]
+    assert refusal is not None
+    assert refusal.result == result
+    assert refusal.reason.startswith("failure refused by the plant: ")
 
 
 @pytest.mark.parametrize("now_us", [ANSWERED_WITHIN_US, -1])
@@ -50,19 +53,20 @@ def test_a_plant_that_does_not_answer_is_not_waited_for(failures: Failures, now_
     failures.inject(asked(MOTOR, OFF), enabled=True)
     ended = failures.poll((), now_us)
     assert ended is not None
-    assert ended[1] == Outcome(FAILED, "failure refused: the plant does not answer")
+    assert ended[1] == Refusal("failure refused: the plant does not answer", FAILED)
 
 
 def test_faults_need_the_permission_of_the_parameter(failures: Failures) -> None:
-    assert failures.inject(asked(MOTOR, OFF), enabled=False).result == DENIED
+    assert failures.inject(asked(MOTOR, OFF), enabled=False) not in (None, PENDING)
     assert failures.take() == ()
 
 
 def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
     by_state, elsewhere = Failures(Feedback.STATE, relays=True), Failures(Feedback.SENSORS, relays=False)
-    outcome = by_state.inject(asked(GPS, OFF), enabled=True)
-    assert outcome == Outcome(UNSUPPORTED, "failure refused: flown by the state, not by sensors")
-    assert elsewhere.inject(asked(MOTOR, OFF), enabled=True).result == UNSUPPORTED
+    refusal = by_state.inject(asked(GPS, OFF), enabled=True)
+    assert refusal == Refusal("failure refused: flown by the state, not by sensors", UNSUPPORTED)
+    refusal = elsewhere.inject(asked(MOTOR, OFF), enabled=True)
+    assert refusal == Refusal("failure refused: this simulator takes none", UNSUPPORTED)
     assert by_state.take() == elsewhere.take() == ()
 
 
@@ -79,7 +83,8 @@ def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
     ],
 )
 def test_impossible_numbers_are_refused(failures: Failures, params: tuple[float, ...], result: int) -> None:
-    outcome = failures.inject(asked(*params), enabled=True)
-    assert outcome.result == result
-    assert outcome.reason
+    refusal = failures.inject(asked(*params), enabled=True)
+    assert refusal is not None
+    assert refusal.result == result
+    assert refusal.reason
     assert failures.take() == ()

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 
 from colibri.mavlink.node.service import Send
-from colibri.mavlink.services.command import ACCEPTED, DENIED, FAILED, Command, Outcome
+from colibri.mavlink.services.command import FAILED, Command
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
+from colibri.mavlink.wire.refusal import Refusal
 from tests.support.messages import FLOATS, GROUND, NAN, on_the_wire
 
 MODES = (
@@ -21,10 +22,10 @@ class Vehicle:
     def __init__(self) -> None:
         self.flown: list[int] = []
 
-    def __call__(self, custom_mode: int, command: Command) -> Outcome:
+    def __call__(self, custom_mode: int, command: Command) -> Refusal | None:
         assert command.peer == GROUND
         self.flown.append(custom_mode)
-        return Outcome(ACCEPTED)
+        return None
 
 
 def command(p1: float = 0.0, p2: float = 0.0) -> Command:
@@ -55,14 +56,14 @@ def test_one_mode_by_its_index() -> None:
 @given(FLOATS)
 def test_an_index_that_is_none_is_denied(index: float) -> None:
     answer = StandardModes(MODES, Vehicle()).available_modes(command(435.0, index))
-    assert answer == Outcome(DENIED) or index in (0.0, 1.0, 2.0, 3.0) or index != index
+    assert answer == Refusal() or index in (0.0, 1.0, 2.0, 3.0) or index != index
 
 
 def test_a_standard_mode_is_flown() -> None:
     vehicle = Vehicle()
     (handler,) = StandardModes(MODES, vehicle).handlers().values()
     assert callable(handler)
-    assert handler(command(1.0)).result == ACCEPTED
+    assert handler(command(1.0)) is None
     assert vehicle.flown == [3 << 16]
 
 
@@ -71,5 +72,7 @@ def test_a_mode_that_does_not_exist_or_may_not_be_chosen_fails(p1: float) -> Non
     vehicle = Vehicle()
     (handler,) = StandardModes(MODES, vehicle).handlers().values()
     assert callable(handler)
-    assert handler(command(p1)).result == FAILED
+    refusal = handler(command(p1))
+    assert refusal is not None
+    assert refusal.result == FAILED
     assert vehicle.flown == []

@@ -8,11 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from tests.support.messages import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
 from tests.support.snapshots import FLYING, TELEMETRY
 
@@ -35,8 +36,8 @@ def flying(kind: str = SILENT) -> StreamService:
 
 def ask(stream: StreamService, command: int, p1: float, p2: float = 0.0, peer: Peer = GROUND) -> int:
     handler: Any = stream.handlers()[command]
-    outcome: Outcome = handler(Command(command, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, peer, 0))
-    return outcome.result
+    refusal: Refusal | None = handler(Command(command, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, peer, 0))
+    return ACCEPTED if refusal is None else refusal.result
 
 
 def fly(stream: StreamService, from_us: int, until_us: int, frame_us: int = FRAME_US) -> list[tuple[int, Send]]:
@@ -230,7 +231,7 @@ def test_what_is_not_known_yet_may_be_asked_for_later() -> None:
 
 def test_a_provider_may_refuse() -> None:
     stream = flying()
-    stream.provide("STORAGE_INFORMATION", lambda _: Outcome(DENIED))
+    stream.provide("STORAGE_INFORMATION", lambda _: Refusal())
     assert ask(stream, REQUEST, mav.MAVLINK_MSG_ID_STORAGE_INFORMATION) == DENIED
 
 
