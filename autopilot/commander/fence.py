@@ -16,7 +16,6 @@ class Fence:
     """The fences of one vehicle."""
 
     def __init__(self, home: Home, behaviour: Behaviour) -> None:
-        """Begin without a geofence."""
         self._home = home
         self._behaviour = behaviour
         self._items: tuple[MissionItem, ...] = ()

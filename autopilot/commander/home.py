@@ -20,7 +20,6 @@ class Home:
     """
 
     def __init__(self, origin: Geodetic) -> None:
-        """Begin at the origin, chosen by nobody."""
         self.origin = origin
         self.position_enu_m = _ORIGIN
         self.yaw_rad = 0.0

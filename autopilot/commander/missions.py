@@ -30,7 +30,6 @@ class Missions:
     """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
-        """Begin without plans; changes are reported to `lines`."""
         self._home = home
         self._fence = fence
         self._lines = lines
@@ -91,12 +90,7 @@ class Missions:
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
-        """Return the task of a mission that is flown already, or that is over while the rotors still turn.
-
-        Args:
-            turns: How many turns of the current item were flown before.
-            legs: How many legs of it are left; empty before it began.
-        """
+        """Return the task of a mission under way, `turns` and `legs` of its current item as before a restart."""
         behaviour = self._behaviour
         self._executor.adopt(
             Defaults(max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m)
@@ -173,7 +167,7 @@ class MissionTask:
     def __init__(
         self, executor: MissionExecutor, missions: Missions, turns: float = 0.0, legs: tuple[int, ...] = ()
     ) -> None:
-        """Begin with the current item, of which `turns` around a centre were flown before, and `legs` are left."""
+        """Begin with the current item, `turns` of which were flown before a restart, and `legs` are left."""
         self._executor = executor
         self._missions = missions
         self._order: Order | None = None

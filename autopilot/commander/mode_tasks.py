@@ -82,17 +82,7 @@ class ModeTasks:
         references: References,
         first: Track | None,
     ) -> None:
-        """Make tasks of these parts.
-
-        Args:
-            missions: Have the task of a mission.
-            attitude: Leads attitude and thrust; None for a law that takes neither.
-            vehicle: As the control law assumes it.
-            preview: The references that the law takes.
-            instants: At which references are planned.
-            references: How a track is planned, from the profile.
-            first: A track that is flown from time 0 on; None for none.
-        """
+        """`attitude` is None for a law that takes no attitude setpoints; `first` is a track flown from time 0 on."""
         self._missions = missions
         self._attitude = attitude
         self._gravity_m_s2 = vehicle.gravity_m_s2
@@ -184,6 +174,5 @@ def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask
 
 
 def _at_start(planner: Planner, now_us: int) -> Reference:
-    """Return a reference that is on a track that began at time 0."""
     target = target_of(planner.horizon(now_us))
     return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())

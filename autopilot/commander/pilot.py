@@ -102,15 +102,7 @@ class Pilot:
     def __init__(
         self, instants: Instants, behaviour: Behaviour, make_task: TaskFactory, home: Home, lines: StatusQueue
     ) -> None:
-        """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
-
-        Args:
-            instants: At which references are planned, and which of them the control law previews.
-            behaviour: The numbers to fly by.
-            make_task: Returns the task with which a mode begins.
-            home: Moved by take-offs and by whoever chooses it.
-            lines: Take status texts for ground stations.
-        """
+        """Begin on the ground, or in the air: see `begin`. `make_task` returns the first task of a mode."""
         self._make_task = make_task
         self._lines = lines
         self.state = FIRST
@@ -162,12 +154,9 @@ class Pilot:
     def resume(
         self, now_us: int, vehicle: VehicleState, record: PilotRecord, again: TaskFactory, *, seamless: bool
     ) -> None:
-        """Restore the state at the first frame after a restart.
+        """Restore the state at the first frame after a restart; a vehicle that has come down meanwhile stays there.
 
         Args:
-            now_us: Simulated time.
-            vehicle: The vehicle; if it has come down meanwhile it stays there.
-            record: State before the restart.
             again: Returns the task with which a mode goes on.
             seamless: Whether the restart took no time: the reference goes on as recorded, else from the vehicle.
         """
@@ -333,7 +322,6 @@ class Pilot:
     def _guidance(
         self, context: TaskContext, wanted: AttitudeMotion | Motion | PlannedMotion, *, begins: bool
     ) -> Guidance:
-        """Return the references by which the output of a task is flown, and look for the ground."""
         now_us, vehicle = self.sensed.now_us, context.state
         if isinstance(wanted, AttitudeMotion):
             self.generator.set(wanted.reference)
@@ -352,7 +340,6 @@ class Pilot:
         return RESTS
 
     def _idle(self) -> Guidance:
-        """Stand with idling rotors, for as long as the parameters allow."""
         self._rest()
         event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
         if event is not None:

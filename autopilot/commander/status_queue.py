@@ -5,7 +5,6 @@ class StatusQueue:
     """MAV_SEVERITY and text of each line, in order."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self._lines: list[tuple[int, str]] = []
 
     def say(self, severity: int, text: str) -> None:

@@ -25,7 +25,6 @@ class Supervisor:
     """
 
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
-        """Begin with no condition; failsafes are reported to `lines`."""
         self._lines = lines
         self._conditions = Conditions()
         self.memory = Memory()

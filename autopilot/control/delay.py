@@ -50,7 +50,7 @@ class DelayCompensation:
     """
 
     def __init__(self, vehicle: Vehicle, told_s: float | None = None) -> None:
-        """Compensate the delay that is told, or None: the one that is measured; what is compiled is loaded here."""
+        """Compensate `told_s`, or None: the delay that is measured; compiled code is loaded here."""
         self._measured: deque[int] = deque(maxlen=_MEDIAN_OF)
         self._median_us = self.delay_us = 0
         self._told_s: float | None = None
@@ -95,13 +95,7 @@ class DelayCompensation:
             sent.popleft()
 
     def ahead(self, frame: StateFrame, charge_ah: float, *, standing: bool = False) -> StateFrame:
-        """Return the state `delay_us` after that of a frame; at zero the frame itself. Called once a control sample.
-
-        Args:
-            frame: The vehicle.
-            charge_ah: Taken from the battery.
-            standing: Whether it stands on the ground.
-        """
+        """Return the state `delay_us` after that of a frame; at zero the frame itself. Called once a control sample."""
         if self.delay_us == 0:
             self._known = None
             return frame

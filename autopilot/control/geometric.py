@@ -53,11 +53,6 @@ class GeometricController:
     """
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        """Control `vehicle` as the profile's `table` says.
-
-        Raises:
-            SettingsError: The table is wrong.
-        """
         del clock
         settings = read_settings(table, GeometricSettings)
         self.control_interval_us = interval_us(settings.control_interval_s)
@@ -167,7 +162,6 @@ def vee(skew: Array) -> Array:
 
 
 def _unit(vector: Array, rate: Array) -> tuple[Array, Array]:
-    """Return a vector's direction and how fast that turns."""
     length = norm(vector)
     unit = vector / length
     return unit, (rate - unit * dot(unit, rate)) / length

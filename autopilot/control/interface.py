@@ -189,7 +189,7 @@ class Controller(Protocol[Memory]):
             memory: What the step before returned.
             time_us: Simulated time, µs, a multiple of the control interval.
             state: The vehicle when the decision takes effect: now, unless a delay is compensated.
-            references: The references of `preview`, from that instant on; not to be written to, others have them, too.
+            references: Those of `preview`, from that instant on; shared, so not to be written to.
         """
 
 

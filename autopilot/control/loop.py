@@ -70,9 +70,7 @@ class ControlLoop:
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
-        """Control `vehicle` as `profile` says; `clock` only measures, it decides nothing.
-
-        `law` makes the control law, in place of what is registered under its name.
+        """Load the control law, or make it by `law`; `clock` measures only.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -233,7 +231,6 @@ class ControlLoop:
         return self._controller
 
     def _take_in(self, controller: Controller[Any]) -> None:
-        """Fly by a law, as what of the optional protocols it is."""
         self._controller = controller
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
@@ -241,7 +238,6 @@ class ControlLoop:
         self._waiting = on_path if on_path is not None and on_path.min_path_speed < 1.0 else None
 
     def _take(self, time_us: int, answer: tuple[Any, Decision]) -> Decision:
-        """Remember and command what the law has decided."""
         check_answer(self._name, answer, time_us)
         self._memory, decision = answer
         self._command(decision.rotor_speeds, time_us)

@@ -119,7 +119,6 @@ class _Optimum(NamedTuple):
 
 
 def _solver(name: str, options: dict[str, Any]) -> Callable[[Qp], _Optimum]:
-    """Return a solver that is installed; it raises where a QP is none."""
     if name == _DAQP:
         return _Daqp(options)
     return _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)

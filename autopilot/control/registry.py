@@ -68,7 +68,6 @@ def load_controller(name: str) -> Factory:
 
 
 def _unknown(name: str) -> ControllerError:
-    """Return what says that there is no such control law, and which is of nearly that name."""
     known = controller_names()
     hint = nearest(name, known) or f"installed are {', '.join(known)}"
     return ControllerError(f"unknown controller {name}: {hint}")

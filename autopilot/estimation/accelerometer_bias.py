@@ -79,7 +79,6 @@ class AccelerometerWatch:
     """Looks at every fix after it was tested."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
-        """Begin with nothing seen. What is compiled is loaded here."""
         self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _MIN_SIGMA))
         self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _MIN_SIGMA))
         self._gravity = gravity_m_s2

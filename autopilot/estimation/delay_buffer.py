@@ -31,7 +31,6 @@ class DelayBuffer:
     """
 
     def __init__(self, samples: int) -> None:
-        """Have room for so many samples."""
         self.samples: Array = np.zeros((samples, SAMPLE))
         self.first = 0
         self.waiting: deque[Waiting] = deque()

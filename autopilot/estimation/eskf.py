@@ -92,7 +92,6 @@ class Filter:
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
-        """Take the noise and the biases of `sensors` for what they have."""
         self._sensors, self._gravity = sensors, gravity_m_s2
         self._field = np.array(field_enu_gauss)
         self.field_gauss = hypot(*field_enu_gauss)
@@ -173,7 +172,6 @@ class Filter:
             P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
 
     def _rest(self, aligned: Aligned) -> None:
-        """Fuse the means of specific force, field and rate."""
         x, P, sensors = self.x, self.P, self._sensors
         force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _MIN_NOISE)) / aligned.duration_s
         rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _MIN_NOISE)) / aligned.duration_s

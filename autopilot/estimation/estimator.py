@@ -91,10 +91,7 @@ class Estimator:
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
-        """Estimate from frames that come every `interval_us`, in ENU from `origin`.
-
-        What is compiled is loaded here, not in the first step.
-        """
+        """Estimate in ENU from `origin`; compiled code is loaded here, not in the first step."""
         self._sensors, self._gravity, self._origin = sensors, gravity_m_s2, origin
         self._interval_us = interval_us
         self._field = field_enu_gauss(origin)
@@ -108,7 +105,6 @@ class Estimator:
         self._restart()
 
     def _restart(self) -> None:
-        """Forget everything but what was counted."""
         sensors = self._sensors
         self._inertial = Inertial(sensors, self._rejected)
         self._gps_watch = GpsWatch()
@@ -266,7 +262,6 @@ class Estimator:
         self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
 
     def _take_until(self, now_us: int) -> None:
-        """Take what is as old as a fix that came at `now_us`."""
         waiting, before_us = self._buffer.waiting, now_us - self._delay_us
         while waiting and waiting[0].time_us <= before_us:
             self._take(now_us)
@@ -351,7 +346,6 @@ class Estimator:
         return self._estimate
 
     def _note_tests(self) -> Tests:
-        """Return the last tests; once for all that were made since."""
         if self._tests is None:
             self._tests, self._resets = self.filter.tests, self.filter.resets
         return self._tests

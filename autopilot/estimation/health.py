@@ -58,7 +58,6 @@ class HealthWatch:
     """Notices what has ceased to be well, and what is well again."""
 
     def __init__(self) -> None:
-        """Begin with everything well."""
         self._ill: frozenset[int] = frozenset()
 
     def lines(self, health: Health) -> list[tuple[int, str]]:

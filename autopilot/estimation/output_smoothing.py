@@ -27,7 +27,6 @@ class OutputSmoothing:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self.position_m = _NONE
         self.velocity_m_s = _NONE
 

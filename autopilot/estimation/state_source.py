@@ -49,10 +49,7 @@ class StateSource:
     """
 
     def __init__(self, estimator: NewEstimator | None, interval_us: int) -> None:
-        """Estimate by `estimator` from frames `interval_us` apart; without one there are no frames of sensors.
-
-        What is compiled is loaded here, not at the first frame.
-        """
+        """Load what is compiled, not at the first frame; without an estimator there are no frames of sensors."""
         self._interval_us = interval_us
         self._make = estimator
         self._estimating = None if estimator is None else estimator(interval_us)

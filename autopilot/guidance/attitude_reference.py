@@ -81,7 +81,6 @@ class AttitudeReference:
     """
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
-        """Plan at the samples of `preview`; what is compiled is loaded here."""
         self.adopt(vehicle)
         self._interval_s = preview.interval_us * 1e-6
         self._samples = preview.samples

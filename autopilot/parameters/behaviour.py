@@ -189,7 +189,6 @@ def _number(value: Any) -> int:
 
 
 def _group(name: str) -> str:
-    """Return the group of a name's prefix."""
     return _GROUPS[name.partition("_")[0]]
 
 

@@ -25,7 +25,6 @@ def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
 def _axes(
     names: str, key: Path, unit: str, minimum: float, maximum: float, what: str, decimals: int = 3
 ) -> list[Number]:
-    """Return three numbers, of roll, pitch and yaw; described by `what`."""
     return [
         Number(name, (*key, place), unit, minimum, maximum, what.format(_MOMENTS[place]), decimals=decimals)
         for place, name in enumerate(names.split())
@@ -33,7 +32,6 @@ def _axes(
 
 
 def _poles(name: str, key: Path, what: str) -> list[Number]:
-    """Return two numbers, of two poles of what is named."""
     return [
         Number(f"{name}{place + 1}", (*key, "poles", place), "rad/s", -20.0, -0.5, f"{turn} pole of {what}")
         for place, turn in enumerate(_TURN)
@@ -41,7 +39,6 @@ def _poles(name: str, key: Path, what: str) -> list[Number]:
 
 
 def _references(prefix: str) -> list[Number]:
-    """Return what bounds the references that either law follows."""
     return [
         Number(
             f"{prefix}_APPROACH", ("guidance", "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"
@@ -53,7 +50,6 @@ def _references(prefix: str) -> list[Number]:
 
 
 def _observed(prefix: str) -> list[Number]:
-    """Return the numbers of the disturbance observers and of the mass, which either law has."""
     acceleration, moment, mass = f"{prefix}_OBS_ACC", f"{prefix}_OBS_MOM", f"{prefix}_MASS"
     return [
         Number(acceleration, ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
@@ -73,7 +69,6 @@ def _observed(prefix: str) -> list[Number]:
 
 
 def _limits(prefix: str, key: str) -> list[Number]:
-    """Return the soft limits of the rates, and the weight on all soft ones."""
     return [
         *_axes(
             f"{prefix}_RATE_P {prefix}_RATE_Q {prefix}_RATE_R",
@@ -85,7 +80,6 @@ def _limits(prefix: str, key: str) -> list[Number]:
 
 
 def _recovery(prefix: str) -> list[Number]:
-    """Return the numbers of the recovery, and of the solver, which either law has."""
     return [
         Number(f"{prefix}_FB_TURN", ("fallback", "turn_1_s"), "1/s", 0.1, 50.0, "Recovery: turn for each rad left"),
         Number(

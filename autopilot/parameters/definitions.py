@@ -31,7 +31,6 @@ class Numbers:
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
-        """Take them from `profile` and `vehicle` as their files have them."""
         self._profile = profile
         self._vehicle = vehicle
         self._table = profile.table(profile.controller)

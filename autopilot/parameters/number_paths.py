@@ -99,7 +99,6 @@ def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], 
 
 
 def _with(tree: Any, path: Path, value: Value) -> Any:
-    """Return a tree with another number at `path`; the one given stays as it is."""
     if not path:
         return value
     key, *rest = path

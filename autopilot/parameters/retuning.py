@@ -76,16 +76,7 @@ class Tuning:
         parameters: Parameters | None = None,
         trial: Trial | None = None,
     ) -> None:
-        """Tune `numbers` while a law flies in the rhythm of `running`.
-
-        Args:
-            numbers: Of law and vehicle.
-            build: Builds the law.
-            running: The law that flies.
-            say: Reports why a change was refused.
-            parameters: All of them; None: those of law and vehicle alone are tried.
-            trial: Tries what else is built from them; None: nothing is.
-        """
+        """Tune while a law flies in the rhythm of `running`; `say` reports why a change was refused."""
         self._numbers = numbers
         self._build = build
         self._say = say
@@ -159,16 +150,11 @@ def builder(controller: str, clock: Clock) -> Build:
 
 
 def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
-    """Return its rhythm as values to compare."""
     return controller.control_interval_us, controller.preview
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly two control samples of hover, the second one a metre away from the reference, and two far from hover.
-
-    Raises:
-        DecisionError: No rotor can follow what the law decides.
-    """
+    """Fly two control samples of hover, the second one a metre away from the reference, and two far from hover."""
     still, straight = np.zeros((controller.preview.samples, 3)), np.zeros(controller.preview.samples)
     references = Horizon(still, still, still, still, still, straight, straight, straight)
     memory = controller.initial(vehicle.hover_speed)

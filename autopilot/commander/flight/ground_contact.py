@@ -39,7 +39,6 @@ class GroundContact:
     """
 
     def __init__(self, lines: StatusQueue) -> None:
-        """Begin on the ground; take-off and landing are reported to `lines`."""
         self._lines = lines
         self._landing = Landing()
         self.standing = self.idles = True

@@ -15,7 +15,6 @@ class Readiness:
     """
 
     def __init__(self, lines: StatusQueue) -> None:
-        """Begin before the first arming inputs; a failed rotor is reported to `lines`."""
         self._lines = lines
         self._inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
         self.rotor_failed = self.error = ""

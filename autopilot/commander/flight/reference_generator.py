@@ -73,7 +73,6 @@ class ReferenceGenerator:
     """
 
     def __init__(self, instants: Instants, limits: Limits) -> None:
-        """Plan at these instants; what is compiled is loaded here, within `limits`: a take-off is no time for that."""
         self._instants = instants
         self.interval_s = instants.preview.interval_us * 1e-6
         self.samples = instants.preview.samples

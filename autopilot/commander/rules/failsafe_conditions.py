@@ -68,7 +68,6 @@ class Conditions:
     """Judges the conditions of one vehicle, sample after sample."""
 
     def __init__(self) -> None:
-        """Begin with nothing lost."""
         self._since_us: dict[Condition, int] = {}
         self._position: Vector | None = None
         self._attitude: Quaternion | None = None

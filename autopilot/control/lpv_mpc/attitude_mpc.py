@@ -80,7 +80,6 @@ class AttitudeMpc:
         interval_s: float,
         clock: Clock,
     ) -> None:
-        """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
         self.horizon = sum(settings.moves)
         self._body = body_of(vehicle)
         self._interval_s = interval_s
@@ -123,12 +122,8 @@ class AttitudeMpc:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
         The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
-        tilt within its limit, thrust gives way: a second plan has the thrust that leaves most for moments.
-
-        Args:
-            now: What the plan begins with.
-            target: What it is to reach.
-            ahead: States that the last plan has at the samples after this one, (n, 9); None without one.
+        tilt within its limit, thrust gives way: a second plan has the thrust that leaves most for moments. `ahead`
+        are the last plan's states at the samples after this one, (n, 9).
         """
         self.predict(now, ahead)
         plan, diagnostics = self._solve(now, target)
@@ -145,7 +140,6 @@ class AttitudeMpc:
         return middle / float(self.problem.from_thrust.max())
 
     def _solve(self, now: InitialState, target: Target) -> tuple[Plan | None, Diagnostics]:
-        """Plan from the responses predicted last."""
         qp = self.condense(now, target)
         started_s = self._clock()
         status, z, iterations = self._solver.solve(qp)

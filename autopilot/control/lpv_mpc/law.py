@@ -116,12 +116,6 @@ class LpvMpc(TrackingLaw[Memory]):
     plan_columns = PlanColumns(prediction.PHI, prediction.THETA, prediction.PSI, prediction.R)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        """Control `vehicle` as the profile's `table` says; `clock` only measures.
-
-        Raises:
-            SettingsError: The table is wrong.
-            SolverError: The solver cannot be used.
-        """
         settings = read_settings(table, LpvMpcSettings)
         interval_s = settings.control_interval_s
         self.control_interval_us = interval_us(interval_s)
@@ -182,7 +176,6 @@ class LpvMpc(TrackingLaw[Memory]):
         return Memory(tracked, moments, plan, age), Decision(commands, (phi, theta, psi), how)
 
     def _choose(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> Choice:
-        """Plan; where that cannot be had, fall back."""
         target, now, rotation = setpoint.target, inputs.now, inputs.observed.rotation
         steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
         if steep or setpoint.aligned < _RECOVER_BEYOND:
@@ -212,7 +205,6 @@ class LpvMpc(TrackingLaw[Memory]):
         return Choice(squared, moments, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
     def _descend(self, inputs: LawInputs, age: int, diagnostics: Diagnostics) -> Choice:
-        """Level and sink, the last resort."""
         now = inputs.now
         end = np.zeros(prediction.STATES + prediction.INPUTS)
         end[prediction.PSI] = now.x[prediction.PSI]

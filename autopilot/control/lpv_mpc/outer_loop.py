@@ -53,7 +53,6 @@ class OuterLoop:
     """
 
     def __init__(self, settings: GuidanceSettings, vehicle: Vehicle, lag: RotorLag, interval_s: float, n: int) -> None:
-        """Control `vehicle` every `interval_s` over a horizon of `n` steps."""
         k1_s2, k2_s = gains(settings.poles)
         self._samples, self._steps = n + 2, n
         errors_ahead = error_transition(settings.poles, interval_s, self._samples)
@@ -73,7 +72,6 @@ class OuterLoop:
         """Return the setpoint that leads to references.
 
         Args:
-            motion: Now.
             references: At each sample from now to one past the horizon.
             planned_yaw: By the last plan, from now, rad, (m,); (0,) without one.
             disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).

@@ -83,7 +83,6 @@ class VehicleTracker:
     """
 
     def __init__(self, vehicle: Vehicle, observer: ObserverSettings, mass: MassSettings, interval_s: float) -> None:
-        """Follow `vehicle` every `interval_s`."""
         self.vehicle = vehicle
         self.lag = rotor_lag.rotor_lag(vehicle, interval_s)
         self.battery = BatteryModel(vehicle)

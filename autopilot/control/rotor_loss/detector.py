@@ -122,7 +122,6 @@ class RotorWatch:
     """
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Watch `vehicle`, a control sample every `interval_s`; what is compiled is loaded here."""
         self._interval_s = interval_s
         self.lost: int | None = None
         self.max_evidence = 0.0
@@ -158,11 +157,7 @@ class RotorWatch:
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
         """Take in a control sample; return the rotor that is lost, None while all turn.
 
-        Args:
-            state: The vehicle now.
-            controls: What the rotors were commanded to since the sample before, parts of the largest speed.
-            charge_ah: Charge taken from the battery.
-            airborne: Whether nothing but air touches it.
+        `controls` are since the sample before, parts of the largest speed; `airborne`: nothing but air touches it.
         """
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
@@ -174,7 +169,6 @@ class RotorWatch:
     def _take_in(
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, counts: bool
     ) -> tuple[int, float]:
-        """Take in a sample that counts, or that is only remembered; return the likeliest rotor, and its evidence."""
         _, velocity, attitude, _, rate, _ = state
         battery = self._battery
         found: tuple[int, float] = _take_in(

@@ -98,15 +98,11 @@ class ReducedAttitude:
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
     ) -> None:
-        """Find the gains: some ms.
+        """Find the gains for a vehicle without rotor `lost`, 0..3: takes some ms.
 
         Args:
-            vehicle: Before it lost a rotor.
-            lost: The rotor, 0..3.
-            interval_s: Between two control samples.
-            follows: Part of the way to its command that a force goes in one of them.
+            follows: Part of the way to its command that a force goes in one sample.
             spin_rad_s: The final spin, positive.
-            weights: Of the cost.
 
         Raises:
             ThreeRotorsError: There is no such law.

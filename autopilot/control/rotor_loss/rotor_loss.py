@@ -50,7 +50,6 @@ class RotorLoss:
     """
 
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
-        """Look after `vehicle`, which is controlled every `interval_us`."""
         self._interval_s = interval_us * 1e-6
         self._adopt_laws(vehicle)
         self.watch = RotorWatch(vehicle, self._interval_s)
@@ -124,10 +123,8 @@ class RotorLoss:
         """Take in a control sample; return whether a rotor is known to be lost since this very one.
 
         Args:
-            state: The vehicle now.
             controls: What the rotors were commanded to since the sample before, parts of the largest speed.
-            charge_ah: Charge taken from the battery.
-            airborne: Whether the vehicle flies, and feels how.
+            airborne: Whether nothing but air touches the vehicle.
             ground_m: Height of the ground, z of ENU, as far as it is known.
         """
         if not self.enabled or self.impossible or self.watch.lost is not None:

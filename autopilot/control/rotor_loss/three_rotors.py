@@ -63,14 +63,10 @@ class ThreeRotors:
         state: VehicleState,
         ground_m: float,
     ) -> None:
-        """Take over in flight.
+        """Take over in flight, and land where the vehicle can stop.
 
         Args:
-            vehicle: Before it lost a rotor.
-            law: Of its attitude, by `law_without`.
-            interval_s: Between two control samples.
             speeds: Of the rotors now, parts of the largest, (4,).
-            state: The vehicle now. It lands where it can stop.
             ground_m: Height of the ground, z of ENU, as far as it is known.
         """
         self._vehicle, self._interval_s = vehicle, interval_s
@@ -94,12 +90,7 @@ class ThreeRotors:
         self.controls = (0.0, 0.0, 0.0, 0.0)
 
     def step(self, state: VehicleState, charge_ah: float) -> Decision:
-        """Decide the rotor speeds to hold until the next control sample.
-
-        Args:
-            state: The vehicle now.
-            charge_ah: Charge taken from the battery.
-        """
+        """Decide the rotor speeds to hold until the next control sample."""
         self._elapsed_s += self._interval_s
         R = np.array(rotation_matrix(state.attitude))
         self._observe(state)
@@ -141,7 +132,6 @@ class ThreeRotors:
         self._explained[2] -= self._gravity
 
     def _observe(self, state: VehicleState) -> None:
-        """Observe the acceleration that the rotors do not explain."""
         expected = self._velocity + self._interval_s * (self._explained + self._wind)
         missed = np.array(state.velocity_enu_m_s) - expected
         self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])

@@ -31,7 +31,6 @@ class AttitudeMpc:
     def __init__(
         self, settings: AttitudeSettings, vehicle: Vehicle, solver: QpSolver, interval_s: float, clock: Clock
     ) -> None:
-        """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
         self._discretisation = settings.discretisation
         self._inertia = vehicle.body.inertia_kg_m2
         self._solver = solver
@@ -61,7 +60,6 @@ class AttitudeMpc:
             moment_n_m: The last U2, U3, U4, N m, (3,).
             rotor_momentum_n_m_s: h of the rotor speeds last commanded.
             reference: phi, theta, psi wanted, rad; constant along the horizon.
-            horizon: Number of steps to predict.
         """
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)

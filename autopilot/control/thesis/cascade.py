@@ -46,12 +46,6 @@ class Cascade:
     """
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        """Control `vehicle` as the profile's `table` says; `clock` only measures.
-
-        Raises:
-            SettingsError: The table is wrong.
-            SolverError: The solver cannot be used.
-        """
         settings = read_settings(table, CascadeSettings)
         self._samples = settings.position.samples
         self._horizon = settings.attitude.horizon

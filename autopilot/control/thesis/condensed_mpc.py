@@ -62,13 +62,7 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
     """Eliminate the states: outputs over the horizon are an affine function of the increments.
 
     With Y = Phi x + Gamma Δu: H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in.
-
-    Args:
-        model: The increment model; n states, m inputs, p outputs.
-        horizon: N, number of steps.
-        x: Present augmented state, (n,).
-        reference: r, the output wanted at each step, (N, p).
-        weights: Diagonals of Q, S (p,) and R (m,).
+    `x` is the augmented state, (n,), `reference` the output wanted at each step, (N, p).
     """
     p, m = model.C.shape[0], model.B.shape[1]
     responses = np.empty((horizon + 1, *model.C.shape))

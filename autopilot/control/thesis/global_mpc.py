@@ -71,12 +71,6 @@ class GlobalMpc:
     """
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        """Control `vehicle` as the profile's `table` says; `clock` only measures.
-
-        Raises:
-            SettingsError: The table is wrong.
-            SolverError: The solver cannot be used.
-        """
         self._settings = read_settings(table, GlobalSettings)
         self.control_interval_us = interval_us(self._settings.control_interval_s)
         self.preview = Preview(self.control_interval_us, self._settings.horizon + 1)
@@ -119,7 +113,6 @@ class GlobalMpc:
     def _model(
         self, state: VehicleState, rates: Vector, thrust_n: float, rotor_momentum_n_m_s: float
     ) -> tuple[Array, Array]:
-        """Return the LPV model at the present state and the last input."""
         body, gravity_m_s2 = self._vehicle.body, self._vehicle.gravity_m_s2
         min_n = _MIN_THRUST * body.mass_kg * gravity_m_s2
         thrust_n = copysign(max(abs(thrust_n), min_n), thrust_n)

@@ -19,13 +19,8 @@ def attitude_model(
 ) -> tuple[Array, Array]:
     """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point.
 
-    State [phi phi' theta theta' psi psi'] in rad and rad/s, inputs U2, U3, U4 in N m.
-
-    Args:
-        phi_rate: phi', rad/s.
-        theta_rate: theta', rad/s.
-        rotor_momentum_n_m_s: h along body z, the vehicle's `rotor_momentum` times its rotor speeds: THESIS's Ω J.
-        inertia_kg_m2: Ix, Iy, Iz.
+    State [phi phi' theta theta' psi psi'] in rad and rad/s, inputs U2, U3, U4 in N m. The rotors' momentum is h along
+    body z, the vehicle's `rotor_momentum` times its rotor speeds: THESIS's Ω J.
     """
     ix, iy, iz = inertia_kg_m2
     h = rotor_momentum_n_m_s
@@ -61,8 +56,6 @@ def global_model(
         attitude: A and B of `attitude_model`.
         euler: phi, theta, psi, rad.
         thrust_n: The last U1, above zero, N.
-        mass_kg: Mass.
-        gravity_m_s2: Gravitational acceleration.
     """
     phi, theta, psi = euler
     A, B = np.zeros((12, 12)), np.zeros((12, 4))

@@ -33,7 +33,6 @@ class PositionController:
     """Places the poles of a double integrator on each axis and turns the acceleration into tilt and thrust."""
 
     def __init__(self, settings: PositionSettings, vehicle: Vehicle) -> None:
-        """Control `vehicle` with the poles of `settings`."""
         self._k1, self._k2 = gains(settings.poles)
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2

@@ -46,7 +46,6 @@ class BatteryModel:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Follow the battery of `vehicle`."""
         self._battery = vehicle.battery
         drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
@@ -79,13 +78,6 @@ class BatteryModel:
         if self._battery is None:
             return 1.0
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
-
-    def limit_squared(self, charge_ah: float, expected: Array, limits: Array) -> None:
-        """Fill the largest squared speeds that a rotor can reach, (N,), while all have the power of those expected.
-
-        Squared speeds are in parts of the largest; those expected, (n, 4), stay after the last.
-        """
-        fill_limits(expected, self.open_voltage_v(charge_ah), self.numbers, limits)
 
     def max_common_speed(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
@@ -145,7 +137,10 @@ def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float
 
 @compiled
 def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
-    """Fill what `BatteryModel.limit_squared` does; `packed` is the `BatteryNumbers`."""
+    """Fill the largest squared speeds that a rotor can reach, (N,), while all have the power of those expected, (n, 4).
+
+    Squared speeds are in parts of the largest; those expected stay after the last. `packed` is the `BatteryNumbers`.
+    """
     numbers = packed[0]
     for n in range(limits.shape[0]):
         if n < expected.shape[0]:

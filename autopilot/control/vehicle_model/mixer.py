@@ -12,7 +12,6 @@ class Mixer:
     """The inverse allocation of one vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Invert the allocation of `vehicle`."""
         self._allocation = vehicle.allocation()
         self._inverse = exact_inverse(self._allocation)
         self._momentum = vehicle.rotor_momentum()

@@ -133,12 +133,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     plan_columns = PlanColumns(6, 7, 8, 11)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        """Control `vehicle` as the profile's `table` says; `clock` only measures.
-
-        Raises:
-            SettingsError: The table is wrong.
-            SolverError: The solver cannot be used.
-        """
         settings = read_settings(table, WholeLpvMpcSettings)
         self._interval_s = h = settings.control_interval_s
         self.control_interval_us = interval_us(h)
@@ -246,7 +240,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         return Inputs(observed, float(state.euler[2]), max_n)
 
     def _filled(self, inputs: Inputs) -> Now:
-        """Return what a plan begins with, as arrays of the record that each decision fills again."""
         return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
 
     def _decide(
@@ -271,7 +264,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def _choose(
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
+        """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and diagnostics."""
         _, target, force, path = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
@@ -303,7 +296,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
 
 
 def _planned(memory: Memory, inputs: Inputs) -> bool:
-    """Whether the last plan leads to the attitude now."""
     if memory.plan is None:
         return False
     planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))

@@ -116,7 +116,6 @@ class WholeMpc:
         interval_s: float,
         clock: Clock,
     ) -> None:
-        """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
         self.horizon = n = sum(settings.blocks)
         self._solver, self._clock = solver, clock
         numbers = model_of(vehicle, interval_s)
@@ -199,8 +198,6 @@ class WholeMpc:
         Where the plan within the rotors' limits alone exceeds a soft limit, a second one has these, too.
 
         Args:
-            now: The `Now` that the plan begins with.
-            target: The `Target`.
             last: Commands of the last plan, from now on, (n, 4); None without one.
             psi: Yaw now, rad, unwrapped.
             path: The nominal speeds along the path, where they are free.

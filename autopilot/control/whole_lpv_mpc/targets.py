@@ -39,7 +39,6 @@ class TargetBuilder:
     """Builds what plans are to follow."""
 
     def __init__(self, guidance: Guidance, path: PathSettings, mpc: WholeMpc) -> None:
-        """Build it for plans of `mpc`."""
         self._guidance, self._path, self._mpc = guidance, path, mpc
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2
@@ -63,7 +62,6 @@ class TargetBuilder:
         What the rotors are asked for beforehand is that of the speed now, held; at the end, that of the speed there.
 
         Args:
-            now: Where the plan begins.
             references: From path time on.
             last: Speeds of the last plan from now on, (k,); None without one: then it begins at the vehicle's.
             lag_s: By which path time is behind the clock.

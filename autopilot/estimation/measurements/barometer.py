@@ -33,7 +33,6 @@ class Barometer(Instrument):
     group = Updated.BAROMETER
 
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
-        """Expect any weather."""
         self._noise_pa = sensors.barometer.noise_pa
         self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
         self._watch = Watch(self.source, _MIN_PA, _MAX_PA, _FROZEN_US)

@@ -36,7 +36,7 @@ class Kind:
     """
 
     def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:
-        """Measure `numbers` at once; after `patience_us` of rejections, inflate (first state, count, σ), accept."""
+        """After `patience_us` of rejections, inflate (first state, count, σ) and accept."""
         self.name = name
         self.gate = FIVE_SIGMA[numbers - 1]
         self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)

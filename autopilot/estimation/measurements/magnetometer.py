@@ -37,7 +37,6 @@ class Magnetometer(Instrument):
     group = Updated.MAGNETOMETER
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
-        """Expect the field of the earth."""
         self._field = np.array(field_enu_gauss)
         self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
         self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))

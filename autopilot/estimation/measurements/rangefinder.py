@@ -45,7 +45,6 @@ class RangefinderBelow(Instrument):
     smoothed = True
 
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
-        """Expect the ground at height 0."""
         part = sensors.rangefinder
         assert part is not None, "what is fitted is described"
         self._part = part

@@ -53,7 +53,6 @@ class Alignment:
     """Waits for rest."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector, interval_s: float) -> None:
-        """Wait for a vehicle with `sensors` where the field is `field_enu_gauss`."""
         accel, gyro = sensors.accelerometer, sensors.gyroscope
         self._gravity = gravity_m_s2
         self._earth_field = field_enu_gauss

@@ -47,7 +47,7 @@ class Falling:
     """Waits for a fall, from a frame on that is not a flight's first."""
 
     def __init__(self, gravity_m_s2: float, field_enu_gauss: Vector, delay_s: float) -> None:
-        """Wait where the field is `field_enu_gauss`, for fixes received `delay_s` after they were measured."""
+        """Fixes are received `delay_s` after they were measured."""
         self._gravity = gravity_m_s2
         self._earth_field = np.array(field_enu_gauss)
         self._delay_us = round(delay_s * 1e6)

@@ -50,7 +50,6 @@ class Inertial:
     """Reads frames."""
 
     def __init__(self, sensors: Sensors, rejected: Rejected) -> None:
-        """Read accelerometer and gyroscope of `sensors`, and count what is rejected."""
         accel, gyro = sensors.accelerometer, sensors.gyroscope
         self._rejected = rejected
         self._force = _Axes(

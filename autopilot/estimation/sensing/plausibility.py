@@ -54,7 +54,6 @@ class GpsWatch:
     """
 
     def __init__(self) -> None:
-        """Begin before the first fix."""
         self.time_us: int | None = None
         self._alive = Watch(Source.GPS, -inf, inf, _GPS_PATIENCE_US)
 
@@ -77,7 +76,6 @@ class ClockResets:
     """Counts frames that follow one another and not the clock: a few are strays, many a clock that was reset."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._time_us: int | None = None
         self._count = 0
 

@@ -35,7 +35,6 @@ class Rejected:
     """Counts what was rejected."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._counts: dict[tuple[str, Reason], int] = {}
         self._published: Rejections = MappingProxyType({})
 

@@ -101,7 +101,6 @@ class MissionExecutor:
     """
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
-        """Begin with a plan of valid items, not started."""
         self.defaults = defaults
         self._items: tuple[MissionItem, ...] = ()
         self.progress = Progress()
@@ -254,7 +253,6 @@ class MissionExecutor:
         self._fresh = True
 
     def _do(self, item: MissionItem, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> None:
-        """Do what takes no time."""
         events.append(Reached(self.progress.seq))
         if item.command == mav.MAV_CMD_DO_CHANGE_SPEED and item.p1 not in (2.0, 3.0):
             if item.p2 > 0.0:

@@ -119,7 +119,6 @@ class Geofence:
     """
 
     def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
-        """Build the fence of valid items; without any, every place is inside."""
         self.max_height_m = max_height_m
         self.return_point_enu_m: tuple[float, float] | None = None
         self._groups: dict[float, list[Zone]] = {}

@@ -29,7 +29,6 @@ class TiltLoop:
     """Attitude and thrust as a generator of demands slews them."""
 
     def __init__(self, generator: AttitudeReference) -> None:
-        """Begin with the attitude that the vehicle has at the first demand."""
         self._generator = generator
         self._memory: ReferenceMemory | None = None
 
@@ -55,7 +54,6 @@ class StabilizedTask(EndlessTask):
     """Sticks to tilt, yaw rate and thrust."""
 
     def __init__(self, generator: AttitudeReference) -> None:
-        """Begin with the attitude that the vehicle has."""
         self._tilt = TiltLoop(generator)
         self._generator = generator
         self._stop = HoldTask()
@@ -72,7 +70,6 @@ class AltitudeTask(EndlessTask):
     """Sticks to tilt, yaw rate and climb; height is held while its stick is in the middle."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
-        """Begin with the attitude and height that the vehicle has."""
         self._tilt = TiltLoop(generator)
         self._generator = generator
         self._stop = HoldTask()
@@ -106,7 +103,6 @@ class DescentTask(EndlessTask):
     """Level, and down at the speed of landings: for a vehicle of unknown position or heading."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
-        """Begin with the attitude and climb that the vehicle has."""
         self._tilt = TiltLoop(generator)
         self._weight_n = generator.weight_n
         self._loop = HeightLoop(self._weight_n, gravity_m_s2)
@@ -124,7 +120,6 @@ class HeightLoop:
     """The height loop: the thrust that follows the height of a reference, whatever the tilt."""
 
     def __init__(self, weight_n: float, gravity_m_s2: float) -> None:
-        """Begin without an offset."""
         self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
         self._offset_m_s2 = 0.0
 

@@ -21,7 +21,6 @@ class FollowTargetTask(EndlessTask):
     """A place relative to the target; without one, stop."""
 
     def __init__(self) -> None:
-        """Begin without a target."""
         self._stop = HoldTask()
         self._ahead_rad: float | None = None
 

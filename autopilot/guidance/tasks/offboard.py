@@ -21,7 +21,6 @@ class OffboardTask(EndlessTask):
     """The setpoints of an offboard companion; where they end, stop."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
-        """Follow setpoints; of attitude if there is a generator of demands for it."""
         self._tilt = TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()
 

@@ -29,7 +29,6 @@ class OrbitTask(EndlessTask):
     """
 
     def __init__(self, order: Circle, context: TaskContext) -> None:
-        """Begin where the reference is."""
         self.order = order
         self._radius_m = abs(order.radius_m)
         self._turn = -copysign(1.0, order.radius_m)
@@ -61,7 +60,6 @@ class OrbitTask(EndlessTask):
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
     def _rate_of(self, context: TaskContext) -> float:
-        """Return how fast the reference goes around, rad/s, counter-clockwise."""
         (vx, vy, _), angle = context.velocity, self._angle
         return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
 

@@ -37,7 +37,6 @@ class GoToTask:
     """Straight to a place, and stay."""
 
     def __init__(self, order: GoTo, context: TaskContext) -> None:
-        """Begin where the reference is."""
         self._place = order.position_enu_m
         self._speed_m_s = order.speed_m_s
         east, north = (order.position_enu_m[axis] - context.place[axis] for axis in (0, 1))
@@ -66,7 +65,6 @@ class HoldTask:
     """Stop, and stay where that is."""
 
     def __init__(self) -> None:
-        """Begin to brake."""
         self._place: Vector | None = None
         self._yaw_rad = 0.0
         self._target: Target | None = None
@@ -101,7 +99,7 @@ class TakeoffTask:
     def __init__(
         self, height_enu_m: float, yaw_rad: float | None, context: TaskContext, speed_m_s: float | None = None
     ) -> None:
-        """Begin where the reference is; climb at `speed_m_s`, or at the parameter's speed."""
+        """Climb at `speed_m_s`; None: at the parameter's speed."""
         self._height_m = max(height_enu_m, context.place[2])
         self._yaw_rad = context.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
@@ -135,7 +133,7 @@ class LandTask(EndlessTask):
     """Straight down, slower towards the ground, until that ends it."""
 
     def __init__(self, xy: tuple[float, float], yaw_rad: float | None) -> None:
-        """Sink onto a point, heading as now where `yaw_rad` is None."""
+        """Keep the heading where `yaw_rad` is None."""
         self._xy = xy
         self._yaw_rad = yaw_rad
 
@@ -163,7 +161,6 @@ class TaskSequence:
     """
 
     def __init__(self, first: Leg, *others: Leg) -> None:
-        """Begin with the first at the first sample."""
         self._ahead = [first, *others]
         self._inner: tuple[int, ...] = ()
         self.task: FlightTask | None = None
@@ -211,10 +208,7 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        """Fly a track that began, or begins, at `began_us`.
-
-        A control law that previews references other than a control sample apart has a planner of its own.
-        """
+        """Fly a track from `began_us` on; `planner_for_law` is for a law that previews at another interval."""
         self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law

@@ -15,7 +15,6 @@ class PositionTask(EndlessTask):
     """Sticks to velocity; an axis whose stick is in the middle is held where it came to rest."""
 
     def __init__(self) -> None:
-        """Hold nothing yet."""
         self._xy: tuple[float, float] | None = None
         self._z: float | None = None
         self._yaw_rad: float | None = None

@@ -101,11 +101,6 @@ def dips_of(track: Track, floor_m: float) -> Iterator[tuple[float, float]]:
 
 
 def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
-    """Return the track through waypoints at their times.
-
-    Raises:
-        TrackFileError: The vehicle cannot fly it.
-    """
     track = through(waypoints)
     for dip in _dips(track, waypoints, floor_m):
         what = f"{_legs([dip.leg])} dips to {dip.height_m:.2f} m, below the floor of {floor_m:g} m"
@@ -134,7 +129,7 @@ def _widened(excess: Array, neighbours: int) -> Array:
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track through waypoints held above the floor, and where it would have been below it.
+    """Return the track held above the floor, and where it would have been below.
 
     Raises:
         TrackFileError: None is found.
@@ -153,7 +148,6 @@ def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
 
 
 def _height_over(waypoints: Waypoints, leg: int, floor_m: float) -> float:
-    """Return the height at which a dip of a leg is held."""
     ends = waypoints.points_enu_m[leg : leg + 2, 2]
     return floor_m + min(_CLEARANCE_M, 0.5 * max(float(ends.min()) - floor_m, 0.0))
 
@@ -178,7 +172,6 @@ def _stretched_in_words(stretch: Array, limiting: str) -> str:
 
 
 def _legs(legs: Sequence[int]) -> str:
-    """Return the numbers of legs for a user, who counts waypoints from 1 on."""
     if len(legs) > _LISTED:
         return f"{len(legs)} legs"
     return f"leg{'s' if len(legs) > 1 else ''} {_listed([f'{leg + 1} to {leg + 2}' for leg in legs])}"

@@ -35,8 +35,6 @@ def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | N
 
     Args:
         name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
-        vehicle: That is to fly it.
-        profile: Whose law flies it.
         floor_m: Below which no track may lead, m, ENU; None for the ground, if the vehicle has any.
 
     Raises:

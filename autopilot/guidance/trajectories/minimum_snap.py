@@ -58,12 +58,7 @@ def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
 
 
 def minimal_knots(elements: Array, points: Array) -> Array:
-    """Return the derivatives at `points` (n, axes) where the cost is least, that of order 0 first, (n, order, axes).
-
-    Args:
-        elements: Cost of each segment, as `elements` gives it.
-        points: What is passed, (n, axes).
-    """
+    """Return the derivatives at `points` (n, axes) where the cost is least, that of order 0 first, (n, order, axes)."""
     knots = np.zeros((len(points), elements.shape[2], points.shape[1]))
     knots[:, 0] = points
     if len(points) > 2:
@@ -134,11 +129,8 @@ def _free_derivatives(elements: Array, points: Array) -> Array:
 def balanced(elements: Array, forces: Array) -> Array:
     """Return the derivatives at the inner points whose product with the cost's curvature is `forces`.
 
-    The blocks of the curvature couple only neighbours: block elimination forwards, then backwards.
-
-    Args:
-        elements: Cost of each segment.
-        forces: (n - 2, order - 1, axes), n > 2.
+    The blocks of the curvature couple only neighbours: block elimination forwards, then backwards. `forces` are
+    (n - 2, order - 1, axes), n > 2.
     """
     before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]

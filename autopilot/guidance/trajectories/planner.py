@@ -32,7 +32,6 @@ class Planner:
     """
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
-        """Tabulate `track` at the interval of `preview`, by its formula or by differences."""
         self.preview = preview
         self._track = track
         self._references = references
@@ -99,7 +98,6 @@ def _rest(track: Track, interval_us: int) -> int | None:
 
 
 def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
-    """Every derivative exactly."""
     del interval_s
     x, y, z = track.position(track.clock(t, _SNAP))
     derivatives = [np.stack([axis.derivative(order) for axis in (x, y, z)], axis=-1) for order in range(_SNAP + 1)]

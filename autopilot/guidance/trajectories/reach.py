@@ -97,13 +97,11 @@ class Reach:
     """The limits of one vehicle under one profile."""
 
     def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
-        """Take the rotors' limits of `vehicle`, and those of tilt and body rates of the profile's law if it has any.
+        """Take the limits of rotors, and of tilt and body rates if the profile's law has any.
 
         Args:
-            vehicle: That flies.
-            profile: Whose law flies it.
-            exact_drag: Whether drag is that of the thrust and tilt of each moment, not that of a hover in every
-                direction: beyond 10 m/s they differ by newtons.
+            exact_drag: Drag by the thrust and tilt of each moment, not by those of hover in every direction: beyond
+                10 m/s they differ by newtons.
         """
         self._exact_drag = exact_drag
         self._vehicle = vehicle
@@ -151,7 +149,7 @@ class Reach:
         return demands
 
     def _pulled(self, motion: Motion) -> "_Pulled":
-        """Return what moves the vehicle.
+        """Split what moves the vehicle into thrust and drag.
 
         Drag across the rotors' axis is c (v - (v·z) z) with c = c_xy + c_r √T, along it c_z (v·z) z, so that
         T z = m (a + g) + c v + (c_z - c) (v·z) z: the thrust points along m (a + g) + c v.
@@ -228,7 +226,6 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _length(a: Array) -> Array:
-    """Return the lengths of vectors, (n,), of two or three axes."""
     total = a[:, 0] * a[:, 0]
     for axis in a.T[1:]:
         total = total + axis * axis

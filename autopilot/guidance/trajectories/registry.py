@@ -55,16 +55,10 @@ def track_names() -> list[str]:
 
 
 def _installed_names() -> list[str]:
-    """Return the names of the tracks of other packages."""
     return sorted({entry.name for entry in entry_points(group=GROUP)})
 
 
 def _load_installed(name: str) -> Any:
-    """Return what another package registered as track `name`; None if none has.
-
-    Raises:
-        TrackError: It cannot be loaded.
-    """
     for entry in entry_points(group=GROUP, name=name):
         try:
             return entry.load()
@@ -130,7 +124,6 @@ def _keys(kind: type[TrackOptions]) -> str:
 
 
 def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given: dict[str, str]) -> str:
-    """Say which value is impossible, and what there is."""
     what, _, key = reason.rstrip("`").partition(" - at `$.")
     if key not in fields:
         return what

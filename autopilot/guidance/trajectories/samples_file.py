@@ -47,13 +47,7 @@ def read_samples(path: Path) -> Samples:
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
-    """Check that velocities lead from each position to the next, and accelerations from each velocity to the next.
-
-    By the trapezoidal rule; for the positions with the accelerations' correction at both ends.
-
-    Raises:
-        TrackFileError: They do not.
-    """
+    """By the trapezoidal rule; for the positions with the accelerations' correction at both ends."""
     x, v, a = np.moveaxis(motion, 1, 0)
     goes = np.diff(x, axis=0) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     for columns, change, rate, rounding, unit in (

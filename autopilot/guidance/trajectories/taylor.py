@@ -66,19 +66,15 @@ class TaylorSeries:
         return TaylorSeries(np.array([(a[: k + 1] * b[k::-1]).sum(axis=0) for k in range(len(a))]))
 
     def __sub__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
-        """Subtract a series or a constant, one for all times or one for each."""
         return self + -1.0 * other
 
     def __rsub__(self, other: "Array | float") -> "TaylorSeries":
-        """Subtract from a constant."""
         return -1.0 * self + other
 
     def __neg__(self) -> "TaylorSeries":
-        """Return the opposite."""
         return -1.0 * self
 
     def __truediv__(self, divisor: float) -> "TaylorSeries":
-        """Divide by a constant."""
         return self * (1.0 / divisor)
 
     def sin(self) -> "TaylorSeries":

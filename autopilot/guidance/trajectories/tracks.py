@@ -282,13 +282,7 @@ def sampled(samples: Samples) -> Track:
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
-    """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU; at rest after its end.
-
-    Args:
-        track: The track.
-        t: Times, s, (n,).
-        derivative: 0 for the position itself.
-    """
+    """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU; at rest after its end."""
     time = track.clock(np.asarray(t, dtype=np.float64), derivative)
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 

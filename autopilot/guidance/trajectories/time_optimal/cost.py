@@ -44,7 +44,6 @@ class FlightCost:
         """Set the problem.
 
         Args:
-            reach: The vehicle's limits.
             given: The waypoints, (legs + 1, 3), m, ENU.
             pieces: Into which each leg is cut, of equal durations.
             margin: Part of each range that is left to the control law.
@@ -94,11 +93,7 @@ class FlightCost:
         return float((durations * (1.0 + penalty)).sum()), gradient
 
     def _penalty(self, motion: Array) -> tuple[Array, Array]:
-        """Return the penalty of each sample, (samples, pieces), and its slope, (derivatives, samples, pieces, 3).
-
-        Args:
-            motion: Position and its derivatives, (derivatives, samples, pieces, 3).
-        """
+        """Return the penalty of each sample, (samples, pieces), and its slope, (derivatives, samples, pieces, 3)."""
         slope = np.zeros_like(motion)
         low = np.maximum(self.floor_m - motion[0, :, :, 2], 0.0)
         slope[0, :, :, 2] = -2.0 * low
@@ -140,13 +135,7 @@ class _Slopes:
     """
 
     def __init__(self, forms: Array, ends: Array, durations: Array) -> None:
-        """Begin with none.
-
-        Args:
-            forms: The elements of the path.
-            ends: Derivatives at both ends of each piece, (pieces, 8, 3).
-            durations: Of the pieces, s.
-        """
+        """`ends` are the derivatives at both ends of each piece, (pieces, 8, 3)."""
         self._forms, self._ends, self._durations = forms, ends, durations
         self.of_durations = np.zeros(len(durations))
         self.of_points = np.zeros((len(durations) + 1, 3))
@@ -200,7 +189,6 @@ def _at_knots(ends: Array) -> Array:
 
 
 def _total(values: Array, pieces_axis: int) -> Array:
-    """Return the sums over all but one axis."""
     moved = np.moveaxis(values, pieces_axis, -1)
     total: Array = moved.reshape(-1, moved.shape[-1]).sum(axis=0)
     return total
@@ -215,6 +203,5 @@ def _duration(root: Array) -> tuple[Array, Array]:
 
 
 def _root(duration_s: Array) -> Array:
-    """Return what gives these durations."""
     longer = np.sqrt(2.0 * np.maximum(duration_s, 1.0) - 1.0) - 1.0
     return np.where(duration_s > 1.0, longer, 1.0 - np.sqrt(2.0 / np.minimum(duration_s, 1.0) - 1.0))

@@ -57,11 +57,7 @@ def _wanted_pieces(legs: int) -> int:
 
 
 def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array, points: Array) -> tuple[Array, Array]:
-    """Return better leg times and points, of as many pieces; what the battery still gives is that of the flight before.
-
-    Raises:
-        TrackFileError: It cannot be held above the floor.
-    """
+    """Return better leg times and points, of as many pieces; the battery's state is that of the flight before."""
     pieces = (len(points) - 1) // len(legs_s)
     cost = FlightCost(reach, waypoints.points_enu_m, pieces, waypoints.margin)
     cost.floor_m = floor_m + _CLEARANCE_M if pieces > 1 else -inf
@@ -105,7 +101,6 @@ def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) ->
 
 
 def _track(waypoints: Waypoints, legs_s: Array, points: Array) -> Track:
-    """Return the track through points at these leg times."""
     pieces = (len(points) - 1) // len(legs_s)
     between = np.arange(len(points)) % pieces > 0
     passed = np.concatenate([_knots(legs_s, pieces)[:, None], points], axis=1)

@@ -37,13 +37,9 @@ class _Pair(NamedTuple):
 
 
 def minimise(function: Function, x: Array, iterations: int, tolerance: float) -> Array:
-    """Return where a function is least, (n,), as far as so many iterations lead.
+    """Return where a function, given with its gradient, is least, (n,), as far as so many iterations lead.
 
-    Args:
-        function: Of x, with its gradient.
-        x: Where to begin, (n,).
-        iterations: The most.
-        tolerance: Ends when as many iterations as are remembered bring less than this part of the value.
+    It ends when as many iterations as are remembered bring less than `tolerance` of the value.
     """
     point = _Point(x, *function(x))
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
@@ -71,7 +67,7 @@ def _first(point: _Point) -> float:
 
 
 def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
-    """Return the quasi-Newton direction by two loops over the pairs, (n,)."""
+    """Two loops over the pairs."""
     direction, weights = -gradient, []
     for step, change, product in reversed(pairs):
         weights.append(dot(step, direction) / product)
