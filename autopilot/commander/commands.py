@@ -25,11 +25,7 @@ _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 class Commands:
-    """Handlers of a ground station's commands: a method a command.
-
-    Attributes:
-        motion: Handlers of the commands to move.
-    """
+    """Handlers of a ground station's commands: a method a command."""
 
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         self._pilot = pilot

@@ -13,7 +13,6 @@ class Home:
     """Home of one vehicle. The pilot moves it; the fence, the missions and the commands measure from it.
 
     Attributes:
-        origin: Of the ENU frame.
         position_enu_m: Where the vehicle took off, or the place that was chosen, m.
         yaw_rad: Heading there, rad.
         chosen: Whether somebody chose it: a take-off then leaves it where it is.

@@ -85,14 +85,6 @@ class Pilot:
     parts of them would need the whole state.
 
     Attributes:
-        state: Mode, and whether the rotors may turn.
-        behaviour: The numbers to fly by.
-        home: Where it took off, or a place that was chosen.
-        ground: Contact with the ground.
-        generator: Of the reference.
-        readiness: Arming checks, and a failed rotor.
-        sensed: Inputs of the last control sample.
-        task: What is flown.
         lag_us: By how much path time lags behind the clock.
         speed_m_s: Cruise speed requested for this flight; None for the parameters'.
         saving: The failsafe that is flown, until a mode is selected or the rotors stop.

@@ -20,7 +20,6 @@ class Supervisor:
     """The supervisor of one vehicle.
 
     Attributes:
-        limits: Limits and delays, from the parameters.
         memory: Conditions that hold, and the failsafes they began.
     """
 

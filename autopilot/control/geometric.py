@@ -45,12 +45,7 @@ class Target(NamedTuple):
 
 
 class GeometricController:
-    """The control law.
-
-    Attributes:
-        control_interval_us: The control sample.
-        preview: Now.
-    """
+    """The control law."""
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         del clock

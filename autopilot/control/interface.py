@@ -159,7 +159,6 @@ class Decision(NamedTuple):
     Attributes:
         rotor_speeds: In the vehicle's unit and rotor order, within its limits, (4,).
         attitude_reference: phi, theta, psi that the attitude is steered to, rad.
-        diagnostics: How it came about.
     """
 
     rotor_speeds: Array
@@ -173,7 +172,6 @@ class Controller(Protocol[Memory]):
 
     Attributes:
         control_interval_us: Time between two control samples: whole milliseconds.
-        preview: The references it wants.
     """
 
     control_interval_us: int

@@ -60,9 +60,6 @@ class ControlLoop:
     """One control law flying one vehicle.
 
     Attributes:
-        vehicle: That it controls.
-        preview: The references that the law wants.
-        control_interval_us: Its sample.
         frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
         takes_attitude: Whether the law can take an attitude and a thrust.
         plan_columns: Where the law's plan holds the attitude; None for a law that plans none.

@@ -68,7 +68,6 @@ class QpResult(NamedTuple):
     """What came of a QP.
 
     Attributes:
-        status: How it ended.
         x: The solution, (n,), or None.
         iterations: That the solver took, the same wherever the QP is the same; nan where it does not say.
     """

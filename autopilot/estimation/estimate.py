@@ -117,7 +117,6 @@ class Estimate(NamedTuple):
         velocity_std_m_s: Of the velocity, east, north, up.
         attitude_std_rad: Of the attitude, about east, north, up.
         gyro_bias_rad_s, accel_bias_m_s2: FLU.
-        health: What may be flown on.
         tests: How well the measurements agree with it.
         rejected: How many values were rejected since the start, by sensor and reason.
         resets: How often position, velocity or a reference was reset, because measurements had long contradicted it.

@@ -58,7 +58,6 @@ class EstimatorRecord(NamedTuple):
 
     Attributes:
         time_us, filter_us: Of the last frame, and of the filter.
-        filter: The filter.
         samples: The ring, whose first sample that waits is row `first`.
         waiting: What was measured at the ends of the samples that wait.
         reading: Of the last frame.

@@ -21,12 +21,7 @@ _SAG = 0.03
 
 
 class BatteryMonitor:
-    """Integrates the charge taken from one vehicle's battery.
-
-    Attributes:
-        charge_ah: Charge taken, Ah.
-        energy_wh: Energy taken, Wh.
-    """
+    """Integrates the charge taken from one vehicle's battery."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._model = BatteryModel(vehicle)

@@ -63,11 +63,9 @@ class StationSettings:
     """Settings of a vehicle towards ground stations.
 
     Attributes:
-        system_id: MAVLink system id.
         identity: A name of `identity.IDENTITIES`.
         origin: Of the ENU frame.
         boot_unix_us: Unix time at simulated time 0, µs; 0 if it is unknown.
-        signing: Checks and signs frames.
         files: What can be read and written by file transfer.
         logs: Where the logs of flights go; None: into folder `logs` of the files.
         feedback: Kind of the frames, states or sensors.
@@ -94,13 +92,7 @@ class Stations:
         hub: Where the links meet.
         offboard: Setpoints of companions.
         manual: Sticks of a pilot.
-        plans: The uploaded plans, and the protocol about them.
-        missions: Flies the plans.
-        fence: Keeps the vehicle inside.
         needs: Which needs of modes are met.
-        system: Obeys commands to the autopilot as a system.
-        failures: Injected failures.
-        log: The log that they download.
     """
 
     def __init__(

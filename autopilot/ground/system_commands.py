@@ -25,7 +25,6 @@ class SystemCommands:
 
     Attributes:
         banner: Name and version of the autopilot.
-        version: Fields of AUTOPILOT_VERSION.
         restart: `REBOOT` or `SHUT_DOWN` once that was requested; 0 before.
     """
 

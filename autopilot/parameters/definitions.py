@@ -27,7 +27,6 @@ class Numbers:
 
     Attributes:
         definitions: The parameters, whose defaults are the numbers.
-        defaults: Name -> default.
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:

@@ -32,10 +32,8 @@ class GroundContact:
     """Contact of one vehicle with the ground.
 
     Attributes:
-        standing: Whether it stands on the ground.
         idles: Whether the rotors stand or idle.
         height_m: Height of where it last stood, z of ENU, m.
-        times: Of the last arming, take-off and landing.
     """
 
     def __init__(self, lines: StatusQueue) -> None:

@@ -23,7 +23,6 @@ class ArmingInputs(NamedTuple):
 
     Attributes:
         state: Of the vehicle; None before the first frame.
-        standing: Whether it stands on the ground.
         charge: Part of the battery's charge that is left; 1 without a battery.
         thrust_stick: Of the pilot, 0..1; None if the mode takes none, or none is received.
         outside_fence: Why the vehicle may not be where it is; None if it may.

@@ -28,11 +28,8 @@ class FailsafeInputs(NamedTuple):
     """What the conditions are judged by.
 
     Attributes:
-        now_us: Simulated time.
         missed_us: When the last frame came before frames were missed; None if none were.
         state: The vehicle, reported by the plant or estimated.
-        mode: The flight mode.
-        standing: Whether it stands on the ground.
         estimate: Accuracy of the state; None where the plant reports it.
         setpoint: The companion's last, however old; None if it has ended its stream.
         sticks_us: When sticks were last received; None if they were released.

@@ -62,7 +62,6 @@ class Row(NamedTuple):
     """A failsafe of the table.
 
     Attributes:
-        condition: What it watches for.
         holds: When that holds, in words.
         limits: Parameters of its limits.
         delay: Parameter of how long it must hold; empty where that is no parameter.

@@ -66,7 +66,6 @@ class AttitudeMpc:
     """LPV-MPC of roll, pitch and yaw, within the limits of the rotors.
 
     Attributes:
-        horizon: N.
         problem: What all its QPs share.
         gain: K of the LQR that the terminal weight belongs to, (3, 12).
     """

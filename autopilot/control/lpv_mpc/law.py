@@ -69,7 +69,6 @@ class Memory(NamedTuple):
     """What the law carries from one control sample to the next.
 
     Attributes:
-        tracked: Of the vehicle.
         moments: U2..U4 last commanded, N m, (3,).
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
@@ -85,7 +84,6 @@ class LawInputs(NamedTuple):
     """What a decision begins with.
 
     Attributes:
-        observed: Of the vehicle.
         now, motion: For the attitude's plan, and for the outer loop.
     """
 
@@ -108,9 +106,7 @@ class LpvMpc(TrackingLaw[Memory]):
     """The control law. Its predicted outputs are the states of `prediction`.
 
     Attributes:
-        control_interval_us: The control sample.
         preview: From now to one sample past the horizon.
-        plan_columns: Of the attitude in its predicted outputs.
     """
 
     plan_columns = PlanColumns(prediction.PHI, prediction.THETA, prediction.PSI, prediction.R)

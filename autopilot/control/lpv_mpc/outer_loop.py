@@ -37,7 +37,6 @@ class Setpoint(NamedTuple):
     Attributes:
         force: Of the thrust now, N, ENU, (3,).
         aligned: Cosine of the angle from the thrust to it.
-        target: Of the attitude.
     """
 
     force: Array
@@ -46,11 +45,7 @@ class Setpoint(NamedTuple):
 
 
 class OuterLoop:
-    """From references, or a demanded attitude, to the setpoint of the attitude.
-
-    Attributes:
-        loop: What stays the same in it.
-    """
+    """From references, or a demanded attitude, to the setpoint of the attitude."""
 
     def __init__(self, settings: GuidanceSettings, vehicle: Vehicle, lag: RotorLag, interval_s: float, n: int) -> None:
         k1_s2, k2_s = gains(settings.poles)

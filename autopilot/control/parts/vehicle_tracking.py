@@ -36,7 +36,6 @@ class Tracked(NamedTuple):
         wrench, mean_wrench: U1, N, and U2..U4, N m, now, and over the interval that ends now, (4,) each.
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
-        charge_ah: Charge taken from the battery.
         mass_kg: That the vehicle moves like.
     """
 
@@ -58,7 +57,6 @@ class Observed(NamedTuple):
         measured, estimate: Of the observer, (9,) and (12,).
         mass_kg: That the vehicle moves like.
         max_speed: That a rotor can reach while all keep their power, in parts of the largest.
-        current_a: Of the battery.
     """
 
     rigid: Array
@@ -74,9 +72,6 @@ class VehicleTracker:
     """Follows one vehicle.
 
     Attributes:
-        vehicle: It.
-        lag: Of its rotors.
-        battery: Its battery.
         inertia: Ix, Iy, Iz, kg m², (3,).
         allocation: From squared rotor speeds, parts of the largest, to U1, N, and U2..U4, N m, (4, 4).
         momentum: Angular momentum of each rotor at the largest speed, along body z, N m s, (4,).

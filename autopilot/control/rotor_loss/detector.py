@@ -82,13 +82,7 @@ def signature_of(vehicle: Vehicle) -> Signature:
 
 
 class Numbers(NamedTuple):
-    """What stays the same from sample to sample.
-
-    Attributes:
-        signature: Of the vehicle's rotors.
-        lag: Of the rotors over a control sample.
-        interval_s: Of a control sample.
-    """
+    """What stays the same from sample to sample."""
 
     signature: Signature
     lag: RotorLag

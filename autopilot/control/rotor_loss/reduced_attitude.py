@@ -91,7 +91,6 @@ class ReducedAttitude:
     """The law for one vehicle that has lost one rotor.
 
     Attributes:
-        trio: The rotors that are left.
         cone_rad: Angle between thrust and spin axis at the final spin.
     """
 

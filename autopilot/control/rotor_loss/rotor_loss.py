@@ -44,7 +44,6 @@ class RotorLoss:
     """Watches the rotors of one vehicle, and flies it once one is lost.
 
     Attributes:
-        watch: Detects which is lost.
         enabled: Whether anything is done, or noticed.
         impossible: Why the vehicle cannot be landed on three rotors; empty if it can.
     """

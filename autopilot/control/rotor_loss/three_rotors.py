@@ -51,7 +51,6 @@ class ThreeRotors:
     Attributes:
         controls: Rotor commands, parts of the largest speed.
         landed: Whether the ground holds it.
-        law: Of its attitude.
     """
 
     def __init__(

@@ -66,7 +66,6 @@ class GlobalMpc:
     """The control law. Its predicted outputs are x, y, z in m and psi in rad.
 
     Attributes:
-        control_interval_us: The control sample.
         preview: Now, and the horizon.
     """
 

@@ -94,7 +94,6 @@ class Memory(NamedTuple):
     """What the law carries from one control sample to the next.
 
     Attributes:
-        tracked: Of the vehicle.
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
         lag_us: By which path time is behind the clock, µs.
@@ -110,7 +109,6 @@ class Inputs(NamedTuple):
     """What a decision begins with.
 
     Attributes:
-        observed: Of the vehicle.
         psi: Yaw, rad, unwrapped.
         max_n: Largest thrust.
     """
@@ -124,10 +122,8 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     """The control law. Its predicted outputs are those of `condensing.PREDICTED`.
 
     Attributes:
-        control_interval_us: The control sample.
         preview: From now to one sample past the horizon.
         min_path_speed: The least speed along the references, in parts of their own.
-        plan_columns: Of the attitude in its predicted outputs.
     """
 
     plan_columns = PlanColumns(6, 7, 8, 11)

@@ -100,7 +100,6 @@ class WholeMpc:
     """LPV-MPC of position, attitude and rotors together.
 
     Attributes:
-        horizon: N.
         model: The vehicle's numbers, as one record.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
         starts: Step at which each block begins, and N, (b + 1,).

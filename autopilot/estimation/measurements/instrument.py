@@ -36,7 +36,6 @@ class Instrument(Protocol):
         ratio: By which ESTIMATOR_STATUS reports its tests.
         group: Of `Updated`; 0 where it is measured in a message of its own.
         smoothed: Whether its corrections are given in with time, as those of GPS are.
-        kind: Its tests.
     """
 
     part: ClassVar[str]

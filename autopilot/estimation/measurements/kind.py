@@ -26,7 +26,6 @@ class Kind:
     """One kind of measurement: its last test, and for how long it has been rejected.
 
     Attributes:
-        name: In tests and logs.
         test: The last.
         accepted_us: When it was last accepted.
         rejected_us: Since when it is not; None while it is.

@@ -34,7 +34,6 @@ class Aligned(NamedTuple):
         force, rate: Specific force, m/s² FLU, and rad/s FLU.
         field, fields: Magnetic field, gauss FLU; of how many.
         pressure_height_m, heights: Of the barometer; None without one; of how many.
-        fix: The last fix.
         attitude: That the force and the field show.
     """
 

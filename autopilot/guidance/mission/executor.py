@@ -65,7 +65,6 @@ class MissionRecord(NamedTuple):
     """Progress of a mission as plain data, for a restart.
 
     Attributes:
-        seq: The current item.
         state: MISSION_STATE.
         order: Of the phase that is flown.
         speed_m_s: Set by the mission; None for the cruise speed.

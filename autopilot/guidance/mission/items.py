@@ -71,7 +71,6 @@ class _Allowed(NamedTuple):
 
     Attributes:
         place: Whether x and y must be a latitude and a longitude.
-        height: Whether z must be an altitude.
         p1: Of the first parameter, and so on.
         here: Whether x and y may also be 0, 0 or not given.
     """

@@ -29,13 +29,9 @@ class TaskContext(NamedTuple):
     Attributes:
         now_us: Simulated time at which what is decided takes effect, less the control law's lag: path time.
         state: The vehicle then.
-        reference: State of the reference.
-        home_enu_m: Home.
-        behaviour: The numbers that the vehicle flies by.
         interval_s: Between two instants of a target.
         samples: How many instants a target has.
         steered: Latest input of clients.
-        standing: Whether the vehicle stands on the ground.
         ground_m: Height of where it last stood, z of ENU.
         blind: Whether the position is not to be flown by: a landing is level then.
     """
@@ -100,7 +96,6 @@ class AttitudeMotion(NamedTuple):
     """Motion by attitude and thrust.
 
     Attributes:
-        demand: What the control law is to hold.
         reference: Where the reference stands meanwhile.
         lifts: Whether a vehicle that stands must leave the ground for it.
         sinks: Whether a vehicle in the air must sink.

@@ -26,7 +26,6 @@ class CsvTable:
     """The numbers of a file.
 
     Attributes:
-        path: The file.
         values: The columns, (n,) each, n >= 2.
         lines: On which each row stands.
     """

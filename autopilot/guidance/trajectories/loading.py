@@ -19,7 +19,6 @@ class LoadedTrack(NamedTuple):
     """A track to fly.
 
     Attributes:
-        track: The track.
         note: What a user should know of it: what was changed, or which limit it exceeds; empty for nothing.
     """
 

@@ -27,7 +27,6 @@ class Planner:
     horizon depends on the time alone, not on those before.
 
     Attributes:
-        preview: What a horizon is made of.
         table: The block that the last horizon began in, and as many references as a horizon may reach beyond it.
     """
 

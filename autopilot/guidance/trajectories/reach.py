@@ -42,8 +42,6 @@ class Demand:
     """One quantity that a track asks for, and its limit.
 
     Attributes:
-        name: Of the quantity.
-        unit: Of the quantity.
         values: At each time, (n,).
         limit: The most that there is; the least if `falls`.
         span: Range of the quantity.

@@ -23,7 +23,6 @@ class Waypoints:
     """Where to be and when.
 
     Attributes:
-        path: The file.
         times_s: Strictly increasing from 0, s, (n,), n >= 2.
         points_enu_m: (n, 3), m, ENU.
         yaw_rad: Unwrapped the shorter way round, (n,), rad; None to look along the path.
