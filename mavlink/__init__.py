@@ -1,4 +1,4 @@
-"""The vehicle side of MAVLink: codec, links, and the conversations as state machines without input or output."""
+"""MAVLink: codec, links, and the conversations of vehicle and client as state machines without input or output."""
 
 from typing import TYPE_CHECKING
 

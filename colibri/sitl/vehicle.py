@@ -21,8 +21,8 @@ from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
-from colibri.sitl.inbox import StatusTexts
 from colibri.sitl.mission_items import Item, on_wire
+from colibri.sitl.status_texts import StatusTexts
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
 

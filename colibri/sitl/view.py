@@ -16,7 +16,7 @@ from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Columns, Record
 from colibri.sitl.ground_station import Station
-from colibri.sitl.inbox import StatusTexts
+from colibri.sitl.status_texts import StatusTexts
 
 _NEAR_M = {"state": 0.3, "sensors": 2.0}
 _SLOW_M_S = 0.3

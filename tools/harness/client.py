@@ -3,8 +3,8 @@
 from typing import Any
 
 from colibri.autopilot.core.step import Received
+from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.wire.dialect import Codec
-from colibri.sitl.inbox import Inbox
 
 SYSTEM, COMPONENT = 1, 1
 """Of the vehicle."""

@@ -7,10 +7,10 @@ from typing import Any
 
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.mission.items import MISSION, MissionItem, item_fields
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
-from colibri.sitl.inbox import Inbox
 
 _VEHICLE = Peer(0, 1, AUTOPILOT_COMPONENT)
 _MAX_DATAGRAM_BYTES = 65536

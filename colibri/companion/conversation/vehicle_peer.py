@@ -4,13 +4,13 @@ from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from colibri.companion.conversation.clock import VehicleClock
 from colibri.companion.conversation.commands import CommandQueue
 from colibri.companion.conversation.parameters import ParameterReader
-from colibri.companion.conversation.states import HANDLES, StateAssembler, TimedState
-from colibri.companion.conversation.vehicle_report import VehicleReport
 from colibri.companion.stacks.recognition import recognised
 from colibri.companion.stacks.stack import Stack
+from colibri.mavlink.client.clock import VehicleClock
+from colibri.mavlink.client.report import VehicleReport
+from colibri.mavlink.client.states import HANDLES, StateAssembler, TimedState
 from colibri.mavlink.wire.dialect import (
     AUTOPILOT_COMPONENT,
     AUTOPILOT_INVALID,

@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.companion.conversation.clock import VehicleClock
 from colibri.companion.conversation.commands import AGAIN_US, TRIES, UNANSWERED, CommandQueue
 from colibri.companion.conversation.parameters import ParameterReader
-from colibri.companion.conversation.states import StateAssembler, TimedState
-from colibri.companion.conversation.vehicle_report import VehicleReport
 from colibri.companion.stacks.ardupilot import ARDUPILOT
 from colibri.companion.stacks.colibri import COLIBRI
 from colibri.companion.stacks.px4 import PX4
 from colibri.companion.stacks.recognition import recognised
 from colibri.companion.stacks.thrust_curve import MiddleHovers, ThrustCurve
+from colibri.mavlink.client.clock import VehicleClock
+from colibri.mavlink.client.report import VehicleReport
+from colibri.mavlink.client.states import StateAssembler, TimedState
 from colibri.mavlink.wire.dialect import Bits, Codec, Message, mav
 
 VEHICLE = Codec(1, 1)

@@ -5,10 +5,10 @@ import pytest
 from scipy.linalg import expm
 
 from colibri.common.jit import packed
-from colibri.companion.conversation.states import TimedState
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
 from colibri.companion.steering.predictor import Predictor
+from colibri.mavlink.client.states import TimedState
 from colibri.plant.vehicle.description import load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird").without(["drag"])

@@ -1,12 +1,10 @@
-"""What a ground station has received of a vehicle."""
+"""The messages that a client has received from a vehicle, kept for whoever asks later."""
 
 from collections import Counter
 from difflib import get_close_matches
 from typing import Any
 
-from colibri.mavlink.wire.dialect import Codec, Message, mav
-
-_STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
+from colibri.mavlink.wire.dialect import Message, mav
 
 
 class Heard(dict[str, list[Any]]):
@@ -79,26 +77,3 @@ class Inbox:
             self.texts[-1] += fields.text
         else:
             self.texts.append(fields.text)
-
-
-class StatusTexts(Inbox):
-    """Every STATUSTEXT that a vehicle sends to one ground station, read where it is sent: no link loses it.
-
-    Attributes:
-        times_us: When each text was sent.
-    """
-
-    def __init__(self) -> None:
-        """Begin empty."""
-        super().__init__()
-        self._codec = Codec(0, 0)
-        self.times_us: list[int] = []
-
-    def add_datagram(self, datagram: bytes, now_us: int) -> None:
-        """Add a datagram that is sent now."""
-        if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
-            return
-        for message in self._codec.decode(datagram):
-            if message.name == "STATUSTEXT":
-                self.add(message)
-                self.times_us += [now_us] * (len(self.texts) - len(self.times_us))

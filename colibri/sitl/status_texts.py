@@ -1,0 +1,28 @@
+"""Every STATUSTEXT that a vehicle sends to one ground station, read where it is sent: no link loses it."""
+
+from colibri.mavlink.client.inbox import Inbox
+from colibri.mavlink.wire.dialect import Codec, mav
+
+_STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
+
+
+class StatusTexts(Inbox):
+    """The texts, and when each was sent.
+
+    Attributes:
+        times_us: When each text was sent.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._codec = Codec(0, 0)
+        self.times_us: list[int] = []
+
+    def add_datagram(self, datagram: bytes, now_us: int) -> None:
+        """Add a datagram that is sent now."""
+        if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
+            return
+        for message in self._codec.decode(datagram):
+            if message.name == "STATUSTEXT":
+                self.add(message)
+                self.times_us += [now_us] * (len(self.texts) - len(self.times_us))
