@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from colibri.autopilot.control.registry import controller_names as controller_names
     from colibri.autopilot.control.registry import load_controller as load_controller
     from colibri.autopilot.control.vehicle_model.mixer import Mixer as Mixer
-    from colibri.autopilot.core.copter import Copter as Copter
+    from colibri.autopilot.core.autopilot import Autopilot as Autopilot
+    from colibri.autopilot.core.copter import copter_autopilot as copter_autopilot
     from colibri.autopilot.core.step import Step as Step
-    from colibri.autopilot.core.track_autopilot import Autopilot as Autopilot
+    from colibri.autopilot.core.track_stages import track_autopilot as track_autopilot
     from colibri.autopilot.errors import AutopilotError as AutopilotError
     from colibri.autopilot.guidance.trajectories.registry import TrackError as TrackError
     from colibri.autopilot.guidance.trajectories.registry import track as track

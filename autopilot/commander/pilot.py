@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.commander.flight.ground_contact import GroundContact, GroundRecord
 from colibri.autopilot.commander.flight.readiness import Readiness
-from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance, ReferenceGenerator
+from colibri.autopilot.commander.flight.reference_generator import ReferenceGenerator
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import MissionTask
 from colibri.autopilot.commander.rules.failsafe_rule import Flight
@@ -14,6 +14,7 @@ from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, St
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour, at_speed
+from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.autopilot.guidance.landing_detector import is_below, stands_at_first
 from colibri.autopilot.guidance.reference import Reference
 from colibri.autopilot.guidance.sample_grid import Instants

@@ -5,8 +5,8 @@ that were sent and have not acted yet, and by the disturbance, which is observed
 one predicted for it. References are those of that instant, too. So a control law finds what it is made for, commands
 that act at once.
 
-The delay is told, or measured: a plant says of each command how long after its frame it took effect, and the median of
-the last ones is compensated. Simulated time alone counts, so the same frames give the same flight.
+The delay is declared or measured: the plant reports how long after its frame each command took effect, and the median
+of the last ones is compensated. Simulated time alone counts, so the same frames give the same flight.
 """
 
 from collections import deque
@@ -49,12 +49,12 @@ class DelayCompensation:
         delay_us: From a frame to the moment at which the command that answers it takes effect, as it is compensated.
     """
 
-    def __init__(self, vehicle: Vehicle, told_s: float | None = None) -> None:
-        """Compensate `told_s`, or None: the delay that is measured; compiled code is loaded here."""
+    def __init__(self, vehicle: Vehicle, declared_s: float | None = None) -> None:
+        """Compensate the declared delay, or with None the measured one; compiled code is loaded here."""
         self._measured: deque[int] = deque(maxlen=_MEDIAN_OF)
         self._median_us = self.delay_us = 0
-        self._told_s: float | None = None
-        self.tell(told_s)
+        self._declared_s: float | None = None
+        self.declare(declared_s)
         self.adopt(vehicle)
         self.begin(NO_ROTORS)
         x = np.zeros(motion.STATES)
@@ -65,10 +65,10 @@ class DelayCompensation:
         """Predict with other numbers of the vehicle."""
         self._vehicle, self._model = vehicle, packed(motion.motion_model(vehicle))
 
-    def tell(self, told_s: float | None) -> None:
-        """Compensate this delay from now on; None: the one that is measured."""
-        self._told_s = told_s
-        self._believe()
+    def declare(self, declared_s: float | None) -> None:
+        """Compensate this delay from now on; None: the measured one."""
+        self._declared_s = declared_s
+        self._choose()
 
     def measure(self, delay_us: int) -> None:
         """Take in how late a command took effect."""
@@ -76,7 +76,7 @@ class DelayCompensation:
         median_us = sorted(self._measured)[(len(self._measured) - 1) // 2]
         if abs(median_us - self._median_us) >= _WORTH_US:
             self._median_us = median_us
-            self._believe()
+            self._choose()
 
     def begin(self, controls: FourRotors, *, rests: bool = False) -> None:
         """Begin with the rotors turning at `controls`; a vehicle that `rests` stays until they carry it."""
@@ -113,8 +113,8 @@ class DelayCompensation:
     def _weight_n(self) -> float:
         return self._vehicle.body.mass_kg * self._vehicle.gravity_m_s2
 
-    def _believe(self) -> None:
-        delay_us = self._median_us if self._told_s is None else round(self._told_s * 1e6)
+    def _choose(self) -> None:
+        delay_us = self._median_us if self._declared_s is None else round(self._declared_s * 1e6)
         self.delay_us = min(max(delay_us, 0), MAX_DELAY_US)
 
     def _now(self, frame: StateFrame, voltage_v: float) -> Array:

@@ -169,8 +169,8 @@ class ControlLoop:
         """Whether a control sample is at `time_us`."""
         return time_us % self.control_interval_us == 0
 
-    def state(self, frame: StateFrame) -> VehicleState:
-        """Unwrap yaw by continuity: a quaternion forgets full turns."""
+    def observe(self, frame: StateFrame) -> VehicleState:
+        """Return the state with yaw unwrapped near that of the last frame: a quaternion forgets full turns."""
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)

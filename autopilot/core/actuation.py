@@ -1,6 +1,5 @@
 """Rotor commands of one vehicle: of the control law within its solve time, or of the landing on three rotors."""
 
-from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.registry import check_rotor_speeds
@@ -8,6 +7,7 @@ from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.defence.descent import Descent
 from colibri.autopilot.core.defence.plain_law import PlainLaw
 from colibri.autopilot.core.step import STILL
+from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.common.types import FourRotors
 from colibri.plant.vehicle.description import Vehicle
 

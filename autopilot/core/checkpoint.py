@@ -138,7 +138,7 @@ class Checkpointer:
         stations.missions.resume(stations.plans.plans, checkpoint.mission if same else None)
         if checkpoint.had_station:
             stations.expect_station(frame.time_us)
-        state = parts.loop.state(frame)
+        state = parts.loop.observe(frame)
         pilot.resume(
             frame.time_us,
             state,

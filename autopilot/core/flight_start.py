@@ -47,7 +47,7 @@ class FlightStart:
             self._resume(history, frame)
         elif before_us is not None and frame.time_us > before_us:
             loop = self._parts.loop
-            loop.begin_in_flight(loop.state(frame).euler[2])
+            loop.begin_in_flight(loop.observe(frame).euler[2])
             self._parts.rotor_loss.begin(loop.controls)
         else:
             self._begin(frame, again=before_us is not None)
@@ -77,7 +77,7 @@ class FlightStart:
         loop.begin(loop.vehicle.rotors.idle_speed if rests else speed, parts.tasks.first_yaw_rad)
         mode = Mode.TRACK if parts.tasks.is_first else None
         delay_us = parts.delay.delay_us
-        parts.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests, delay_us=delay_us)
+        parts.pilot.begin(frame.time_us, loop.observe(frame), mode=mode, rests=rests, delay_us=delay_us)
         parts.rotor_loss.forget()
         parts.actuation.begin(STILL if parts.pilot.ground.standing else loop.controls)
         parts.pilot.readiness.trust_rotors()

@@ -1,14 +1,12 @@
-"""A control sample flown: supervision, guidance, actuation; what raises is replaced."""
+"""References and decision of a control sample; each has a replacement that flies where it raises."""
 
-from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Decision, VehicleState
-from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.defence.descent import Descent
-from colibri.autopilot.core.defence.errors import Defence
 from colibri.autopilot.core.parts import Parts
-from colibri.autopilot.core.supervision import Supervision
+from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.autopilot.guidance.tasks.position import HoldTask
 from colibri.common.rotations import euler_from_quaternion
 from colibri.mavlink.hil.state import StateFrame
@@ -17,9 +15,8 @@ from colibri.mavlink.hil.state import StateFrame
 class Flying:
     """Flies one vehicle, control sample after control sample."""
 
-    def __init__(self, parts: Parts, supervision: Supervision, defence: Defence) -> None:
-        """Fly a vehicle of these parts."""
-        self._parts, self._supervision, self._defence = parts, supervision, defence
+    def __init__(self, parts: Parts) -> None:
+        self._parts, self._guard = parts, parts.defence.guard
         self._blind = False
 
     @property
@@ -28,30 +25,20 @@ class Flying:
         descent = self._parts.actuation.descent
         return self._parts.pilot.state.armed and not (descent is not None and descent.landed)
 
-    def step(self, now_us: int, state: VehicleState, *, blind: bool) -> tuple[Guidance, Decision | None]:
-        """Fly a sample; `blind`: the estimator has failed, and nobody knows the place."""
-        parts = self._parts
-        if blind and not self._blind:
+    def go_blind(self) -> None:
+        """Descend: the estimator has failed, and the position is unknown."""
+        if not self._blind:
             self._blind = True
-            self._defence.off.add(errors.ROTOR_WATCH)
-            parts.pilot.save(Action.DESCEND)
-        self._supervision.step(now_us, state)
-        guidance = RESTS if parts.actuation.descent is not None else self._guided(now_us)
-        decision = self._decided(now_us, state, guidance)
-        if parts.rotor_loss.landed and parts.pilot.state.armed:
-            parts.pilot.touch_down()
-        return guidance, decision
+            self._parts.defence.off.add(table.ROTOR_WATCH)
+            self._parts.pilot.save(Action.DESCEND)
 
     def rescue(self, now_us: int, known: StateFrame) -> Decision | None:
         """Fly the last resort where a sample itself has raised."""
         self.descend(now_us)
         euler = euler_from_quaternion(known.attitude)
         state = VehicleState(known.position_enu_m, known.velocity_enu_m_s, known.attitude, euler, known.rate_flu_rad_s)
-        try:
-            return self._parts.actuation.decide_plainly(now_us, state, RESTS)
-        except Exception as error:
-            self._defence.caught(errors.PLAIN_LAW, error)
-            return None
+        actuation = self._parts.actuation
+        return self._guard(table.PLAIN_LAW, lambda: actuation.decide_plainly(now_us, state, RESTS), lambda: None)
 
     def descend(self, now_us: int) -> None:
         """Fly the last resort from now on, for good."""
@@ -60,45 +47,64 @@ class Flying:
             actuation.descent = Descent(now_us, pilot.ground.height_m, standing=pilot.ground.standing)
             pilot.readiness.descends = True
 
-    def _guided(self, now_us: int) -> Guidance:
-        """Return the pilot's references; where his task raises, those of hold, and where that does, none."""
-        pilot, defence = self._parts.pilot, self._defence
-        holds = not isinstance(pilot.task, HoldTask) and pilot.state.mode is not Mode.LAND
-        try:
-            return pilot.step()
-        except Exception as error:
-            defence.caught(errors.TASK if holds else errors.GUIDANCE, error)
-        if not pilot.state.armed:
+    def guide(self, now_us: int) -> Guidance:
+        """Return the pilot's references; where the task raises, those of hold, and where that does, none."""
+        pilot = self._parts.pilot
+        if self._parts.actuation.descent is not None:
             return RESTS
-        if holds:
-            try:
-                pilot.save(Action.HOLD)
-                return pilot.step()
-            except Exception as error:
-                defence.caught(errors.GUIDANCE, error)
-        self.descend(now_us)
-        return RESTS
+        holds = not isinstance(pilot.task, HoldTask) and pilot.state.mode is not Mode.LAND
 
-    def _decided(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        def hold() -> Guidance:
+            pilot.save(Action.HOLD)
+            return pilot.step()
+
+        def last_resort() -> Guidance:
+            self.descend(now_us)
+            return RESTS
+
+        def instead() -> Guidance:
+            if not pilot.state.armed:
+                return RESTS
+            return self._guard(table.GUIDANCE, hold, last_resort) if holds else last_resort()
+
+        return self._guard(table.TASK if holds else table.GUIDANCE, pilot.step, instead)
+
+    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         """Return the decision of the control law, or of what flies in its place."""
-        parts, actuation, defence = self._parts, self._parts.actuation, self._defence
-        if actuation.descent is None and not actuation.by_plain_law:
-            flown = errors.THREE_ROTORS if parts.rotor_loss.flies else errors.LAW
-            try:
-                solve_time_s = parts.pilot.behaviour.solve_time_s
-                felt = state if parts.pilot.ground.clear(state) else state._replace(airborne=False)
-                return actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
-            except Exception as error:
-                defence.caught(flown, error)
-            if flown is errors.THREE_ROTORS and flown not in defence.off:
+        parts = self._parts
+        if parts.actuation.descent is None and not parts.actuation.by_plain_law:
+            decision = self._decide_by_law(now_us, state, guidance)
+        else:
+            decision = self._decide_plainly(now_us, state, guidance)
+        if parts.rotor_loss.landed and parts.pilot.state.armed:
+            parts.pilot.touch_down()
+        return decision
+
+    def _decide_by_law(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        parts = self._parts
+        flown = table.THREE_ROTORS if parts.rotor_loss.flies else table.LAW
+
+        def by_law() -> Decision | None:
+            solve_time_s = parts.pilot.behaviour.solve_time_s
+            felt = state if parts.pilot.ground.clear(state) else state._replace(airborne=False)
+            return parts.actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
+
+        def instead() -> Decision | None:
+            if flown is table.THREE_ROTORS and flown not in parts.defence.off:
                 return None
             parts.rotor_loss.end()
-            actuation.by_plain_law = True
-        try:
-            decision = actuation.decide_plainly(now_us, state, guidance)
-        except Exception as error:
-            defence.caught(errors.PLAIN_LAW, error)
-            return None
-        if actuation.descent is not None and actuation.descent.landed and parts.pilot.state.armed:
-            parts.pilot.touch_down()
+            parts.actuation.by_plain_law = True
+            return self._decide_plainly(now_us, state, guidance)
+
+        return self._guard(flown, by_law, instead)
+
+    def _decide_plainly(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        actuation, pilot = self._parts.actuation, self._parts.pilot
+
+        def plainly() -> Decision | None:
+            return actuation.decide_plainly(now_us, state, guidance)
+
+        decision = self._guard(table.PLAIN_LAW, plainly, lambda: None)
+        if actuation.descent is not None and actuation.descent.landed and pilot.state.armed:
+            pilot.touch_down()
         return decision

@@ -66,7 +66,7 @@ def parts_of(
     estimator: NewEstimator | None,
     strict: bool,
 ) -> Parts:
-    """Return the parts of a vehicle; arguments and errors are those of `Copter`."""
+    """Return the parts of a vehicle; arguments and errors are those of `copter_autopilot`."""
     numbers = Numbers(profile, vehicle)
     parameters = Parameters(definitions(profile, vehicle, settings.system_id))
     parameters.load(values or {})
@@ -87,7 +87,7 @@ def parts_of(
     stations = Stations(
         *(settings, pilot, missions, fence, lines, parameters, recorder),
         takes_attitude=attitude is not None,
-        caught=None if strict else defence.caught,
+        defence=defence,
     )
     supervisor = Supervisor(parameters, lines)
     rotor_loss = RotorLoss(assumed, loop.control_interval_us)
@@ -98,7 +98,7 @@ def parts_of(
     delay = DelayCompensation(assumed)
 
     def obey_delay(flies_by: Behaviour) -> None:
-        delay.tell(profile.delay_s if flies_by.delay_s < 0.0 else flies_by.delay_s)
+        delay.declare(profile.delay_s if flies_by.delay_s < 0.0 else flies_by.delay_s)
 
     obey_delay(flies_by)
     trial = Trial(loop, rotor_loss, planned_at)

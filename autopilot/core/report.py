@@ -1,11 +1,9 @@
 """The report of a control sample: arming inputs to the pilot, the snapshot to ground stations."""
 
-from typing import NamedTuple
-
-from colibri.autopilot.commander.flight.reference_generator import Guidance
 from colibri.autopilot.commander.rules.arming import ArmingInputs, battery_fault
 from colibri.autopilot.commander.rules.modes import MANUAL
-from colibri.autopilot.control.interface import Decision, VehicleState
+from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.core.autopilot import Sample
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.health import HealthWatch, not_known
@@ -13,16 +11,6 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 _CRITICAL = (mav.MAV_BATTERY_CHARGE_STATE_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE_EMERGENCY)
-
-
-class Sample(NamedTuple):
-    """A control sample; no decision while the rotors stand or idle, and the duration of the computation."""
-
-    now_us: int
-    state: VehicleState
-    guidance: Guidance
-    decision: Decision | None
-    duration_s: float
 
 
 class Reporter:

@@ -3,8 +3,7 @@
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.control.interface import VehicleState
-from colibri.autopilot.core.defence import errors
-from colibri.autopilot.core.defence.errors import Defence
+from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
 
@@ -14,9 +13,8 @@ _EVER_US = 10**15
 class Supervision:
     """Supervises one vehicle."""
 
-    def __init__(self, parts: Parts, defence: Defence) -> None:
-        """Supervise a vehicle of these parts; what raises is left to `defence`."""
-        self._parts, self._defence = parts, defence
+    def __init__(self, parts: Parts) -> None:
+        self._parts, self._guard = parts, parts.defence.guard
         self._missed_us: int | None = None
         self._listening_us = NEVER_US
 
@@ -31,14 +29,10 @@ class Supervision:
 
     def step(self, now_us: int, state: VehicleState) -> None:
         """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
-        parts, defence = self._parts, self._defence
-        if errors.ROTOR_WATCH not in defence.off:
-            try:
-                self._watch_rotors(state)
-            except Exception as error:
-                defence.caught(errors.ROTOR_WATCH, error)
-        steered, position_known = self._sensed(now_us)
-        delay_us = 0 if errors.DELAY in defence.off else parts.delay.delay_us
+        parts, guard = self._parts, self._guard
+        guard(table.ROTOR_WATCH, lambda: self._watch_rotors(state), lambda: None)
+        steered, position_known = guard(table.SETPOINTS, lambda: self._sensed(now_us), lambda: (NOT_STEERED, True))
+        delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         parts.pilot.sense(
             now_us,
             state,
@@ -48,23 +42,19 @@ class Supervision:
             waited_us=parts.loop.take_waited_us(),
             path_speed=parts.loop.path_speed,
         )
-        if errors.FAILSAFES not in defence.off:
-            try:
-                action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)
-                if action is not Action.NONE:
-                    parts.pilot.save(action)
-            except Exception as error:
-                defence.caught(errors.FAILSAFES, error)
+        guard(table.FAILSAFES, lambda: self._execute(now_us, state), lambda: None)
         self._missed_us = None
+
+    def _execute(self, now_us: int, state: VehicleState) -> None:
+        """Have the pilot execute the failsafe that is due."""
+        action = self._parts.supervisor.step(self._inputs(now_us, state), self._parts.pilot.flight)
+        if action is not Action.NONE:
+            self._parts.pilot.save(action)
 
     def _sensed(self, now_us: int) -> tuple[Steered, bool]:
         """Return the setpoints of clients, and whether the position is known."""
         parts = self._parts
-        try:
-            return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
-        except Exception as error:
-            self._defence.caught(errors.SETPOINTS, error)
-            return NOT_STEERED, True
+        return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
 
     def _watch_rotors(self, state: VehicleState) -> None:
         """Detect a lost rotor, after which there is but one way to fly."""

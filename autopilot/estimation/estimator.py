@@ -122,25 +122,66 @@ class Estimator:
         self._buffer = DelayBuffer(self._capacity)
         self.filter_us = 0
         self._reading = _NOTHING
-        self._late: SensorFrame | None = None
+        self._queued: SensorFrame | None = None
+        self._unpublished = False
         self._time_us: int | None = None
         self._published_us = 0
         self._estimate: Estimate | None = None
         self._tests: Tests | None = None
         self._resets = 0
 
-    def step(self, frame: SensorFrame, *, asked: bool = True) -> Estimate | None:
-        """Take a frame; return the estimate at its time, or None as long as the vehicle has not rested with a fix.
+    @property
+    def last(self) -> Estimate | None:
+        """The last estimate; None as long as the vehicle has not rested with a fix."""
+        return self._estimate
 
-        Unless `asked`, the estimate before is returned again, which takes half of the time; and so it is where the time
-        of a frame does not follow. When such frames go on, the simulator has restarted, and so does the estimator.
+    def step(self, frame: SensorFrame) -> Estimate | None:
+        """Return the estimate at the time of a frame, as `receive` and `estimate` do."""
+        self.receive(frame)
+        return self.estimate()
+
+    def receive(self, frame: SensorFrame) -> None:
+        """Queue a frame for `advance`, which comes with the next call of any method at the latest.
+
+        The first estimate, and a frame that does not follow, are dealt with at once: `last` depends on them.
         """
-        self._take_late()
+        self.advance()
+        self._queued = frame
+        last_us = self._time_us
+        if self._estimate is None or last_us is None or not 0 < frame.time_us - last_us <= MAX_GAP_US:
+            self.advance()
+
+    def estimate(self) -> Estimate | None:
+        """Return the estimate at the time of the last frame; None as long as there is none.
+
+        Where the time of a frame does not follow, the one before is returned. When such frames go on, the simulator has
+        restarted, and so does the estimator.
+        """
+        self.advance()
+        if self._unpublished and self._time_us is not None:
+            self._publish(self._time_us)
+        return self._estimate
+
+    def advance(self) -> None:
+        """Take in the frame that is queued: bring the filter on to what is as old as a fix that comes with it."""
+        frame, self._queued = self._queued, None
+        if frame is not None:
+            self._take_in(frame)
+
+    def settle(self) -> None:
+        """Advance, and do what the next frame will need, where it comes in time: the same, but earlier."""
+        self.advance()
+        if self._estimate is not None and self._time_us is not None:
+            self._take_until(self._time_us + self._interval_us)
+            self._note_tests()
+
+    def _take_in(self, frame: SensorFrame) -> None:
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
             self._rejected.add(Source.CLOCK, Reason.TIME)
             if not self._clock_resets.settle(frame.time_us):
-                return self._estimate
+                self._unpublished = False
+                return
             self._restart()
             last_us = None
         self._clock_resets.clear()
@@ -163,7 +204,7 @@ class Estimator:
             elif caught is not None:
                 self._start_in_air(caught, frame.time_us)
             else:
-                return None
+                return
             self._published_us = self.filter_us = frame.time_us
         else:
             buffer = self._buffer
@@ -173,34 +214,13 @@ class Estimator:
             self._take_until(frame.time_us)
             if fix is not None:
                 self._fuse(fix, frame.time_us)
-        if not asked and self._estimate is not None:
-            return self._estimate
-        return self._publish(frame.time_us)
-
-    def put_off(self, frame: SensorFrame) -> Estimate | None:
-        """Return the estimate before, as `step` does unless asked, but leave the frame to `settle`, or the next one."""
-        self._take_late()
-        last_us = self._time_us
-        if self._estimate is None or last_us is None or not 0 < frame.time_us - last_us <= MAX_GAP_US:
-            return self.step(frame, asked=False)
-        self._late = frame
-        return self._estimate
-
-    def settle(self) -> None:
-        """Do what can be done before the next frame comes, where it comes in time: the same, but earlier."""
-        self._take_late()
-        if self._estimate is not None and self._time_us is not None:
-            self._take_until(self._time_us + self._interval_us)
-            self._note_tests()
-
-    def _take_late(self) -> None:
-        frame, self._late = self._late, None
-        if frame is not None:
-            self.step(frame, asked=False)
+        self._unpublished = True
+        if self._estimate is None:
+            self._publish(frame.time_us)
 
     def record(self) -> bytes:
         """Return what is needed to go on after a restart; empty before the first estimate."""
-        self._take_late()
+        self.advance()
         if self._estimate is None or self._time_us is None:
             return b""
         return to_bytes(
@@ -306,7 +326,8 @@ class Estimator:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
-        """Return the estimate now; None, after a restart, if its numbers can be of no vehicle."""
+        """Make the estimate of now; None, after a restart, if its numbers can be of no vehicle."""
+        self._unpublished = False
         filter_, buffer = self.filter, self._buffer
         ahead = len(buffer.waiting)
         look_ahead(filter_.x, filter_.P, buffer.samples, buffer.first, ahead, self._gravity, self._now)

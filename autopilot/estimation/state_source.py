@@ -54,6 +54,7 @@ class StateSource:
         self._make = estimator
         self._estimating = None if estimator is None else estimator(interval_us)
         self._time_us: int | None = None
+        self._given: StateFrame | None = None
         self.estimate: Estimate | None = None
         self.sensed: SensorFrame | None = None
         self.latest: dict[str, Any] = {}
@@ -78,16 +79,16 @@ class StateSource:
         """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
         return self._estimating is not None and self._estimating.resume(record, time_us)
 
-    def state(self, frame: Frame, *, asked: bool = True, settles: bool = False) -> StateFrame | None:
-        """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
+    def receive(self, frame: Frame) -> None:
+        """Take in a frame; on sensors, queue it for the estimator.
 
-        Where `settle` is called between frames, less is done for the one that is not asked for.
-
-        Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
-        estimator's to judge.
+        Time that begins again is another flight, of which nothing is known. A frame that is a little late is left to
+        the estimator.
         """
         if isinstance(frame, StateFrame):
-            return frame
+            self._given = frame
+            return
+        self._given = None
         assert self._make is not None, "frames of sensors come only where there is an estimator"
         if self._estimating is None or self._begins_again(frame):
             self._estimating, self.estimate = self._make(self._interval_us), None
@@ -99,11 +100,27 @@ class StateSource:
                 self.latest[row.field] = value
         if frame.gps is not None:
             self._fix_us = frame.time_us
-        if settles and not asked:
-            self.estimate = self._estimating.put_off(frame)
-        else:
-            self.estimate = self._estimating.step(frame, asked=asked)
+        self._estimating.receive(frame)
+        self.estimate = self._estimating.last
+
+    def state(self) -> StateFrame | None:
+        """Return the state at the last frame; None until there is an estimate."""
+        if self._estimating is not None and self._given is None:
+            self.estimate = self._estimating.estimate()
+        return self.last
+
+    @property
+    def last(self) -> StateFrame | None:
+        """The last state: that of the last frame, or on sensors of the last estimate; None before the first."""
+        if self._given is not None:
+            return self._given
         return None if self.estimate is None else self.estimate.frame
+
+    def advance(self) -> None:
+        """Have the estimator do the work of the last frame now, whether its estimate is needed or not."""
+        if self._estimating is not None:
+            self._estimating.advance()
+            self.estimate = self._estimating.last
 
     def settle(self) -> None:
         """Do what need not be done between a frame and its answer."""

@@ -3,7 +3,6 @@
 from math import isnan
 
 from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.flight.reference_generator import Guidance
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import ROWS, Mode, custom_mode
@@ -19,6 +18,7 @@ from colibri.autopilot.control.interface import (
 from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
+from colibri.autopilot.guidance.guidance import Guidance
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.telemetry.snapshot import (

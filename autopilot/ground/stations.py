@@ -1,8 +1,9 @@
 """The vehicle's side towards ground stations: all services, put together around one pilot, on one hub."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.fence import Fence
@@ -25,7 +26,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
 from colibri.mavlink.mission.service import MissionService, Vehicle
-from colibri.mavlink.node.hub import Caught, Hub, Outgoing
+from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata, metadata_json
 from colibri.mavlink.parameters.pack import packed
@@ -52,6 +53,7 @@ from colibri.mavlink.ulog.recorder import Recorder
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
 
+T = TypeVar("T")
 PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 MAX_SAID = 20
 """Status texts kept for whoever watches the process."""
@@ -83,6 +85,16 @@ class StationSettings:
     relays_faults: bool = True
 
 
+class Guarding(Protocol):
+    """Catches the exceptions of parts by their names."""
+
+    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+        """Return what `call` returns, or what `otherwise` does where that raises."""
+
+    def caught(self, part: str, error: Exception, instead: str = "") -> None:
+        """Take in an exception of a part."""
+
+
 class Stations:
     """Serves any number of ground stations.
 
@@ -106,11 +118,11 @@ class Stations:
         recorder: Recorder,
         *,
         takes_attitude: bool,
-        caught: Caught | None = None,
+        defence: Guarding,
     ) -> None:
-        """`caught` receives exceptions of a service; None: they are raised."""
+        """`defence` catches the exceptions of services."""
         identity = IDENTITIES[settings.identity]
-        self._lines, self._pilot, self._caught = lines, pilot, caught
+        self._lines, self._pilot, self._guard = lines, pilot, defence.guard
         self._text = StatusText()
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
@@ -156,7 +168,7 @@ class Stations:
             services,
             signing=settings.signing,
             observers=(self._streams,),
-            caught=caught,
+            caught=defence.caught,
         )
         self.snapshot: Snapshot | None = None
         self.log = OnboardLog(recorder, files)
@@ -199,34 +211,24 @@ class Stations:
 
     def poll(self, now_us: int) -> list[Outgoing]:
         """Do what is due; return what to send. Called once a frame."""
-        try:
-            self._tell(now_us)
-        except Exception as error:
-            self._left_out("progress", error, "not reported")
-        try:
-            for severity, text in self._lines.take():
-                self.say(severity, text)
-            self.hub.poll(now_us)
-        except Exception as error:
-            self._left_out("hub", error, "not polled in this frame")
+        self._guard("progress", lambda: self._tell(now_us), _nothing)
+        self._guard("hub", lambda: self._poll_hub(now_us), _nothing)
         said = self._text.take()
         self._said.extend(said)
-        try:
-            self.log.update(self.snapshot, said, now_us, armed=self._pilot.state.armed)
-        except Exception as error:
-            self._left_out("flight log", error, "not recorded")
+        armed = self._pilot.state.armed
+        self._guard("flight log", lambda: self.log.update(self.snapshot, said, now_us, armed=armed), _nothing)
         return self.take_outbox()
+
+    def _poll_hub(self, now_us: int) -> None:
+        for severity, text in self._lines.take():
+            self.say(severity, text)
+        self.hub.poll(now_us)
 
     def _tell(self, now_us: int) -> None:
         for seq in self.missions.take_reached():
             self.plans.reached(seq)
         for text in self.system.poll(now_us):
             self.say(INFO, text)
-
-    def _left_out(self, part: str, error: Exception, instead: str) -> None:
-        if self._caught is None:
-            raise error
-        self._caught(part, error, instead)
 
     def refuse_commands(self, reason: str) -> None:
         """Deny every command for a reason, and drop all other messages; with an empty reason, serve again."""
@@ -278,3 +280,7 @@ def _files(settings: StationSettings, metadata: Metadata, parameters: Parameters
     pack = {"@PARAM/param.pck": lambda query: packed(parameters, query) or b""}
     mounts = {} if settings.logs is None else {LOGS: settings.logs}
     return Tree(settings.files or Memory(), mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
+
+
+def _nothing() -> None:
+    """Replace what raised by nothing."""

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
-from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
@@ -18,7 +18,6 @@ from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED
 
 if TYPE_CHECKING:
-    from colibri.autopilot.core.copter import Copter
     from colibri.autopilot.process.ground import Ground
 
 
@@ -58,7 +57,7 @@ class Client:
         self._refusal_reported = self._unknown_reported = False
         self._unknown_since_us: int | None = None
 
-    def fly(self, autopilot: "Autopilot | Copter") -> None:
+    def fly(self, autopilot: Autopilot[Any]) -> None:
         """Answer every frame until it is stopped.
 
         Raises:
@@ -74,8 +73,8 @@ class Client:
             due_s = self._end.poll(perf_counter())
             self._send()
             if step:  # while the plant integrates
-                if isinstance(autopilot, Autopilot):
-                    autopilot.settle()
+                if self._ground is None:
+                    autopilot.serve()
                 self._frame_came = True
                 self._report_if_unknown(step)
                 self._keep(partial(AutopilotLog.write, step=step))

@@ -8,9 +8,10 @@ from time import perf_counter, thread_time, time
 from typing import TYPE_CHECKING, Any
 
 from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.checkpoint import History
-from colibri.autopilot.core.copter import Copter
-from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.copter import Copter, copter_autopilot
+from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import MAX_SAID, StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
@@ -43,7 +44,7 @@ class Ground:
     It has more attributes than most classes: what a vehicle is made of, to make another one after a restart.
 
     Attributes:
-        copter: The vehicle; another one after a restart.
+        autopilot: Flies the vehicle; another one after a restart.
         errors: What was caught in flight.
         shut_down: Whether a ground station has requested the end.
     """
@@ -85,7 +86,7 @@ class Ground:
         self._log: AutopilotLog | None = None
         self._recorded_snapshot: Snapshot | None = None
         self._texts: deque[str] = deque(maxlen=MAX_SAID)
-        self.copter = self._new_copter(self._state.history())
+        self.autopilot = self._new_autopilot(self._state.history())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
         try:
@@ -111,8 +112,13 @@ class Ground:
         if log.topics:
             log.topics.follow(self.copter.parameters)
 
-    def serve(self, now_s: float) -> Copter:
-        """Receive from ground stations and answer them; return the vehicle that flies on.
+    @property
+    def copter(self) -> Copter:
+        """The vehicle."""
+        return self.autopilot.stages
+
+    def serve(self, now_s: float) -> Autopilot[Copter]:
+        """Receive from ground stations and answer them; return the autopilot that flies on.
 
         They are answered last: what an answer acknowledges is on disk by then, whenever this process is killed.
         """
@@ -120,19 +126,16 @@ class Ground:
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
             received = self._recorded(self._log, received)
-        outbox = self.copter.serve(received)
+        outbox = self.autopilot.serve(received)
         self._record_told()
         if stations.system.restart:
             self._restart(stations.system.restart)
-        try:
-            self._look_after(now_s)
-        except Exception as error:
-            self.copter.defence.caught(errors.PROCESS, error)
+        self.copter.guard(table.PROCESS, lambda: self._look_after(now_s), lambda: None)
         self._links.send(outbox)
         records = self.copter.defence.take()
         if records:
             self.errors.write(records)
-        return self.copter
+        return self.autopilot
 
     def _record_told(self) -> None:
         """Record what ground stations are told, where it is new; keep the texts for the terminal."""
@@ -204,14 +207,14 @@ class Ground:
             self._status.say("said", "shut down by a ground station")
         elif kind == REBOOT:
             try:
-                copter = self._new_copter(None)
+                autopilot = self._new_autopilot(None)
             except Exception as error:
                 self.copter.stations.system.restart = 0.0
-                self.copter.defence.caught(errors.RESTART, error, "the autopilot goes on as it is")
+                self.copter.defence.caught(table.RESTART, error, "the autopilot goes on as it is")
                 return
             self.copter.stations.log.close()
             self.errors.write(self.copter.defence.take())
-            self.copter = copter
+            self.autopilot = autopilot
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
             if self._log:
@@ -219,7 +222,7 @@ class Ground:
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
-    def _new_copter(self, history: History | None) -> Copter:
+    def _new_autopilot(self, history: History | None) -> Autopilot[Copter]:
         args = self._args
         self._values = self._state.parameters()
         self._past_bytes = b"" if history is None else to_bytes(history)
@@ -235,7 +238,7 @@ class Ground:
             relays_faults=args.simulator is None,
         )
         try:
-            copter = Copter(
+            return copter_autopilot(
                 self._profile,
                 self._vehicle,
                 settings,
@@ -247,7 +250,6 @@ class Ground:
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error
-        return copter
 
     def _report(self, now_s: float) -> None:
         pilot = self.copter.pilot

@@ -2,10 +2,11 @@
 
 import argparse
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.autopilot import Autopilot
+from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.process.client import Client
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
         profile, vehicle = loaded(args)
         served = args.gcs or args.stepped
         ground = _ground(args, profile, vehicle, status, stop) if served else None
-        autopilot = ground.copter if ground else _alone(args, profile, vehicle, status)
+        autopilot: Autopilot[Any] = ground.autopilot if ground else _alone(args, profile, vehicle, status)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except Error as error:
         fail(keep_failure(error, args.out))
@@ -113,12 +114,12 @@ def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
     )
 
 
-def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Autopilot:
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Autopilot[TrackStages]:
     flown, note = load_track(args.track or TRACK, vehicle, profile, args.floor)
     if note:
         status.say("track", note)
     estimator = estimator_for(args.feedback, vehicle, args.home.origin)
-    return Autopilot(profile, vehicle, flown, perf_counter, estimator=estimator)
+    return track_autopilot(profile, vehicle, flown, perf_counter, estimator=estimator)
 
 
 def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "Ground":

@@ -9,7 +9,7 @@ from typing import Any
 
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.bench.speed import Report
 from colibri.bench.stages import Figures, summary
@@ -53,20 +53,21 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     The log of the flight is served as a ground station is, also where there is none.
     """
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
-    copter = Copter(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
+    autopilot = copter_autopilot(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
+    stations = autopilot.stages.stations
     for link in range(channels):
-        copter.stations.use(copter.stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
+        stations.use(stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
     plant = PlantBuilder(plan, plan.plant_vehicle, {plan.feedback: nudged(plan.start)}).build(
-        plan.feedback, copter.frame_interval_us
+        plan.feedback, autopilot.frame_interval_us
     )
     times_us = []
     with gc_frozen():
         while plant.world.time_us < plan.duration_s * 1e6:
-            plant.answer(copter.step(*plant.measure()).command)
+            plant.answer(autopilot.step(*plant.measure()).command)
             began_s = perf_counter()
-            copter.serve(())
+            autopilot.serve()
             times_us.append((perf_counter() - began_s) * 1e6)
-    sent = sum(channel.sent for channel in copter.stations.hub.channels if channel.link >= 0)
+    sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)
     return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.duration_s}
 
 

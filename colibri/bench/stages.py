@@ -19,7 +19,7 @@ from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.control.whole_lpv_mpc import planning
 from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_blocks
 from colibri.flights.in_process import fly_locally
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd

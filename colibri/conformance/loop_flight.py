@@ -50,7 +50,7 @@ class LoopFlight:
         """
         off_m = []
         for _ in range(self._samples(seconds)):
-            state = self.loop.state(state_frame(self.world))
+            state = self.loop.observe(state_frame(self.world))
             references = self._planner.horizon_at(self.world.time_us, self.loop.control_interval_us)
             off_m.append(np.linalg.norm(references.position_enu_m[0] - state.position_enu_m))
             self.loop.decide(self.world.time_us, state, references)
@@ -66,10 +66,10 @@ class LoopFlight:
         n = self.loop.preview.samples
         demand = AttitudeDemand(np.tile(angles, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
         for _ in range(self._samples(HELD_S)):
-            state = self.loop.state(state_frame(self.world))
+            state = self.loop.observe(state_frame(self.world))
             self.loop.decide_attitude(self.world.time_us, state, demand)
             self._go_on()
-        return self.loop.state(state_frame(self.world))
+        return self.loop.observe(state_frame(self.world))
 
     @property
     def tilt_deg(self) -> float:
@@ -139,7 +139,7 @@ def restart(subject: Subject, how: str, plan: FlightPlan) -> Restarted:
     """Do what `restarted` does, for a plan."""
     flight = LoopFlight(subject, plan)
     flight.fly(_BEFORE_S)
-    kept, yaw_rad, world = flight.loop.record(), flight.loop.state(state_frame(flight.world)).euler[2], flight.world
+    kept, yaw_rad, world = flight.loop.record(), flight.loop.observe(state_frame(flight.world)).euler[2], flight.world
     unbroken_m, unbroken = flight.fly(_AFTER_S), flight.world
     flight.loop, flight.world = flight.new_loop(), world
     if how == "blind":
@@ -178,5 +178,5 @@ def held(
 def hold(subject: Subject, phi: float, theta: float, thrust_n: float) -> VehicleState:
     """Do what `held` does, for a subject."""
     flight = LoopFlight(subject, subject.plan("hover:height=60", start=subject.start(z=60.0)))
-    yaw_rad = flight.loop.state(state_frame(flight.world)).euler[2]
+    yaw_rad = flight.loop.observe(state_frame(flight.world)).euler[2]
     return flight.hold((phi, theta, yaw_rad), thrust_n)

@@ -3,11 +3,12 @@
 from collections.abc import Callable
 from math import isfinite
 from time import perf_counter, sleep
-from typing import Protocol
+from typing import Any, Protocol
 
 from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.autopilot.process.logs import AutopilotLog
@@ -81,14 +82,14 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
     return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
 
 
-def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot, Plant]:
+def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages], Plant]:
     """Return the autopilot and the plant of a flight as it begins; `clock` only measures.
 
     Raises:
         ControllerError, ProfileError, SolverError: As `fly_locally`.
     """
     estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
-    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.law)
+    autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.law)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
     starts = {plan.feedback: nudged(plan.start)}
     builder = PlantBuilder(plan, plan.plant_vehicle, starts, integrator=integrator)
@@ -118,7 +119,7 @@ def _setup(plan: FlightPlan) -> Setup:
 class Direct:
     """Hands frame and command over in double precision, without the codec."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Autopilot[Any]) -> None:
         """Ask `autopilot`."""
         self._autopilot = autopilot
 
@@ -131,7 +132,7 @@ class Direct:
 class InMemory:
     """Carries the datagrams that the two processes would send, in the same conversation."""
 
-    def __init__(self, autopilot: Autopilot, frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
+    def __init__(self, autopilot: Autopilot[Any], frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
         """Let `autopilot` call the plant and request `feedback`."""
         self._autopilot = autopilot
         self._logs = logs

@@ -6,14 +6,15 @@ from contextlib import suppress
 from math import degrees
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.control.registry import DecisionError
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.checkpoint import History
-from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.core.step import Received, Step
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.loading import load_track, with_file
@@ -58,14 +59,14 @@ class Answer(NamedTuple):
     Attributes:
         time_us: Of the frame.
         command: What it had answered; None where nothing of that was recorded.
-        pilot: That answered.
+        autopilot: That answered.
         step: Its answer.
         known: Its state estimate; None before the first estimate.
     """
 
     time_us: int
     command: ActuatorCommand | None
-    pilot: Autopilot | Copter
+    autopilot: Autopilot[Any]
     step: Step
     known: StateFrame | None
 
@@ -203,7 +204,7 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
         if answer.command is not None:
             replayed = _carried(codec, answer.step.command)
             if replayed != answer.command:
-                difference = Difference(answer.command, replayed, _mode(answer.pilot), answer.known)
+                difference = Difference(answer.command, replayed, answer.autopilot.stages.mode, answer.known)
                 return Replayed(commands, last_us, difference)
             commands, last_us = commands + 1, answer.time_us
     return Replayed(commands, last_us, None)
@@ -216,26 +217,25 @@ def _answers(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Iterator[
     for what in inputs:
         if isinstance(what, ReceivedDatagram):
             inbox.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
-    pilot: Autopilot | Copter | None = None
+    autopilot: Autopilot[Any] | None = None
     known: StateFrame | None = None
     for time_us, datagram, command in recorded:
         if time_us in setups:
-            pilot = _begun(setups[time_us])
-            end = _end(setups[time_us], pilot)
-        if pilot is None:
+            autopilot = _begun(setups[time_us])
+            end = _end(setups[time_us], autopilot)
+        if autopilot is None:
             continue
         received = end.receive(datagram, _NO_CLOCK_S)
         if received is None:
             continue
         frame = received.frame
         try:
-            step = pilot.step(*received)
+            step = autopilot.step(*received)
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)
-        yield Answer(frame.time_us, command, pilot, step, known)
-        if isinstance(pilot, Copter):
-            pilot.serve(inbox.get(frame.time_us, ()))
+        yield Answer(frame.time_us, command, autopilot, step, known)
+        autopilot.serve(inbox.get(frame.time_us, ()))
 
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
@@ -269,7 +269,7 @@ def _logged_us(tlog: Path) -> int:
         return 0
 
 
-def _begun(setup: Setup) -> Autopilot | Copter:
+def _begun(setup: Setup) -> Autopilot[Any]:
     """Return an autopilot that begins as it did then."""
     tables = setup.profile_tables or load_profile(setup.profile)
     profile = tables.with_choices(setup.controller, setup.solver, setup.delay_s)
@@ -278,12 +278,12 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
         estimator = estimator_for(setup.feedback, vehicle, setup.origin)
-        return Autopilot(profile, vehicle, flown, _clock, estimator=estimator)
+        return track_autopilot(profile, vehicle, flown, _clock, estimator=estimator)
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
     )
     history = of_bytes(History, setup.history) if setup.history else None
-    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
+    return copter_autopilot(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
 
 
 def _track(setup: Setup, vehicle: Vehicle, profile: Profile) -> Track | None:
@@ -298,10 +298,10 @@ def _track(setup: Setup, vehicle: Vehicle, profile: Profile) -> Track | None:
         return load_track(with_file(setup.track, path), vehicle, profile, setup.floor_m).track
 
 
-def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:
+def _end(setup: Setup, autopilot: Autopilot[Any]) -> AutopilotEnd:
     return AutopilotEnd(
         system_id=setup.system_id,
-        frame_interval_us=pilot.frame_interval_us,
+        frame_interval_us=autopilot.frame_interval_us,
         now_s=_NO_CLOCK_S,
         feedback=setup.feedback,
     )
@@ -335,10 +335,6 @@ def _known(frame: Frame, step: Step, before: StateFrame | None) -> StateFrame | 
     if isinstance(frame, StateFrame):
         return frame
     return before if step.estimate is None else step.estimate.frame
-
-
-def _mode(pilot: Autopilot | Copter) -> str:
-    return "track" if isinstance(pilot, Autopilot) else str(pilot.pilot.state.mode)
 
 
 def _rotors(command: ActuatorCommand) -> str:

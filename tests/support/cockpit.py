@@ -7,7 +7,6 @@ import numpy as np
 
 from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.fence import Fence
-from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_tasks import ModeTasks
@@ -19,6 +18,7 @@ from colibri.autopilot.control.interface import Preview, VehicleState
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
 from colibri.autopilot.guidance.trajectories.tracks import Track

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec
@@ -59,7 +59,7 @@ def test_the_control_law_answers_whatever_decodes(seed: int) -> None:
     """
     chance = random.Random(seed)
     profile = load_profile("thesis")
-    autopilot = Autopilot(profile, load_vehicle(profile.simulation.vehicle), track("spiral"), lambda: NOW_S)
+    autopilot = track_autopilot(profile, load_vehicle(profile.simulation.vehicle), track("spiral"), lambda: NOW_S)
     for sample in range(100):
         scale = 10.0 ** chance.uniform(-38.0, 38.0)
         x, y, z, u, v, w, p, q, r = (chance.choice((0.0, scale, -scale, 3.4e38)) for _ in range(9))

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 PACKAGE = "colibri."
 
 PLACES: tuple[str, ...] = (
-    "autopilot.estimation.state_source:StateSource.state",
-    "autopilot.estimation.estimator:Estimator.step",
+    "autopilot.estimation.state_source:StateSource.receive",
+    "autopilot.estimation.estimator:Estimator._take_in",
     "autopilot.estimation.estimator:Estimator._publish",
     "autopilot.estimation.eskf:Filter.predict",
     "autopilot.estimation.eskf:Filter.fuse_fix",
-    "autopilot.control.loop:ControlLoop.state",
+    "autopilot.control.loop:ControlLoop.observe",
     "autopilot.core.supervision:Supervision.step",
     "autopilot.control.rotor_loss.rotor_loss:RotorLoss.look",
     "autopilot.control.rotor_loss.detector:RotorWatch.step",

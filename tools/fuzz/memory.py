@@ -2,7 +2,7 @@
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.step import answer
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.types import Address
 from colibri.mavlink.hil.feedback import Feedback
@@ -31,7 +31,7 @@ class Flight:
         """Let the autopilot call the plant."""
         profile = load_profile("thesis")
         vehicle = load_vehicle(profile.simulation.vehicle)
-        self._autopilot = Autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
+        self._autopilot = track_autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
         self._physics = Physics(vehicle, "rk4")
         self._world = starting_world(DEFAULT_STARTS[Feedback.STATE], vehicle)
         self.plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US)

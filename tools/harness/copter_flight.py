@@ -12,8 +12,9 @@ from msgspec import structs
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode, mode_of_custom
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.checkpoint import Checkpoint, History
-from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import Track
@@ -63,7 +64,7 @@ class CopterFlight(Stepped, Steered):
 
     Attributes:
         system: The vehicle's system id.
-        copter: The autopilot.
+        autopilot: The autopilot.
         plant: The plant.
         client: The first ground station.
         rotors: The last command to the plant.
@@ -100,10 +101,10 @@ class CopterFlight(Stepped, Steered):
             system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
         )
         self._weather = blowing(wind_enu_m_s)
-        self.copter = self._copter(values, first)
+        self.autopilot = self._copter(values, first)
         world = WorldSetting(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
         builder = PlantBuilder(world, vehicle or self._assumed, {feedback: nudged(start)}, origin=origin)
-        self.plant = builder.build(feedback, self.copter.frame_interval_us)
+        self.plant = builder.build(feedback, self.autopilot.frame_interval_us)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.estimate: Estimate | None = None
         self.client = client or Client()
@@ -114,6 +115,11 @@ class CopterFlight(Stepped, Steered):
             self.wait_until(lambda: self.estimate is not None, within=10.0, what="the first estimate")
         self.step()
 
+    @property
+    def copter(self) -> Copter:
+        """The vehicle that ground stations fly."""
+        return self.autopilot.stages
+
     def history(self) -> History:
         """Return what is kept of the flight, as it comes from a disk."""
         kept = of_bytes(Checkpoint, to_bytes(self.copter.record()))
@@ -121,8 +127,10 @@ class CopterFlight(Stepped, Steered):
         plans = self.copter.stations.plans.plans
         return History(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
 
-    def _copter(self, values: dict[str, Value] | None, first: Track | None, history: History | None = None) -> Copter:
-        return Copter(
+    def _copter(
+        self, values: dict[str, Value] | None, first: Track | None, history: History | None = None
+    ) -> Autopilot[Copter]:
+        return copter_autopilot(
             self._profile,
             self._assumed,
             self._settings,
@@ -146,7 +154,7 @@ class CopterFlight(Stepped, Steered):
     def restart(self, history: History | None = None) -> None:
         """Start the autopilot again, wherever the vehicle is; with the history of a flight it flies on at once."""
         values = None if history is None else dict(self.copter.parameters.values)
-        self.copter = self._copter(values, None, history)
+        self.autopilot = self._copter(values, None, history)
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
         if history is not None:
@@ -154,11 +162,11 @@ class CopterFlight(Stepped, Steered):
 
     def step(self) -> None:
         """Fly one frame."""
-        step = self.copter.step(*self.plant.measure())
+        step = self.autopilot.step(*self.plant.measure())
         self.rotors, self.estimate = step.command, step.estimate or self.estimate
         self.plant.answer(step.command, step.faults)
         inbox = [received for client in self._clients for received in client.take_sent()]
-        for link, address, datagram in self.copter.serve(inbox):
+        for link, address, datagram in self.autopilot.serve(inbox):
             for client in self._clients:
                 if (client.link, client.address) == (link, address):
                     client.receive(datagram)

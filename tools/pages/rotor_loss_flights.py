@@ -9,7 +9,8 @@ import numpy as np
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.autopilot import Autopilot
+from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
@@ -140,11 +141,11 @@ def fly(case: Case, seed: int) -> Flown:
     world = WorldSetting(wind=wind, turbulence=case.turbulence, seed=seed)
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
     values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
-    copter = Copter(profile, vehicle, settings, lambda: 0.0, values=values)
+    autopilot = copter_autopilot(profile, vehicle, settings, lambda: 0.0, values=values)
     starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
-    plant = PlantBuilder(world, vehicle, starts).build(case.feedback, copter.frame_interval_us)
-    _take_off(copter, plant)
-    return _lose(copter, plant, seed, _fault(case, seed % 4))
+    plant = PlantBuilder(world, vehicle, starts).build(case.feedback, autopilot.frame_interval_us)
+    _take_off(autopilot, plant)
+    return _lose(autopilot, plant, seed, _fault(case, seed % 4))
 
 
 def fly_all(cases: Iterable[Case], seeds: Iterable[int]) -> dict[Case, list[Flown]]:
@@ -160,28 +161,30 @@ def _fault(case: Case, rotor: int) -> Fault:
     return Fault(MOTOR, WRONG, rotor + 1, (_BLADES_LEFT, 0.0, 0.0, 0.0))
 
 
-def _take_off(copter: Copter, plant: Plant) -> None:
+def _take_off(autopilot: Autopilot[Copter], plant: Plant) -> None:
     """Climb to the height, and stay for a moment."""
+    copter = autopilot.stages
     while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
-        _step(copter, plant)
+        _step(autopilot, plant)
         assert plant.world.time_us < _MAX_DURATION_S * 1e6, "it must be ready to arm"
     copter.pilot.select(Mode.TAKEOFF, ())
     copter.pilot.arm(())
     began_us = plant.world.time_us
     while copter.pilot.state.mode is not Mode.HOLD:
-        _step(copter, plant)
+        _step(autopilot, plant)
         assert plant.world.time_us < began_us + _MAX_DURATION_S * 1e6, "it must reach its height"
 
 
-def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
+def _lose(autopilot: Autopilot[Copter], plant: Plant, seed: int, fault: Fault) -> Flown:
     """Lose a rotor; fly until the vehicle rests."""
+    copter = autopilot.stages
     lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
     rows: list[tuple[float, ...]] = []
     ends_us, noticed_s = lost_us + round(_MAX_DURATION_S * 1e6), nan
     while plant.world.time_us < ends_us:
         if plant.world.time_us == lost_us:
             plant.inject([fault])
-        controls = _step(copter, plant)
+        controls = _step(autopilot, plant)
         after_s = (plant.world.time_us - lost_us) * 1e-6
         rows.append((after_s, *_seen(plant), *controls))
         if copter.parts.rotor_loss.lost is not None and np.isnan(noticed_s):
@@ -194,10 +197,10 @@ def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
     return Flown(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
 
 
-def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:
-    step = copter.step(*plant.measure())
+def _step(autopilot: Autopilot[Copter], plant: Plant) -> tuple[float, ...]:
+    step = autopilot.step(*plant.measure())
     plant.answer(step.command, step.faults)
-    copter.serve(())
+    autopilot.serve()
     return step.command.controls
 
 

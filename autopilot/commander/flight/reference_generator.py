@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, VehicleState
+from colibri.autopilot.control.interface import Horizon, Pace, VehicleState
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import (
     Reference,
@@ -20,25 +20,6 @@ from colibri.autopilot.guidance.reference import (
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
-
-
-class Guidance(NamedTuple):
-    """References for the control law; neither horizon nor attitude while the rotors stand or idle.
-
-    Attributes:
-        horizon: References of position and yaw.
-        attitude: References of attitude and thrust.
-        begins: Whether the rotors leave idle now: the control law is reset.
-        pace: How time passes along the horizon.
-    """
-
-    horizon: Horizon | None = None
-    attitude: AttitudeDemand | None = None
-    begins: bool = False
-    pace: Pace = Pace.CLOCK
-
-
-RESTS = Guidance()
 
 
 class Led(NamedTuple):

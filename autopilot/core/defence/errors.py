@@ -1,73 +1,22 @@
-"""Exceptions caught in flight: recorded with what is needed to look into them, said once, counted; or raised.
+"""The guard of a flight: exceptions caught, recorded with what is needed to look into them, said once, counted.
 
-A part that has raised is tried again at its next turn, and is off for good after so many times.
+A part that has raised is tried again at its next turn; `table` has all parts, and says which are left out for good.
 """
 
 from collections import Counter
 from collections.abc import Callable
 from traceback import format_exception
-from typing import Final
+from typing import TypeVar
 
 import msgspec
 
 from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.core.defence.table import PARTS, TRIES
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.services.statustext import CRITICAL
 
-BATTERY: Final = "battery monitor"
-RESTART: Final = "restart"
-START: Final = "flight start"
-ESTIMATOR: Final = "estimator"
-STANDBY: Final = "inertial estimate"
-DELAY: Final = "delay compensation"
-ROTOR_WATCH: Final = "rotor watch"
-SETPOINTS: Final = "setpoints"
-FAILSAFES: Final = "failsafes"
-TASK: Final = "flight task"
-GUIDANCE: Final = "guidance"
-LAW: Final = "control law"
-THREE_ROTORS: Final = "three rotors"
-PLAIN_LAW: Final = "plain law"
-FAULTS: Final = "injected faults"
-STEP: Final = "step"
-TELEMETRY: Final = "telemetry"
-STATIONS: Final = "ground stations"
-DATAGRAM: Final = "datagram"
-PARAMETERS: Final = "parameters"
-LOG: Final = "flight log"
-CHECKPOINT: Final = "checkpoint"
-PROCESS: Final = "process"
-
-INSTEAD: Final = {
-    BATTERY: "charge no longer known",
-    RESTART: "nothing goes on of the flight before",
-    START: "begun anew",
-    ESTIMATOR: "inertial sensors carry on",
-    STANDBY: "attitude stays as it was",
-    DELAY: "the delay is not compensated",
-    ROTOR_WATCH: "lost rotors may go unnoticed",
-    SETPOINTS: "none are taken",
-    FAILSAFES: "none may act",
-    TASK: "hold",
-    GUIDANCE: "descending",
-    LAW: "plain law flies",
-    THREE_ROTORS: "last command stays",
-    PLAIN_LAW: "last command stays",
-    FAULTS: "none are injected",
-    STEP: "descending",
-    TELEMETRY: "old values are sent",
-    STATIONS: "not served in this frame",
-    DATAGRAM: "dropped",
-    PARAMETERS: "old values stay",
-    LOG: "not recorded",
-    CHECKPOINT: "none for a restart",
-    PROCESS: "left out",
-}
-"""What a part is replaced by, in words; services of the hub are parts under names of their own."""
-
-TRIES = 3
-"""A part that raises so often is off."""
+T = TypeVar("T")
 _MAX_RECORDS = 3
 """Of one part: what raises in every frame would fill the disk."""
 _MAX_KEPT = 100
@@ -122,8 +71,22 @@ class Defence:
         """Record with each exception what `checkpoint` returns."""
         self._checkpoint = checkpoint
 
+    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+        """Return what `call` returns; what `otherwise` does where that raises, or the part is left out by now.
+
+        Raises:
+            Exception: What `call` raises, if strict.
+        """
+        if part in self.off and PARTS[part].optional:
+            return otherwise()
+        try:
+            return call()
+        except Exception as error:
+            self.caught(part, error)
+        return otherwise()
+
     def caught(self, part: str, error: Exception, instead: str = "") -> None:
-        """Take in an exception of a part, in the clause that has caught it; `instead` says what replaces it.
+        """Take in an exception of a part; `instead`, where given, says what replaces it.
 
         Raises:
             Exception: The same one, if strict.
@@ -133,7 +96,7 @@ class Defence:
         self.counts[part] += 1
         if self.counts[part] >= TRIES:
             self.off.add(part)
-        instead = instead or INSTEAD[part]
+        instead = instead or PARTS[part].instead
         if self.counts[part] == 1:
             self._pilot.readiness.fail(f"{part} failed: restart the autopilot")
             self._say(CRITICAL, f"{part} failed: {instead}")

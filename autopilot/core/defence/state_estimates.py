@@ -1,6 +1,6 @@
 """The state of each frame, whatever the estimator does: where it raises, the inertial sensors carry the state on."""
 
-from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.defence.errors import Defence
 from colibri.autopilot.core.defence.inertial_estimate import InertialEstimate
 from colibri.autopilot.estimation.state_source import StateSource
@@ -22,29 +22,29 @@ class StateEstimates:
     """
 
     def __init__(self, source: StateSource, defence: Defence, gravity_m_s2: float) -> None:
-        """Ask `source`."""
         self._source, self._defence, self._gravity = source, defence, gravity_m_s2
         self._inertial: InertialEstimate | None = None
         self._missed = 0
         self.blind = False
 
-    def state(self, frame: Frame, *, asked: bool) -> StateFrame | None:
-        """Return the state at a frame as `StateSource.state` does; None as long as there never was one."""
+    def state(self, frame: Frame, *, now: bool) -> StateFrame | None:
+        """Return the state at a frame, or unless `now` the one before; None as long as there never was one."""
+        guard, source = self._defence.guard, self._source
         if not self.blind:
-            try:
-                known = self._source.state(frame, asked=asked)
-            except Exception as error:
-                self._defence.caught(errors.ESTIMATOR, error)
-            else:
+            worked, known = guard(table.ESTIMATOR, lambda: (True, self._estimated(frame, now)), lambda: (False, None))
+            if worked:
                 self._inertial, self._missed = None, 0
                 return known
         if isinstance(frame, StateFrame):
             return frame
-        try:
-            return self._carry_on(frame)
-        except Exception as error:
-            self._defence.caught(errors.STANDBY, error)
-            return None if self._source.estimate is None else self._source.estimate.frame
+        last = None if source.estimate is None else source.estimate.frame
+        return guard(table.STANDBY, lambda: self._carry_on(frame), lambda: last)
+
+    def _estimated(self, frame: Frame, now: bool) -> StateFrame | None:
+        """Have the estimator do all work of a frame within it: what it raises belongs to this frame."""
+        self._source.receive(frame)
+        self._source.advance()
+        return self._source.state() if now else self._source.last
 
     def _carry_on(self, frame: SensorFrame) -> StateFrame | None:
         estimate, self._source.sensed = self._source.estimate, frame
@@ -55,7 +55,7 @@ class StateEstimates:
             self._inertial = InertialEstimate(estimate, self._gravity)
         known = self._inertial.step(frame)
         estimate = estimate._replace(frame=known, check=None)
-        if not self.blind and (self._missed > _BRIDGED or self._defence.counts[errors.ESTIMATOR] > _MAX_ERRORS):
+        if not self.blind and (self._missed > _BRIDGED or self._defence.counts[table.ESTIMATOR] > _MAX_ERRORS):
             self.blind = True
         if self.blind:
             (_, _, height_m), (_, _, climb_m_s) = estimate.position_std_m, estimate.velocity_std_m_s

@@ -151,9 +151,9 @@ class LawPilot:
         """Begin with a vehicle that moves as `y` says, (17,), and take it over as it moves: brake, and stay."""
         frame = _frame(0, y)
         self._tick = 0
-        self._loop.begin(self._vehicle.hover_speed, self._loop.state(frame).euler[2])
+        self._loop.begin(self._vehicle.hover_speed, self._loop.observe(frame).euler[2])
         self._rotors = np.full(4, self._vehicle.hover_speed)
-        self._generator.follow(self._loop.state(frame))
+        self._generator.follow(self._loop.observe(frame))
         self._task = HoldTask()
 
     def fly_track(self) -> None:
@@ -194,7 +194,7 @@ class LawPilot:
         decision, horizon, place = None, None, None
         time_us = self._time_us
         if self._tick % self._parts == 0:
-            state = self._loop.state(_frame(time_us, y))
+            state = self._loop.observe(_frame(time_us, y))
             horizon, place = self._references(time_us, state)
             yaw, yaw_rate, yaw_acceleration = (float(of[0]) for of in horizon[5:])
             self._heading = (yaw, yaw_rate, yaw_acceleration)

@@ -129,11 +129,6 @@ class Predictor:
         there[model.VELOCITY] += self.drift_m_s
         return there
 
-    @property
-    def known_us(self) -> int | None:
-        """When the last state was, by the own clock; None before the first."""
-        return None if self._known is None else self._known[0]
-
     def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
         """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
         part = np.full(model.STATES, self._part(passed_s, 0.0))

@@ -136,10 +136,10 @@ class MemoryAutopilot:
             self._ground = Ground(args, *loaded(args), _Silence(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
-        self._copter = self._ground.copter
+        self._autopilot = self._ground.autopilot
         self._end = AutopilotEnd(
             system_id=args.system_id,
-            frame_interval_us=self._copter.frame_interval_us,
+            frame_interval_us=self._autopilot.frame_interval_us,
             now_s=NEVER_LATE_S,
             feedback=args.feedback,
         )
@@ -162,7 +162,7 @@ class MemoryAutopilot:
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         try:
-            answer(self._end, self._copter, datagram, NEVER_LATE_S)
+            answer(self._end, self._autopilot, datagram, NEVER_LATE_S)
         except DecisionError as error:
             raise SessionError(f"the autopilot ended: {error}") from error
 
@@ -183,7 +183,7 @@ class MemoryAutopilot:
 
     def to_stations(self) -> StepMessage:
         """Return what it sends to ground stations at that frame."""
-        self._copter = self._ground.serve(perf_counter())
+        self._autopilot = self._ground.serve(perf_counter())
         assert self._conductor.to_stations is not None, "it has served them"
         return self._conductor.to_stations
 

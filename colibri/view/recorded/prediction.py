@@ -31,7 +31,7 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
             continue
         decisions += 1
         if decisions % EVERY == 1:
-            points = forecaster.forecast(loop.state(answer.known), None, answer.step.decision.diagnostics)
+            points = forecaster.forecast(loop.observe(answer.known), None, answer.step.decision.diagnostics)
             if points:
                 here = answer.known.position_enu_m
                 yield answer.time_us / 1e6, np.array([here, *(point.position_enu_m for point in points)])

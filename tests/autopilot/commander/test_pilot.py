@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.commander.flight.reference_generator import RESTS
 from colibri.autopilot.commander.mode_tasks import task_record
 from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Event, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.guidance import RESTS
 from colibri.autopilot.guidance.tasks.position import HoldTask
 from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.mavlink.mission.items import MISSION

@@ -101,7 +101,7 @@ def test_the_delay_that_is_told_counts_until_it_is_taken_back() -> None:
     delay = DelayCompensation(VEHICLE, 0.03)
     delay.measure(12_000)
     assert delay.delay_us == 30_000
-    delay.tell(None)
+    delay.declare(None)
     assert delay.delay_us == 12_000
-    delay.tell(0.0)
+    delay.declare(0.0)
     assert delay.delay_us == 0

@@ -8,7 +8,8 @@ import pytest
 
 from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
 from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.autopilot import Autopilot
+from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.hil.state import StateFrame
@@ -22,8 +23,8 @@ def flight(**simulation: Any) -> Profile:
     return msgspec.structs.replace(profile, simulation=msgspec.structs.replace(profile.simulation, **simulation))
 
 
-def build(profile: Profile) -> Autopilot:
-    return Autopilot(profile, VEHICLE, track("spiral"), lambda: 0.0)
+def build(profile: Profile) -> Autopilot[TrackStages]:
+    return track_autopilot(profile, VEHICLE, track("spiral"), lambda: 0.0)
 
 
 def frame(time_us: int, psi: float = 1.57) -> StateFrame:

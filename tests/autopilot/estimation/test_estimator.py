@@ -25,26 +25,27 @@ def max_jump_m(of: list[Estimate | None]) -> float:
     return float(np.linalg.norm(steps, axis=1).max())
 
 
-# --- what is put off
+# --- queued frames
 
 
 @pytest.mark.parametrize("settles", [True, False])
-def test_what_is_put_off_changes_no_bit(settles: bool) -> None:
+def test_a_queued_frame_changes_no_bit(settles: bool) -> None:
     """Not where frames are lost, either, nor one that has come before comes again."""
     frames = list(recorded(source.climb, 1, 3.0).frames)
     frames = [frame for k, frame in enumerate(frames) if k % 97 not in (3, 4)]
     frames.insert(600, frames[590])
-    at_once, putting_off = estimator(), estimator()
+    at_once, queueing = estimator(), estimator()
     for k, frame in enumerate(frames):
         if k % 2:
-            at_once.step(frame, asked=False)
-            putting_off.put_off(frame)
+            at_once.receive(frame)
+            at_once.advance()
+            queueing.receive(frame)
         else:
-            assert at_once.step(frame) == putting_off.step(frame)
+            assert at_once.step(frame) == queueing.step(frame)
         if settles:
-            putting_off.settle()
+            queueing.settle()
     if not settles:  # which brings the filter on
-        assert at_once.record() == putting_off.record()
+        assert at_once.record() == queueing.record()
 
 
 # --- how it begins

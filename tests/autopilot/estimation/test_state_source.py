@@ -3,8 +3,9 @@
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.core.copter import Copter
-from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.core.autopilot import Autopilot
+from colibri.autopilot.core.copter import Copter, copter_autopilot
+from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.state_source import StateSource, estimator_for
@@ -40,17 +41,25 @@ class Standing(Estimator):
         assert interval_us == FRAME_US
         Standing.made += 1
         self._began_us: int | None = None
+        self._known: Estimate | None = None
 
-    def step(self, frame: SensorFrame, *, asked: bool = True) -> Estimate | None:
-        del asked
+    @property
+    def last(self) -> Estimate | None:
+        return self._known
+
+    def estimate(self) -> Estimate | None:
+        return self._known
+
+    def advance(self) -> None:
+        pass
+
+    def receive(self, frame: SensorFrame) -> None:
         if self._began_us is None:
             self._began_us = frame.time_us
         if frame.time_us < self._began_us + ALIGNED_US:
-            return None
-        return known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
-
-    def put_off(self, frame: SensorFrame) -> Estimate | None:
-        return self.step(frame, asked=False)
+            return
+        attitude = quaternion_from_euler(0.0, 0.0, 1.57)
+        self._known = known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, attitude, ZERO))
 
     def record(self) -> bytes:
         return b""
@@ -64,19 +73,20 @@ def sensors(time_us: int) -> SensorFrame:
     return SensorFrame(time_us, 0x3F, (0.0, 0.0, 9.81), ZERO, ZERO, 1e5, 15.0)
 
 
-def autopilot() -> Autopilot:
-    return Autopilot(load_profile("flight"), VEHICLE, track("spiral"), lambda: 0.0, estimator=Standing)
+def autopilot() -> Autopilot[TrackStages]:
+    return track_autopilot(load_profile("flight"), VEHICLE, track("spiral"), lambda: 0.0, estimator=Standing)
 
 
-def copter() -> Copter:
+def copter() -> Autopilot[Copter]:
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
-    return Copter(load_profile("flight"), VEHICLE, settings, lambda: 0.0, estimator=Standing)
+    return copter_autopilot(load_profile("flight"), VEHICLE, settings, lambda: 0.0, estimator=Standing)
 
 
 def test_a_state_is_what_is_known() -> None:
     told = StateFrame(0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0), ZERO)
     state_source = StateSource(None, FRAME_US)
-    assert state_source.state(told) is told
+    state_source.receive(told)
+    assert state_source.state() is told
     assert state_source.estimate is None
 
 
@@ -122,16 +132,16 @@ def test_a_station_vehicle_starts_with_the_first_estimate() -> None:
         assert flown.serve([]) == []
     flown.step(sensors(ALIGNED_US))
     flown.serve([])
-    assert flown.pilot.ground.standing
-    assert not flown.pilot.state.armed
-    assert not flown.stations.system.restart
+    assert flown.stages.pilot.ground.standing
+    assert not flown.stages.pilot.state.armed
+    assert not flown.stages.stations.system.restart
 
 
 def test_a_station_vehicle_is_restarted_by_a_new_flight() -> None:
     flown = copter()
     for time_us in (*range(0, ALIGNED_US + 1, FRAME_US), 0):
         flown.step(sensors(time_us))
-    assert flown.stations.system.restart
+    assert flown.stages.stations.system.restart
 
 
 def test_who_is_told_the_state_estimates_nothing() -> None:

@@ -6,7 +6,8 @@ import msgspec
 import pytest
 
 from colibri.autopilot.__main__ import command_line
-from colibri.autopilot.core.defence.errors import LAW, ErrorRecord
+from colibri.autopilot.core.defence.errors import ErrorRecord
+from colibri.autopilot.core.defence.table import LAW
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.error_log import FILE, ErrorLog
 from colibri.autopilot.process.ground import Ground

@@ -61,8 +61,8 @@ def test_without_gps_what_is_set_is_done() -> None:
 
 def between(monkeypatch: pytest.MonkeyPatch, flight: CopterFlight, change: Callable[[Frame], Frame]) -> None:
     """Have each frame changed on its way to the autopilot."""
-    step = flight.copter.step
-    monkeypatch.setattr(flight.copter, "step", lambda frame, plant_status: step(change(frame), plant_status))
+    step = flight.autopilot.step
+    monkeypatch.setattr(flight.autopilot, "step", lambda frame, plant_status: step(change(frame), plant_status))
 
 
 def test_gps_that_says_zero_moves_nobody_to_zero(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.rotor_loss.detector import RotorWatch
-from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -89,7 +89,7 @@ def test_values_that_cannot_be_flown_are_refused_at_the_start() -> None:
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
     vehicle = load_vehicle(FLIGHT.simulation.vehicle)
     with pytest.raises(ImpossibleError, match="hover needs"):
-        Copter(FLIGHT, vehicle, settings, lambda: 0.0, values={"VEH_MASS": 50.0})
+        copter_autopilot(FLIGHT, vehicle, settings, lambda: 0.0, values={"VEH_MASS": 50.0})
 
 
 @pytest.mark.parametrize("rotor", range(4))

@@ -24,7 +24,8 @@ def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
     states: dict[int, tuple[float, ...]] = {}
     for frame in sensor_frames(tlog):
-        estimate = estimator.step(frame, asked=frame.time_us % CONTROL_US == 0)
+        estimator.receive(frame)
+        estimate = estimator.estimate() if frame.time_us % CONTROL_US == 0 else estimator.last
         if estimate is not None and estimate.frame.time_us == frame.time_us:
             f = estimate.frame
             states[f.time_us] = (*f.position_enu_m, *f.velocity_enu_m_s, *f.attitude, *f.rate_flu_rad_s)

@@ -23,7 +23,7 @@ def test_an_attitude_turns_at_its_rates() -> None:
 
 def test_the_inertial_estimate_lasts_for_a_landing() -> None:
     flight = airborne(Feedback.SENSORS)
-    thrower = Thrower("autopilot.estimation.estimator:Estimator.step")
+    thrower = Thrower("autopilot.estimation.estimator:Estimator._take_in")
     thrower.arm()
     try:
         flight.run(5.5)  # shortly before it touches down

@@ -1,0 +1,175 @@
+"""The autopilot as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar
+
+from colibri.autopilot.control.delay import DelayCompensation
+from colibri.autopilot.control.interface import Clock, Decision, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.core.defence.table import DELAY, STEP
+from colibri.autopilot.core.step import Received, Step, follows, nothing_known
+from colibri.autopilot.estimation.state_source import StateSource
+from colibri.autopilot.guidance.guidance import Guidance
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+
+if TYPE_CHECKING:
+    from colibri.mavlink.node.hub import Outgoing
+
+T = TypeVar("T")
+
+
+class Sample(NamedTuple):
+    """A control sample.
+
+    Attributes:
+        now_us: Time of its frame.
+        state: At that time.
+        guidance: The references it was decided by.
+        decision: Of this sample; None while the rotors stand or idle, or an earlier decision is being made.
+        duration_s: Time of the computation.
+    """
+
+    now_us: int
+    state: VehicleState
+    guidance: Guidance
+    decision: Decision | None
+    duration_s: float = 0.0
+
+
+class Stages(Protocol):
+    """The stages of a frame: what differs between a vehicle that flies a track and one that ground stations fly.
+
+    Attributes:
+        loop: The control law.
+        delay: Compensates the delay of commands.
+        state_source: The estimate.
+        time_us: Of the last frame whose state was known; None where the next one begins a flight.
+    """
+
+    loop: ControlLoop
+    delay: DelayCompensation
+    state_source: StateSource
+    time_us: int | None
+
+    @property
+    def mode(self) -> str:
+        """The flight mode."""
+
+    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+        """Return what `call` returns; where it raises, what `otherwise` does, or raise."""
+
+    def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
+        """Take in a frame, and the plant status beside it, before anything else."""
+
+    def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
+        """Return the state at a frame, or unless `now` the one before; None as long as nothing is known."""
+
+    def wait(self, now_us: int) -> None:
+        """Take in that nothing is known of the vehicle yet."""
+
+    def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
+        """Take in the time of a frame whose state is known; `begins`: it does not follow the one before."""
+
+    def ahead(self, known: StateFrame) -> StateFrame:
+        """Return the state at which a command of now takes effect."""
+
+    def supervise(self, now_us: int, state: VehicleState) -> None:
+        """Take in a control sample, and have the failsafe executed that is due."""
+
+    def guide(self, now_us: int, state: VehicleState) -> Guidance:
+        """Return the references of a control sample."""
+
+    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        """Return the decision of a control sample."""
+
+    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
+        """Return the decision in place of a sample that has raised."""
+
+    def actuate(self, now_us: int) -> ActuatorCommand:
+        """Return the command to send."""
+
+    def faults(self) -> tuple[Fault, ...]:
+        """Return the faults to request of the plant."""
+
+    def sampled(self, sample: Sample) -> None:
+        """Take in a control sample that was flown, to report it in `serve`."""
+
+    def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
+        """Do the work that needs no answer in time; serve ground stations, and return what to send them."""
+
+
+StagesT = TypeVar("StagesT", bound=Stages)
+
+
+class Autopilot(Generic[StagesT]):
+    """Flies one vehicle: estimate, observe, supervise, guide, decide, actuate.
+
+    Attributes:
+        stages: What it does at each of these stages.
+        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+    """
+
+    def __init__(self, stages: StagesT, clock: Clock) -> None:
+        """Fly by `stages`; `clock`, in seconds, only measures: it decides nothing."""
+        self.stages = stages
+        self.frame_interval_us = stages.loop.frame_interval_us
+        self._clock = clock
+
+    def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
+        """Answer a frame and the plant status beside it.
+
+        A plant that runs freely may lose a few frames; a frame that comes much later, or earlier, begins a new flight.
+        On sensors the rotors stand before the first estimate.
+
+        Raises:
+            Exception: What a stage raises that is not guarded.
+        """
+        started_s = self._clock()
+        stages, now_us = self.stages, frame.time_us
+        stages.receive(frame, plant_status)
+        due = stages.loop.is_due(now_us)
+        begins = not follows(now_us, stages.time_us, self.frame_interval_us)
+        known = stages.estimate(frame, now=due or begins)
+        if known is None:
+            stages.wait(now_us)
+            return nothing_known(now_us, self._clock() - started_s)
+        stages.enter(known, now_us, begins=begins)
+        flown: Sample | None = None
+        decision = estimate = None
+        if due:
+            flown = stages.guard(STEP, lambda: self._sample(known, now_us), lambda: None)
+            decision = stages.rescue(known, now_us) if flown is None else flown.decision
+            estimate = stages.state_source.estimate
+        command = stages.actuate(now_us)
+        stages.delay.sent(command)
+        duration_s = self._clock() - started_s
+        if flown is not None:
+            stages.sampled(flown._replace(duration_s=duration_s))
+        return Step(
+            *(command, decision, duration_s, estimate, stages.faults()),
+            delay_us=stages.delay.delay_us,
+            frame=frame if due else None,
+            references=None if flown is None else flown.guidance.horizon,
+        )
+
+    def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
+        """Do what waits until a frame is answered, while the plant integrates; return what to send ground stations."""
+        return self.stages.serve(inbox)
+
+    def _sample(self, known: StateFrame, now_us: int) -> Sample:
+        stages = self.stages
+        state = stages.loop.observe(known)
+        ahead = self._ahead(known, state)
+        stages.supervise(now_us, ahead)
+        guidance = stages.guide(now_us, ahead)
+        return Sample(now_us, state, guidance, stages.decide(now_us, ahead, guidance))
+
+    def _ahead(self, known: StateFrame, state: VehicleState) -> VehicleState:
+        """Return the state at which a command of now takes effect; that of now where nothing delays it."""
+        stages = self.stages
+        if stages.delay.delay_us == 0:
+            return state
+        return stages.guard(DELAY, lambda: stages.loop.observe(stages.ahead(known)), lambda: state)

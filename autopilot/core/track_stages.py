@@ -1,0 +1,180 @@
+"""The stages of a vehicle that flies one track, without ground stations; what a stage raises is raised."""
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, TypeVar
+
+from colibri.autopilot.control.delay import DelayCompensation
+from colibri.autopilot.control.interface import Clock, Decision, Pace, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import Factory
+from colibri.autopilot.core.autopilot import Autopilot, Sample
+from colibri.autopilot.core.step import Received
+from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
+from colibri.autopilot.guidance.guidance import Guidance
+from colibri.autopilot.guidance.landing_detector import Landing, is_below, is_clear, stands_at_first, watch
+from colibri.autopilot.guidance.trajectories.planner import Planner
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.plant_status import PlantStatus
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.plant.vehicle.description import Vehicle
+
+if TYPE_CHECKING:
+    from colibri.mavlink.node.hub import Outgoing
+
+T = TypeVar("T")
+
+
+def track_autopilot(
+    profile: Profile,
+    vehicle: Vehicle,
+    track: Track,
+    clock: Clock,
+    *,
+    estimator: NewEstimator | None = None,
+    law: Factory | None = None,
+) -> "Autopilot[TrackStages]":
+    """Return an autopilot that flies `vehicle` along `track` from time 0 on.
+
+    Args:
+        profile: The control law and its numbers.
+        vehicle: The vehicle that the law assumes.
+        track: The track.
+        clock: Seconds; it only measures.
+        estimator: Makes the estimator; None: frames are states.
+        law: Makes the control law; None: the registered one.
+
+    Raises:
+        ControllerError: The profile's control law cannot be used.
+        ProfileError: Its table is wrong.
+        SolverError: Its solver cannot be used.
+    """
+    loop = ControlLoop(profile, vehicle, clock, law)
+    state_source = StateSource(estimator, loop.frame_interval_us)
+    delay = DelayCompensation(vehicle, profile.delay_s)
+    planner = Planner(track, profile.references, loop.preview)
+    start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+    return Autopilot(TrackStages(loop, delay, state_source, planner, start_speed), clock)
+
+
+class TrackStages:
+    """Flies a vehicle along a track.
+
+    A flight begins with the rotors at the profile's speed at time 0, and in hover in mid-flight. On sensors it begins
+    with the first estimate, of a vehicle that stands, or falls; until then it is not armed.
+
+    Attributes:
+        loop: The control law.
+        delay: Compensates the delay of commands.
+        state_source: The estimate.
+        time_us: Of the last frame whose state was known; None where nothing was known of the last frame.
+        mode: The flight mode.
+    """
+
+    mode = "track"
+
+    def __init__(
+        self,
+        loop: ControlLoop,
+        delay: DelayCompensation,
+        state_source: StateSource,
+        planner: Planner,
+        start_speed: float,
+    ) -> None:
+        self.loop, self.delay, self.state_source = loop, delay, state_source
+        self.time_us: int | None = None
+        self._planner, self._start_speed = planner, start_speed
+        self._acts_us: int | None = None
+        self._landing, self._ground_m = Landing(), 0.0
+
+    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+        """Return what `call` returns, and let it raise."""
+        del part, otherwise
+        return call()
+
+    def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
+        """Take in charge and delay as the plant reports them."""
+        del frame
+        if plant_status.battery is not None:
+            self.loop.know_charge(plant_status.battery.used_ah)
+        if plant_status.delay_us is not None:
+            self.delay.measure(plant_status.delay_us)
+
+    def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
+        """Return the state at a frame; unless `now`, the one before: the frame is left to `serve`."""
+        self.state_source.receive(frame)
+        return self.state_source.state() if now else self.state_source.last
+
+    def wait(self, now_us: int) -> None:
+        """Have the next flight begin with the first estimate."""
+        del now_us
+        self.time_us = None
+
+    def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
+        """Take in the time of a frame; where it `begins` a flight, begin with the law, the delay and the ground."""
+        if begins:
+            self._begin(known)
+        self.time_us = now_us
+
+    def ahead(self, known: StateFrame) -> StateFrame:
+        """Return the state at which a command of now takes effect."""
+        return self.delay.ahead(known, self.loop.charge_ah)
+
+    def supervise(self, now_us: int, state: VehicleState) -> None:
+        """Do nothing: nobody is there to take over."""
+
+    def guide(self, now_us: int, state: VehicleState) -> Guidance:
+        """Return the references at the instant at which a command of now takes effect, and watch for the ground."""
+        loop = self.loop
+        acts_us = self._acts_us = now_us + self.delay.delay_us
+        references = self._planner.horizon_at(acts_us - loop.lag_us, loop.control_interval_us)
+        sinks = is_below(float(references.position_enu_m[0, 2]), state)
+        self._landing, _ = watch(self._landing, now_us, state, sinks)
+        return Guidance(references, pace=Pace.CATCHING_UP)
+
+    def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        """Return the decision of the control law."""
+        assert guidance.horizon is not None, "a track has references at any time"
+        felt = state._replace(airborne=is_clear(self._landing, state, self._ground_m))
+        return self.loop.decide(now_us, felt, guidance.horizon, guidance.pace)
+
+    def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
+        """Return nothing: what a sample raises was raised."""
+        del known, now_us
+        return None
+
+    def actuate(self, now_us: int) -> ActuatorCommand:
+        """Return the last command of the law."""
+        return ActuatorCommand(now_us, self.loop.controls, armed=True)
+
+    def faults(self) -> tuple[Fault, ...]:
+        """Return none."""
+        return ()
+
+    def sampled(self, sample: Sample) -> None:
+        """Report nothing."""
+
+    def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
+        """Bring the filter on, and prepare the references of the next sample."""
+        del inbox
+        self.state_source.settle()
+        if self._acts_us is not None:
+            interval_us = self.loop.control_interval_us
+            self._planner.prepare(self._acts_us + interval_us - self.loop.lag_us, interval_us)
+            self._acts_us = None
+        return []
+
+    def _begin(self, known: StateFrame) -> None:
+        loop, source = self.loop, self.state_source
+        speed = self._start_speed if known.time_us == 0 else loop.vehicle.hover_speed
+        rests = self.time_us is None and source.rests
+        if rests:
+            speed = loop.vehicle.rotors.idle_speed
+        loop.begin(speed, float(self._planner.horizon(known.time_us).yaw_rad[0]))
+        self.delay.begin(loop.controls, rests=source.rests)
+        state = loop.observe(known)
+        self._landing, self._ground_m = Landing(), 0.0
+        if rests or stands_at_first(state, 0.0):
+            self._ground_m = state.position_enu_m[2]
