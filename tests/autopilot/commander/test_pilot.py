@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.commander.mode_tasks import task_record
 from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Event, Mode, Need, State
+from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.guidance import RESTS
 from colibri.autopilot.guidance.tasks.position import HoldTask
@@ -85,16 +85,6 @@ def test_no_failsafe_moves_rotors_that_stand(action: Action) -> None:
     cockpit.pilot.save(action)
     assert cockpit.pilot.state == FIRST
     assert cockpit.pilot.saving is Action.NONE
-
-
-@pytest.mark.parametrize("mode", Mode)
-def test_arming_is_allowed_in_the_modes_of_the_table(mode: Mode) -> None:
-    cockpit = Cockpit()
-    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
-    assert cockpit.pilot.select(mode, ()) is None
-    refusal = cockpit.pilot.arm(())
-    assert (refusal is None) is ROWS[mode].to_arm
-    assert cockpit.pilot.state == State(mode, armed=ROWS[mode].to_arm)
 
 
 @pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
@@ -274,18 +264,3 @@ def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
         pilot.disarm(force=order == "force")
     elif order == "second":
         cockpit.fly_for(1.0)
-
-
-@pytest.mark.parametrize("event", [Event.ARRIVED, Event.FINISHED, Event.RETURN_ITEM])
-@pytest.mark.parametrize("mode", Mode)
-def test_finished_tasks_end_only_the_modes_of_the_table(event: Event, mode: Mode) -> None:
-    ends = {
-        (Event.ARRIVED, Mode.TAKEOFF): Mode.HOLD,
-        (Event.FINISHED, Mode.MISSION): Mode.HOLD,
-        (Event.FINISHED, Mode.TRACK): Mode.HOLD,
-        (Event.RETURN_ITEM, Mode.MISSION): Mode.RETURN,
-    }
-    cockpit = in_the_air()
-    cockpit.pilot.select(mode, ())
-    cockpit.pilot.happened(event)
-    assert cockpit.pilot.state == State(ends.get((event, mode), mode), armed=True)

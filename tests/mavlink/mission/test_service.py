@@ -1,7 +1,6 @@
 """The mission protocol, message by message: https://mavlink.io/en/services/mission.html."""
 
 from math import inf, nan
-from timeit import repeat
 from typing import Any
 
 import pytest
@@ -339,11 +338,3 @@ def test_version_1_frames_are_about_the_mission() -> None:
 def test_an_id_is_never_that_of_no_plan() -> None:
     assert plan_of(()).id == 0
     assert plan_of(ITEMS).id != plan_of(ITEMS[::-1]).id
-
-
-def test_polling_costs_next_to_nothing() -> None:
-    ground = Ground()
-    ground.poll()
-    service = ground.service
-    fastest_s = min(repeat(lambda: service.poll(1000), number=1000, repeat=5)) / 1000
-    assert fastest_s < 5e-6

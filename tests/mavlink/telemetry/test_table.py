@@ -184,12 +184,6 @@ def test_each_figure_of_the_solver_has_a_name() -> None:
     assert {fields.name: fields.value for fields in sent("NAMED_VALUE_FLOAT", weighed)} == figures | {"mass_kg": 0.75}
 
 
-def test_the_array_is_laid_out_as_documented() -> None:
-    (fields,) = sent("DEBUG_FLOAT_ARRAY", FLYING)
-    assert fields.data[5] == 5.5
-    assert fields.data[11] == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize("name", ["HOME_POSITION", "BATTERY_STATUS", "WIND_COV", "TRAJECTORY_REPRESENTATION_WAYPOINTS"])
 def test_what_is_not_known_is_not_told(name: str) -> None:
     assert TELEMETRY[name](Snapshot(time_us=0)) is None

@@ -194,11 +194,6 @@ def test_in_flight_conditions_end_with_the_flight() -> None:
     assert not any("cleared" in text for _, text in after.lines)
 
 
-def test_what_somebody_else_says_is_done_without_a_word() -> None:
-    _, done, said = begun({Condition.ROTOR_FAILED: Action.LAND})
-    assert (done, said) == (Action.LAND, ())
-
-
 def test_rows_say_what_they_add_to_a_warning() -> None:
     assert begun({Condition.GPS_LOST: Action.WARN}).lines == ((WARNING, "GPS lost: position by dead reckoning"),)
     assert ROWS[Condition.BATTERY_LOW].warns == ""

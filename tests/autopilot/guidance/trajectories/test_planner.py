@@ -1,6 +1,5 @@
 """Tracks and how they are sampled."""
 
-import timeit
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
 from colibri.autopilot.guidance.trajectories.registry import track
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, THESIS_TRACKS, position
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, THESIS_TRACKS, position
 from colibri.common.types import Array
 
 INTERVAL_S = 0.4
@@ -163,17 +162,6 @@ def test_there_and_back_yaw_turns_by_half_a_turn_at_once(tmp_path: Path) -> None
     assert np.count_nonzero(steps > 1e-6) == 1
 
 
-@pytest.mark.parametrize("name", OPTIONS)
-def test_every_kind_of_track_is_planned_in_time(tmp_path: Path, name: str) -> None:
-    """Tabulating 100 s takes some 10 ms, a horizon some 3 µs; ten times that would be a mistake."""
-    (tmp_path / "samples.csv").write_text("t,x,y,z,vx,vy,vz,ax,ay,az\n0,0,0,1,1,0,0,0,0,0\n2,2,0,1,1,0,0,0,0,0\n")
-    files = {"waypoints": waypoint_file(tmp_path), "samples": f"samples:{tmp_path / 'samples.csv'}"}
-    flown = track(files.get(name, name))
-    planner = Planner(flown, "by-formula", PREVIEW)
-    assert min(timeit.repeat(lambda: Planner(flown, "by-formula", PREVIEW), number=1, repeat=3)) < 0.1
-    assert min(timeit.repeat(lambda: planner.horizon(0), number=100, repeat=3)) < 100 * 50e-6
-
-
 @pytest.mark.parametrize("name", THESIS_TRACKS)
 def test_by_formula_is_what_differences_come_near(name: str) -> None:
     backward, formula = (horizon_from(name, 0, SAMPLES + 1, kind) for kind in KINDS)
@@ -194,10 +182,6 @@ def test_yaw_points_along_the_track_and_never_jumps(name: str) -> None:
     vx, vy = horizon.velocity_enu_m_s[1:, 0], horizon.velocity_enu_m_s[1:, 1]
     assert np.cos(horizon.yaw_rad[1:] - np.arctan2(vy, vx)) == pytest.approx(np.ones(SAMPLES), abs=1e-12)
     assert np.abs(np.diff(horizon.yaw_rad)).max() < np.pi
-
-
-def test_first_yaw_is_the_tangent_of_a_circle() -> None:
-    assert horizon_from("line", 0, 1).yaw_rad[0] == pytest.approx(np.arctan2(-2.0, 1.0) + np.pi / 2)
 
 
 def test_a_horizon_begins_with_the_sample_it_lies_in() -> None:
