@@ -1,14 +1,9 @@
 """The interface of a control law: the three that come along, and one of somebody else's."""
 
 import json
-import os
-import re
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from math import pi
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,18 +18,14 @@ from colibri.autopilot.control.registry import (
     check_rotor_speeds,
     controller_names,
     load_controller,
-    origin_of,
-    registered,
 )
 from colibri.autopilot.control.vehicle_model.mixer import Mixer
-from colibri.cli.main import main
 from colibri.common.config import SettingsError
 from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.foreign import LAW, FlyTheirs, example, fly_as_a_user
 from tools.harness.processes import fly, fly_thesis, rows
 
-DOCS = Path(__file__).parents[3] / "docs"
-FLIGHT = ("fly", "spiral", "--quiet", "--no-figures")
 PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
 
 
@@ -160,70 +151,14 @@ def test_the_geometric_controller_tracks_an_ideal_vehicle(tmp_path: Path, track:
     assert figures["solver"] is None
 
 
-def foreign_package(folder: Path, source: str) -> None:
-    """Install a package as pip would, as far as Python looks."""
-    (folder / "their_law.py").write_text(source, encoding="utf-8")
-    information = folder / "their_law-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: their-law\nVersion: 1.0\n", encoding="utf-8")
-    (information / "entry_points.txt").write_text(
-        "[colibri.controllers]\ntheir-name = their_law:TheirLaw\nbroken = their_law:Nowhere\n", encoding="utf-8"
-    )
-
-
-class Ended(NamedTuple):
-    """How a command ended: its exit code, and what it wrote to standard error."""
-
-    returncode: int | str | None
-    stderr: str
-
-
-FlyTheirs: TypeAlias = Callable[..., Ended]
-
-
-@pytest.fixture
-def fly_theirs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> Iterator[FlyTheirs]:
-    """Install a law by its source and fly: here, and in whatever process is started for it."""
-    found = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-
-    def forget() -> None:
-        sys.modules.pop("their_law", None)
-        registered.cache_clear()
-        origin_of.cache_clear()
-
-    def fly_it(source: str, *options: str) -> Ended:
-        foreign_package(tmp_path, source)
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.setenv("PYTHONPATH", found)
-        forget()
-        try:
-            code: int | str | None = main([*FLIGHT, "--out", str(tmp_path / "out"), *options])
-        except SystemExit as ended:
-            code = ended.code
-        return Ended(code, capfd.readouterr().err)
-
-    yield fly_it
-    forget()
-
-
-def example() -> str:
-    """Return the example of docs/controllers.md."""
-    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "controllers.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert isinstance(code, str)
-    return code
+EXAMPLE = example("controllers.md")
+THEIRS = ("spiral", "--controller", "their-name", "--link")
 
 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
-    assert len(example().splitlines()) <= 36
-    foreign_package(tmp_path, example())
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
-    options = ("--controller", "their-name", "--link", link, "--duration", "40", "--out", str(tmp_path / "out"))
-    command = [sys.executable, "-m", "colibri", *FLIGHT, *options]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert len(EXAMPLE.splitlines()) <= 36
+    fly_as_a_user(LAW, EXAMPLE, tmp_path, *THEIRS, link, "--duration", "40")
     figures = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert figures["controller"] == "their-name"
     assert figures["rmse_after_20s_m"] < 0.5
@@ -231,7 +166,7 @@ def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
 
 @pytest.mark.parametrize("link", ["udp", "direct"])
 def test_a_foreign_law_that_cannot_be_loaded_is_one_line(fly_theirs: FlyTheirs, link: str) -> None:
-    done = fly_theirs(example(), "--controller", "broken", "--link", link)
+    done = fly_theirs(EXAMPLE, "spiral", "--controller", "broken", "--link", link)
     assert done.returncode == 2
     assert done.stderr.startswith("colibri: error: controller broken (their_law:Nowhere) cannot be loaded: ")
     assert done.stderr.count("\n") == 1
@@ -240,14 +175,14 @@ def test_a_foreign_law_that_cannot_be_loaded_is_one_line(fly_theirs: FlyTheirs, 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_a_foreign_law_that_cannot_be_built_says_why_in_one_line(fly_theirs: FlyTheirs, link: str) -> None:
     law = "import colibri\n\n\ndef TheirLaw(*_):\n    raise colibri.Error('mind the gap')\n"
-    done = fly_theirs(law, "--controller", "their-name", "--link", link)
+    done = fly_theirs(law, *THEIRS, link)
     assert (done.returncode, done.stderr) == (2, "colibri: error: mind the gap\n")
 
 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_a_foreign_law_that_goes_wild_ends_in_words(fly_theirs: FlyTheirs, link: str) -> None:
-    wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
-    done = fly_theirs(wild, "--controller", "their-name", "--link", link)
+    wild = EXAMPLE.replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
+    done = fly_theirs(wild, *THEIRS, link)
     assert done.returncode == 1
     said = "colibri: error: controller their-name gave rotor speeds [nan nan nan nan] at t = 0.000 s: expected four"
     assert said in done.stderr
@@ -256,8 +191,8 @@ def test_a_foreign_law_that_goes_wild_ends_in_words(fly_theirs: FlyTheirs, link:
 
 @pytest.mark.parametrize("link", ["memory", pytest.param("udp", marks=pytest.mark.long)])
 def test_an_exception_of_a_foreign_law_loses_the_flight(tmp_path: Path, fly_theirs: FlyTheirs, link: str) -> None:
-    raises = example().replace("        error =", "        time_us < 500_000 or {}['gain']\n        error =")
-    done = fly_theirs(raises, "--controller", "their-name", "--link", link)
+    raises = EXAMPLE.replace("        error =", "        time_us < 500_000 or {}['gain']\n        error =")
+    done = fly_theirs(raises, *THEIRS, link)
     out = tmp_path / "out"
     why = "controller their-name raised at t = 0.500 s: KeyError: 'gain'"
     assert done.returncode == 1
@@ -273,8 +208,8 @@ def test_an_exception_of_a_foreign_law_loses_the_flight(tmp_path: Path, fly_thei
 
 
 def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path, fly_theirs: FlyTheirs) -> None:
-    raises = example().replace("self.mixer = ", "self.mixer = 1 / 0 * ")
-    done = fly_theirs(raises, "--controller", "their-name", "--link", "memory")
+    raises = EXAMPLE.replace("self.mixer = ", "self.mixer = 1 / 0 * ")
+    done = fly_theirs(raises, *THEIRS, "memory")
     said = "colibri: error: controller their-name cannot be built: ZeroDivisionError: division by zero; its traceback"
     assert done.returncode == 2
     assert done.stderr.startswith(said)
@@ -295,13 +230,12 @@ def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path,
 def test_what_a_foreign_law_does_in_place_of_deciding_is_said(
     fly_theirs: FlyTheirs, old: str, new: str, said: str
 ) -> None:
-    done = fly_theirs(example().replace(old, new), "--controller", "their-name", "--link", "memory")
+    done = fly_theirs(EXAMPLE.replace(old, new), *THEIRS, "memory")
     assert done.returncode == 1
     assert done.stderr.startswith(f"colibri: error: controller their-name {said}")
 
 
 def test_what_a_foreign_law_prints_is_shown(fly_theirs: FlyTheirs) -> None:
-    prints = example().replace("        error =", "        time_us or print('now', time_us)\n        error =")
-    flown = ("--controller", "their-name", "--link", "udp", "--duration", "0.5")
-    done = fly_theirs(prints, *flown)
+    prints = EXAMPLE.replace("        error =", "        time_us or print('now', time_us)\n        error =")
+    done = fly_theirs(prints, *THEIRS, "udp", "--duration", "0.5")
     assert (done.returncode, done.stderr) == (0, "now 0\n")

@@ -1,13 +1,7 @@
 """Tracks as a vehicle will fly them, and those of other packages and of files of samples."""
 
-import os
-import re
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
 from math import inf, pi
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import pytest
@@ -16,14 +10,9 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
 from colibri.autopilot.guidance.trajectories.registry import TrackError, track
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
-from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
-
-DOCS = Path(__file__).parents[4] / "docs"
-QUIETLY = ("--quiet", "--no-figures")
-
-FlyTheirs: TypeAlias = Callable[..., tuple[int | str | None, str]]
+from tests.support.foreign import TRACK, FlyTheirs, example, fly_as_a_user
 
 
 def loaded(name: str, floor_m: float | None = None, vehicle: str = "hummingbird") -> LoadedTrack:
@@ -130,53 +119,19 @@ def test_samples_below_the_ground_are_refused(tmp_path: Path) -> None:
         loaded(write(tmp_path, lines))
 
 
-def foreign_package(folder: Path, source: str) -> str:
-    """Install a package that registers the class Helix of `source`; return the PYTHONPATH to find it by."""
-    (folder / "their_track.py").write_text(source, encoding="utf-8")
-    information = folder / "their_track-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: their-track\nVersion: 1.0\n", encoding="utf-8")
-    (information / "entry_points.txt").write_text("[colibri.tracks]\nhelix = their_track:Helix\n", encoding="utf-8")
-    return os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
-
-
-@pytest.fixture
-def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[FlyTheirs]:
-    """Install a track by its source and run `colibri fly` here; returns its exit code and what it said of errors."""
-
-    def fly(source: str, *options: str) -> tuple[int | str | None, str]:
-        monkeypatch.setenv("PYTHONPATH", foreign_package(tmp_path, source))
-        monkeypatch.syspath_prepend(tmp_path)
-        try:
-            code: int | str | None = main(["fly", *options, *QUIETLY, "--out", str(tmp_path / "out")])
-        except SystemExit as ended:
-            code = ended.code
-        return code, capfd.readouterr().err
-
-    sys.modules.pop("their_track", None)
-    yield fly
-    sys.modules.pop("their_track", None)
-
-
-def example() -> str:
-    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "tracks.md").read_text(encoding="utf-8"), re.DOTALL)
-    return str(code)
+EXAMPLE = example("tracks.md")
 
 
 def test_the_example_of_the_docs_flies(tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": foreign_package(tmp_path, example())}
-    options = ("helix:radius=3,climb=0.2", "--duration", "4", *QUIETLY, "--out", str(tmp_path / "out"))
-    command = [sys.executable, "-m", "colibri", "fly", *options]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    fly_as_a_user(TRACK, EXAMPLE, tmp_path, "helix:radius=3,climb=0.2", "--duration", "4")
     rows = np.genfromtxt(tmp_path / "out" / "flight.csv", delimiter=",", names=True)
     assert np.hypot(rows["x_ref"], rows["y_ref"]) == pytest.approx(3.0)
     assert rows["z_ref"] == pytest.approx(1.0 + 0.2 * rows["t"])
 
 
-def test_a_foreign_track_may_return_constants(theirs: FlyTheirs) -> None:
-    level = example().replace("1.0 + self.climb * t", "2").replace("duration_s=60.0", "lambda t: 0.5, 60.0")
-    assert theirs(level, "helix", "--link", "direct", "--duration", "1") == (0, "")
+def test_a_foreign_track_may_return_constants(fly_theirs: FlyTheirs) -> None:
+    level = EXAMPLE.replace("1.0 + self.climb * t", "2").replace("duration_s=60.0", "lambda t: 0.5, 60.0")
+    assert fly_theirs(level, "helix", "--link", "direct", "--duration", "1") == (0, "")
 
 
 @pytest.mark.parametrize(
@@ -194,8 +149,8 @@ def test_a_foreign_track_may_return_constants(theirs: FlyTheirs) -> None:
     ],
 )  # fmt: skip
 def test_a_foreign_track_that_cannot_be_flown_is_one_line(
-    theirs: FlyTheirs, wrong: tuple[str, str], options: str, why: str
+    fly_theirs: FlyTheirs, wrong: tuple[str, str], options: str, why: str
 ) -> None:
-    code, said = theirs(example().replace(*wrong) if wrong[0] else example(), f"helix{options}")
+    code, said = fly_theirs(EXAMPLE.replace(*wrong) if wrong[0] else EXAMPLE, f"helix{options}")
     assert (code, said.count("\n")) == (2, 1)
     assert said.startswith(f"colibri: error: {why}")
