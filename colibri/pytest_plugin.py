@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.errors import SitlError
 from colibri.sitl.summary import FLOWN, Summary
 
@@ -211,6 +210,7 @@ class _Collector:
 
 def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack) -> Flights:
     """Return what the test flies with, ended with `stack`."""
+    from colibri.sitl.backends.setting import setting_of
     from colibri.sitl.session import Flights
 
     known: Flights | None = request.node.stash.get(_FLIGHTS, None)

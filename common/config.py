@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
 
-from colibri.common.errors import Error, nearest
+from colibri.common.errors import Error, unknown
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -42,7 +42,7 @@ def named_text(what: str, folder: Path, name: str, error: type[Error]) -> str:
 def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
     known = toml_names(folder)
     if name not in known:
-        raise error(f"unknown {what} {name}: choose {', '.join(known)} or a .toml file")
+        raise error(unknown(what, name, [*known, "a .toml file"]))
     return folder / f"{name}.toml"
 
 
@@ -161,9 +161,8 @@ def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
         places = found if isinstance(found, dict) else dict(enumerate(found)) if isinstance(found, list) else {}
         choices = {str(place): place for place in places}
         if name not in choices:
-            of = f" of {above}" if above else ""
-            hint = nearest(name, choices) or f"keys{of} are {', '.join(choices) or 'none'}"
-            raise error(f"{key}: unknown key {name}: {hint}")
+            of = f"key of {above}" if above else "key"
+            raise error(f"{key}: {unknown(of, name, choices)}")
         parent, found, above, last = found, places[choices[name]], f"{above}.{name}".lstrip("."), choices[name]
     return parent, last
 

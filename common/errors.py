@@ -1,4 +1,4 @@
-"""The base of every error that a user may see, and what its message says of a name that is unknown."""
+"""The base of every error that a user may see, and the message for an unknown name."""
 
 from collections.abc import Iterable
 
@@ -20,9 +20,11 @@ class InFlightError(Error):
     """A flight that was begun and came to no end, in whichever package; what was logged is there."""
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the question whether the nearest of the known names was meant; empty where none is near."""
+def unknown(what: str, given: object, known: Iterable[str]) -> str:
+    """Return the message for an unknown name: with the closest match, or with all that is valid."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, list(known), 1)
-    return f"did you mean {near[0]}?" if near else ""
+    names = [str(name) for name in known]
+    near = get_close_matches(str(given), names, 1)
+    hint = f'did you mean "{near[0]}"?' if near else f"choose {', '.join(names)}"
+    return f'unknown {what} "{given}" ({hint})'

@@ -101,18 +101,20 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return msgspec.structs.replace(chosen, controllers={**chosen.controllers, chosen.controller: with_solver})
 
 
-def load_profile(name_or_path: str) -> Profile:
-    """Read a profile by its name, or from a file if the argument ends in `.toml`.
+def load_profile(given: str | Profile) -> Profile:
+    """Read a profile by its name, or from a file if the name ends in `.toml`; one that is given is returned.
 
     Raises:
         ProfileError: There is no such profile, or the file has a missing, unknown or impossible key.
     """
-    tables = read_named("profile", _FOLDER, name_or_path, ProfileTables, ProfileError)
+    if isinstance(given, Profile):
+        return given
+    tables = read_named("profile", _FOLDER, given, ProfileTables, ProfileError)
     values = {key: getattr(tables, key) for key in tables.__struct_fields__}
-    if name_or_path.endswith(".toml"):
-        path, taken = Path(name_or_path), {"", *profile_names()}
+    if given.endswith(".toml"):
+        path, taken = Path(given), {"", *profile_names()}
         name = next((name for name in (tables.name, path.stem) if name not in taken), path.name)
-        values |= {"name": name, "file": name_or_path}
+        values |= {"name": name, "file": given}
     profile = Profile(**values)
     _check_frames(profile)
     return profile

@@ -13,7 +13,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller, Decision
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.errors import Error, ForeignError, InFlightError, nearest
+from colibri.common.errors import Error, ForeignError, InFlightError, unknown
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
@@ -64,13 +64,7 @@ def load_controller(name: str) -> Factory:
         except (ImportError, AttributeError) as error:
             raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
         return factory
-    raise _unknown(name)
-
-
-def _unknown(name: str) -> ControllerError:
-    known = controller_names()
-    hint = nearest(name, known) or f"installed are {', '.join(known)}"
-    return ControllerError(f"unknown controller {name}: {hint}")
+    raise ControllerError(unknown("controller", name, controller_names()))
 
 
 class Origin(NamedTuple):
@@ -98,7 +92,7 @@ def origin_of(name: str) -> Origin:
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
         return Origin(entry.value, package, _sha256(spec.origin if spec else None))
-    raise _unknown(name)
+    raise ControllerError(unknown("controller", name, controller_names()))
 
 
 def origin_of_factory(law: Factory) -> Origin:

@@ -1,6 +1,5 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what is reported on the terminal."""
 
-import argparse
 from collections import deque
 from collections.abc import Iterable, Iterator
 from math import hypot
@@ -21,6 +20,7 @@ from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
 from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
@@ -51,38 +51,39 @@ class Ground:
 
     def __init__(
         self,
-        args: argparse.Namespace,
+        spec: AutopilotSpec,
         profile: Profile,
         vehicle: Vehicle,
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files as the command line says; a `conductor` stands for all ground stations.
+        """Open links and files as `spec` says; a `conductor` stands for all ground stations.
 
         Raises:
             GroundError: Something of it cannot be used.
         """
-        self._args = args
+        self._spec = spec
         self._profile = profile
         self._vehicle = vehicle
         self._status = status
         self._state = StateFolder(
-            args.state,
+            spec.state,
             profile,
             vehicle,
-            system_id=args.system_id,
-            signing_key=args.signing_key,
+            system_id=spec.system_id,
+            signing_key=spec.signing_key,
             tick=tick_at(time()),
+            params=spec.params,
         )
-        self._boot_unix_us = args.boot_unix_us
-        if not (args.boot_unix_us or args.stepped):  # what is stepped is the same at every hour
+        self._boot_unix_us = spec.boot_unix_us
+        if not (spec.boot_unix_us or spec.stepped):  # what is stepped is the same at every hour
             self._boot_unix_us = round(time() * 1e6)
         self._first = None
-        if args.track:
-            self._first, note = load_track(args.track, vehicle, profile, args.floor)
+        if spec.track:
+            self._first, note = load_track(spec.track, vehicle, profile, spec.floor)
             if note:
                 status.say("track", note)
-        self.errors = ErrorLog(args.out or args.state, status)
+        self.errors = ErrorLog(spec.out or spec.state, status)
         self._log: AutopilotLog | None = None
         self._recorded_snapshot: Snapshot | None = None
         self._texts: deque[str] = deque(maxlen=MAX_SAID)
@@ -90,7 +91,7 @@ class Ground:
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
         try:
-            links = open_links(args.gcs, signed=self._state.signing.active, insecure=args.insecure)
+            links = open_links(spec.gcs, signed=self._state.signing.active, insecure=spec.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
         self._links: GroundLinks | SteppedLinks = GroundLinks(links, perf_counter, thread_time)
@@ -223,19 +224,19 @@ class Ground:
             self._status.say("said", "restarted by a ground station")
 
     def _new_autopilot(self, history: History | None) -> Autopilot[Copter]:
-        args = self._args
+        spec = self._spec
         self._values = self._state.parameters()
         self._past_bytes = b"" if history is None else to_bytes(history)
         settings = StationSettings(
-            system_id=args.system_id,
-            identity=args.identity,
-            origin=args.home.origin,
+            system_id=spec.system_id,
+            identity=spec.identity,
+            origin=spec.home.origin,
             boot_unix_us=self._boot_unix_us,
             signing=self._state.signing,
             files=self._state.files,
             logs=self._state.logs,
-            feedback=args.feedback,
-            relays_faults=args.simulator is None,
+            feedback=spec.feedback,
+            relays_faults=spec.simulator is None,
         )
         try:
             return copter_autopilot(
@@ -246,7 +247,7 @@ class Ground:
                 values=self._values,
                 first=self._first,
                 history=history,
-                strict=args.strict,
+                strict=spec.strict,
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error

@@ -7,6 +7,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
+from colibri.common.errors import unknown
 from colibri.common.process.folder_lock import FolderLock
 from colibri.common.process.slot_file import Slots
 from colibri.common.serialization import of_bytes, to_bytes
@@ -49,8 +50,11 @@ class StateFolder:
         system_id: int,
         signing_key: Path | None,
         tick: int,
+        params: Mapping[str, float] = {},
     ) -> None:
         """Read the key, of the file `signing_key` if there is one, and open what is kept.
+
+        `params` are initial values of parameters, until others are saved.
 
         Raises:
             FolderInUseError: Another vehicle keeps its state there.
@@ -60,6 +64,7 @@ class StateFolder:
         self._profile = profile
         self._vehicle = vehicle
         self._system_id = system_id
+        self._params = params
         self.signing = Signing(self._read_key(signing_key), max(self._read_timestamp(), tick))
         try:
             self._lock = FolderLock(path, "--state") if path else None
@@ -98,21 +103,36 @@ class StateFolder:
         """Return the parameters that were saved.
 
         Raises:
-            GroundError: Their file cannot be read.
+            GroundError: Their file cannot be read, or an initial value is impossible.
         """
         if self._path is None:
-            return {}
+            return self._initial()
         path = self.parameter_path()
         try:
             text = path.read_text()
         except FileNotFoundError:
-            return {}
+            return self._initial()
         except (OSError, UnicodeDecodeError) as error:
             raise GroundError(f"cannot read parameters from {path}: {error}") from error
         try:
             return read(text, Parameters(definitions(self._profile, self._vehicle, self._system_id)))
         except ParameterFileError as error:
             raise GroundError(f"{path}: {error}; correct or remove it") from error
+
+    def _initial(self) -> dict[str, Value]:
+        """Return the initial values, as a file would keep them.
+
+        Raises:
+            GroundError: A parameter is unknown, or cannot have its value.
+        """
+        parameters = Parameters(definitions(self._profile, self._vehicle, self._system_id))
+        for name, value in self._params.items():
+            if name not in parameters:
+                raise GroundError(unknown("parameter", name, (each.name for each in parameters)))
+            refusal = parameters.set(name, value)
+            if refusal is not None:
+                raise GroundError(f"parameter {name} cannot be {value:g}: {refusal.name}")
+        return {each.name: parameters[each.name] for each in parameters if parameters[each.name] != each.default}
 
     def save_parameters(self, parameters: Parameters) -> None:
         """Save them."""

@@ -4,6 +4,7 @@ from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
+from colibri.common.errors import unknown
 from colibri.common.process.arguments import number
 
 RMSE = "rmse_after_20s_m"
@@ -29,7 +30,7 @@ def limit(text: str) -> Limit:
     """Read a limit of the command line, `[KEY=]VALUE`."""
     key, equals, value = text.rpartition("=")
     if equals and key not in KEYS:
-        raise ArgumentTypeError(f"unknown key {key}: choose {', '.join(KEYS)}")
+        raise ArgumentTypeError(unknown("key", key, KEYS))
     try:
         return Limit(key or RMSE, number(value))
     except ValueError:

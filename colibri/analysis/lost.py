@@ -38,7 +38,7 @@ def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
     `LOST_M` off its reference once settled; in a flight too short for that, if it ends that much further off than it
     began. Where ground stations command, the track is not what it shall fly, and it is never lost.
     """
-    if plan.ground.links:
+    if plan.spec.gcs:
         return None
     began = [at for at in (_grounded(flight), _upside_down(flight), _far_off(flight)) if at is not None]
     if not began:

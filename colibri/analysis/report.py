@@ -35,21 +35,21 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
     sim_time_s = float(t[-1])
     settled = error[t >= SETTLED_AFTER_S]
     return {
-        "track": plan.track_name,
+        "track": plan.spec.track,
         "track_note": plan.track_note,
         "profile": plan.profile.name,
         "controller": plan.profile.controller,
-        "link": plan.link,
-        "seed": plan.seed,
-        "feedback": plan.feedback,
+        "link": plan.spec.link,
+        "seed": plan.spec.seed,
+        "feedback": plan.spec.feedback,
         "solver": plan.profile.table(plan.profile.controller).get("qp", {}).get("solver"),
         "vehicle": plan.vehicle_name,
         "plant_vehicle": plan.plant_vehicle_name,
         "integrator": plan.integrator,
-        "wind": str(plan.weather.wind),
-        "gusts": [str(gust) for gust in plan.weather.gusts],
-        "turbulence": plan.weather.turbulence,
-        "without": list(plan.without),
+        "wind": str(plan.spec.weather.wind),
+        "gusts": [str(gust) for gust in plan.spec.weather.gusts],
+        "turbulence": plan.spec.weather.turbulence,
+        "without": list(plan.spec.without),
         "start": plan.start._asdict(),
         "sim_time_s": sim_time_s,
         "lost": None if lost is None else lost.why,
@@ -81,7 +81,7 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
 
 def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
     """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
-    if plan.feedback is Feedback.SENSORS:
+    if plan.spec.feedback is Feedback.SENSORS:
         return read_estimation(plan, SETTLED_AFTER_S).figures()
     return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
 

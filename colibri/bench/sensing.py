@@ -1,7 +1,6 @@
 """What sensors cost: a step of the estimator, and a flight on them beside one on the state."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -10,10 +9,10 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.bench.speed import Report, Samples, real_time_factor, summarised
 from colibri.bench.stages import summary
+from colibri.bench.variants import plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.flights.fly import fly_plan
 from colibri.flights.in_process import SYSTEM_ID
-from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import OWN_MESSAGES, SensorFrame, decode_sensors
 from colibri.mavlink.wire import dialect
@@ -36,7 +35,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
     """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
     duration_s = max(duration_s, _MIN_S)
     report("estimator")
-    fly_plan(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS))
+    fly_plan(plan_of(profile, folder, duration_s, "memory", Feedback.SENSORS))
     frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))
     steps = {
         ALWAYS: summary(_timed(profile, frames, lambda _time_us: True)),
@@ -48,7 +47,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
             for feedback in Feedback:
                 name = f"{link}, {feedback}"
                 report(f"{name}, {run + 1} of {runs}")
-                factor = real_time_factor(_plan(profile, folder, duration_s, link, feedback))
+                factor = real_time_factor(plan_of(profile, folder, duration_s, link, feedback))
                 samples.setdefault(name, []).append(factor)
     return {
         "track": TRACK,
@@ -87,8 +86,3 @@ def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], b
         estimator.estimate() if wanted else estimator.advance()
         times_us.append((perf_counter() - began_s) * 1e6)
     return times_us[_SETTLED:]
-
-
-def _plan(profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback) -> FlightPlan:
-    plan = FlightPlan.of_options(folder, track=TRACK, profile=profile.name, link=link, feedback=feedback)
-    return replace(plan, duration_s=duration_s)

@@ -16,10 +16,10 @@ from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
-from colibri.flights.plan import FlightPlan, GroundAccess
+from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.streaming.rates import GCS, SDK
-from colibri.plant.process.options import nudged
+from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
 
 CHANNELS = (0, 1, 2, 4, 8)
@@ -57,26 +57,26 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     stations = autopilot.stages.stations
     for link in range(channels):
         stations.use(stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
-    plant = PlantBuilder(plan, plan.plant_vehicle, {plan.feedback: nudged(plan.start)}).build(
-        plan.feedback, autopilot.frame_interval_us
+    plant = PlantBuilder(plan.spec, plan.plant_vehicle, {plan.spec.feedback: nudged(plan.start)}).build(
+        plan.spec.feedback, autopilot.frame_interval_us
     )
     times_us = []
     with gc_frozen():
-        while plant.world.time_us < plan.duration_s * 1e6:
+        while plant.world.time_us < plan.spec.duration * 1e6:
             plant.answer(autopilot.step(*plant.measure()).command)
             began_s = perf_counter()
             autopilot.serve()
             times_us.append((perf_counter() - began_s) * 1e6)
     sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)
-    return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.duration_s}
+    return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.spec.duration}
 
 
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
     """Fly as two processes, paced to the wall clock, so many ground stations connected; return the control step, µs."""
     with ExitStack() as stack:
         ports = [stack.enter_context(_listening()).getsockname()[1] for _ in range(stations)]
-        ground = GroundAccess(tuple(f"udpout:127.0.0.1:{port}" for port in ports))
-        watched = replace(plan, speed=1.0, ground=ground)
+        links = tuple(f"udpout:127.0.0.1:{port}" for port in ports)
+        watched = replace(plan, spec=replace(plan.spec, speed=1.0, gcs=links))
         try:
             fly_processes(watched)
         except FlightError as error:

@@ -1,6 +1,6 @@
 """What the plant takes to answer PX4 and ArduPilot: its servers on links that are none, from command to frame."""
 
-from math import sqrt
+from math import inf, sqrt
 from struct import Struct
 from time import perf_counter
 from typing import Any, cast
@@ -9,20 +9,21 @@ from colibri.bench.speed import Report
 from colibri.bench.stages import summary
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
+from colibri.common.spec import from_values
 from colibri.common.types import Address
 from colibri.mavlink.links.link import Endpoint
 from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.wire.dialect import Codec, mav
-from colibri.plant.__main__ import command_line
 from colibri.plant.process import ardupilot_server, px4_server
+from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.parameter_files import px4_parameters
 
 PX4, ARDUPILOT = "PX4", "ArduPilot"
 VEHICLES = {PX4: "iris", ARDUPILOT: "hummingbird"}
 FRAMES_HZ = {PX4: 250, ARDUPILOT: 1200}
-AIR = {"calm": (), "moderate turbulence": ("--turbulence", "moderate", "--wind", "5@270")}
-_HIGH_UP = ("--start", "z=100")
+AIR: dict[str, dict[str, str]] = {"calm": {}, "moderate turbulence": {"turbulence": "moderate", "wind": "5@270"}}
+_HIGH_UP = {"z": 100.0}
 """Nobody flies here: the rotors turn as in hover, and what tips over must have room to fall."""
 _LOADED_AFTER = 100
 _TRUTH_EVERY_US = 5e3
@@ -97,17 +98,21 @@ def simulator_figures(duration_s: float, report: Report) -> dict[str, Any]:
     return {"exchange_us": figures, "frames_hz": FRAMES_HZ}
 
 
-def _times_us(whom: str, air: tuple[str, ...], duration_s: float) -> list[float]:
+def _times_us(whom: str, air: dict[str, str], duration_s: float) -> list[float]:
     frames = round(duration_s * FRAMES_HZ[whom]) + 2 * _LOADED_AFTER
-    served = "px4" if whom == PX4 else "ardupilot-json"
-    length_s = str(frames / FRAMES_HZ[whom])
-    vehicle = ("--vehicle", VEHICLES[whom], *_HIGH_UP)
-    args = command_line().parse_args(["--serve", served, "--speed", "max", "--duration", length_s, *vehicle, *air])
+    options = {
+        "serve": "px4" if whom == PX4 else "ardupilot-json",
+        "speed": inf,
+        "duration": frames / FRAMES_HZ[whom],
+        "vehicle": VEHICLES[whom],
+        "start": _HIGH_UP,
+    }
+    spec = from_values(PlantSpec, options | air)
     link = _Answers((_of_px4 if whom == PX4 else _of_ardupilot)(frames + 2))
     if whom == PX4:
-        px4_server.run(args, link, _Silent(), _Never())
+        px4_server.run(spec, link, _Silent(), _Never())
     else:
-        ardupilot_server.run(args, cast(UdpLink, link), _Silent(), _Never())
+        ardupilot_server.run(spec, cast(UdpLink, link), _Silent(), _Never())
     return link.times_us
 
 

@@ -81,6 +81,6 @@ def _with_ratios(flown: Samples, peer: Peer | None) -> dict[str, dict[str, float
 def real_time_factor(plan: FlightPlan) -> float:
     """Fly a plan; return simulated over wall-clock time."""
     try:
-        return plan.duration_s / fly_plan(plan).wall_time_s
+        return plan.spec.duration / fly_plan(plan).wall_time_s
     except FlightError as error:
         fail(str(error), EXIT_FAILED)

@@ -1,15 +1,15 @@
 """Profile `flight` with other numbers, and flights with it."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from colibri.autopilot.control.profile import Profile, ProfileTables
+from colibri.autopilot.control.profile import Profile
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
+from colibri.mavlink.hil.feedback import Feedback
 
 CONTROLLER = "whole-lpv-mpc"
 TRACK = "lemniscate"
@@ -28,24 +28,12 @@ def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Pro
     return msgspec.structs.replace(changed, simulation=simulation)
 
 
-def plan_of(profile: Profile, folder: Path, duration_s: float, link: str) -> FlightPlan:
-    """Return the plan of a lemniscate with `profile`, which is written into `folder` for processes to read."""
-    file = folder / "profile.toml"
-    tables = {key: msgspec.to_builtins(getattr(profile, key)) for key in ProfileTables.__struct_fields__}
-    file.write_text("\n".join(toml_lines(tables)) + "\n", encoding="utf-8")
-    return replace(FlightPlan.of_options(folder, track=TRACK, profile=str(file), link=link), duration_s=duration_s)
-
-
-def toml_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:
-    """Yield tables of numbers, text and lists as TOML; what is None is left out."""
-    if path:
-        yield f"[{'.'.join(path)}]"
-    for key, value in table.items():
-        if value is not None and not isinstance(value, Mapping):
-            yield f"{key} = {json.dumps(value)}"
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from toml_lines(value, (*path, key))
+def plan_of(
+    profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback = Feedback.STATE
+) -> FlightPlan:
+    """Return the plan of a lemniscate with `profile`."""
+    options = {"profile": profile, "link": link, "feedback": feedback, "duration": duration_s, "out": folder}
+    return FlightPlan.of(FlightSpec.of(TRACK, **options))
 
 
 def _with_table(profile: Profile, table: Mapping[str, Any]) -> Profile:

@@ -11,7 +11,7 @@ import msgspec
 from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.campaigns.factors import factor_name
-from colibri.campaigns.metrics import Metric, hint, read_metrics, usual
+from colibri.campaigns.metrics import Metric, read_metrics, usual
 from colibri.campaigns.values import (
     CampaignError,
     Choice,
@@ -24,8 +24,10 @@ from colibri.campaigns.values import (
     read_values,
 )
 from colibri.common.config import read_settings, read_toml
+from colibri.common.errors import unknown
 from colibri.common.process.arguments import seeds
-from colibri.experiments.options import option_names
+from colibri.common.spec import keywords_of
+from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 
 Logs: TypeAlias = Literal["none", "lost", "all"]
@@ -184,7 +186,7 @@ def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, A
     known = kind.__struct_fields__
     for name in given:
         if name not in known:
-            raise CampaignError(f"unknown option {name}: {hint(name, known)}")
+            raise CampaignError(unknown("option", name, known))
     read_settings(given, kind)
     named = {name_in_tables(*each) for table in kind.FACTORS for each in given.get(table, {}).items()}
     changed = dict(given) | {
@@ -268,7 +270,7 @@ def _check_names(planned: Campaign) -> None:
     said = [*planned.fly, *planned.draw]
     for name, values in planned.grid.items():
         levels = [each.settings for each in values if isinstance(each, Level)]
-        if levels and name in option_names():
+        if levels and name in keywords_of(FlightSpec):
             raise CampaignError(f"{name}: a factor with levels needs a name of its own")
         said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
     if twice := first_twice(said):

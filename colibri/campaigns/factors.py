@@ -4,17 +4,18 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
-from colibri.campaigns.metrics import hint
 from colibri.campaigns.values import CampaignError, is_number
 from colibri.common.config import value_at
-from colibri.experiments.options import option_names
+from colibri.common.errors import unknown
+from colibri.common.spec import keywords_of
+from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
 SCALED = "*"
 """Ends a key whose value multiplies what the file has there, in place of standing for it."""
 _TABLES = ("profile", "vehicle", "plant-vehicle")
 _OF_A_PROFILE = tuple(f"{key}." for key in ProfileTables.__struct_fields__)
-_NOT_FACTORS = ("seed", "link", "speed", "signing_key")
+_NOT_FACTORS = ("seed", "link", "speed")
 
 
 class Key(NamedTuple):
@@ -31,7 +32,7 @@ def factor_name(given: str) -> str:
     Raises:
         CampaignError: There is no such factor.
     """
-    options = [name for name in option_names() if name not in _NOT_FACTORS]
+    options = [name for name in keywords_of(FlightSpec) if name not in _NOT_FACTORS]
     name = given.replace("-", "_")
     if name in options:
         return name
@@ -45,7 +46,7 @@ def factor_name(given: str) -> str:
     if name in _NOT_FACTORS:
         raise CampaignError(f"{given} is no factor: what a flight does is the same with any")
     known = sorted({*options, *(f"{table}.KEY" for table in _TABLES)})
-    raise CampaignError(f"unknown factor {given}: {hint(name, known)}")
+    raise CampaignError(unknown("factor", given, known))
 
 
 def key_of(factor: str) -> Key | None:

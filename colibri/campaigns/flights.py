@@ -2,7 +2,6 @@
 
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing, suppress
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +10,7 @@ from typing import Any, NamedTuple
 from colibri.analysis.outcome import fly_to_its_end
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.guidance.trajectories.loading import file_text, with_file
+from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.campaigns.definition import Campaign, Logs, Point
 from colibri.campaigns.engines.engine import Engine, Killed
 from colibri.campaigns.factors import key_of, with_keys
@@ -19,10 +18,12 @@ from colibri.campaigns.metrics import Metric
 from colibri.campaigns.values import CampaignError
 from colibri.common.errors import Error, ForeignError
 from colibri.common.process.failure_file import FAILURE
-from colibri.experiments.flight import Flight, plan_of
-from colibri.flights.plan import FlightPlan
-from colibri.flights.provenance import read_provenance
-from colibri.plant.process.options import wind
+from colibri.common.spec import from_values
+from colibri.experiments.flight import Flight
+from colibri.flights.plan import Contents, FlightPlan
+from colibri.flights.provenance import provenance_of
+from colibri.flights.spec import FlightSpec, OptionError
+from colibri.plant.texts import wind
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
@@ -124,7 +125,7 @@ def check(points: Iterable[Point], common: Common) -> None:
     for point in points:
         with TemporaryDirectory(prefix="colibri-") as folder:
             plan = plan_point(common, point, Path(folder))
-            build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.law)
+            build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
 
 
 def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
@@ -147,10 +148,9 @@ def fly_point(common: Common, point: Point) -> Flown:
             return Flown(point.flight, Verdict.REFUSED, why, nothing, "")
         verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
         keep = common.logs == "all" or (common.logs == "lost" and verdict.is_lost)
-        called = {str(folder): point.folder, plan.track_name: str((common.fly | point.settings)["track"])}
-        files = _files(folder.iterdir() if keep else [folder / FAILURE], point.folder, called)
+        files = _files(folder.iterdir() if keep else [folder / FAILURE], folder, point.folder)
         why = outcome.lost.replace(str(folder), point.folder)
-        contents = read_provenance(folder).sha256["all"]
+        contents = provenance_of(plan).sha256["all"]
         if outcome.report is None:
             return Flown(point.flight, verdict, why, nothing, "", contents, files)
         flight = Flight(plan, outcome.report)
@@ -159,35 +159,22 @@ def fly_point(common: Common, point: Point) -> Flown:
 
 
 def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
-    """Return the plan of a flight, from nothing but `common` and its factors; beside `out` it may leave a track's file.
+    """Return the plan of a flight, from nothing but `common` and its factors.
 
     Raises:
         Error: It cannot begin.
     """
     factors = common.fly | point.settings
     options = {name: value for name, value in factors.items() if key_of(name) is None} | {"seed": point.seed}
-    track = str(options.pop("track"))
-    if options.get("link") == "udp":
-        changed = next((name for name in factors if key_of(name) is not None), None)
-        if changed is not None:
-            raise CampaignError(f"{changed}: over udp two processes fly, which know files: leave link out")
-        return plan_of(track, options, out)
-    called = {"profile": options.get("profile") or "flight"}
-    profile = _object(called["profile"], common.profiles)
-    called["vehicle"] = options.get("vehicle") or profile.simulation.vehicle
-    called["plant_vehicle"] = options.get("plant_vehicle") or called["vehicle"]
-    vehicle = with_keys(factors, "vehicle", _object(called["vehicle"], common.vehicles))
-    plant_vehicle = _object(called["plant_vehicle"], common.vehicles) if options.get("plant_vehicle") else vehicle
-    options |= {"profile": with_keys(factors, "profile", profile), "vehicle": vehicle}
-    options["plant_vehicle"] = with_keys(factors, "plant-vehicle", plant_vehicle)
     if options.get("wind") in common.winds:
         options["wind"] = common.winds[options["wind"]]
-    if track in common.track_files:
-        file = out.with_name("track.csv")
-        file.write_text(common.track_files[track], encoding="utf-8")
-        track = with_file(track, file)
-    names: dict[str, Any] = {f"{option}_name": name for option, name in called.items() if isinstance(name, str)}
-    return replace(plan_of(track, options, out), **names, ulog=common.logs != "none")
+    spec = from_values(FlightSpec, {**options, "out": out, "ulog": common.logs != "none"}, OptionError)
+    profile = spec.chosen(with_keys(factors, "profile", _object(spec.profile, common.profiles)))
+    assumed = _object(spec.vehicle or profile.simulation.vehicle, common.vehicles)
+    vehicle = with_keys(factors, "vehicle", assumed)
+    flown = _object(spec.plant_vehicle, common.vehicles) if spec.plant_vehicle else vehicle
+    plant_vehicle = with_keys(factors, "plant-vehicle", flown).without(spec.without)
+    return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track)))
 
 
 def _killed(point: Point, common: Common) -> Flown:
@@ -212,13 +199,10 @@ def _metric(metric: Metric, flight: Flight) -> float | None:
         raise MetricError(f"metric {metric.name} raised {type(error).__name__}: {error}") from error
 
 
-def _files(wanted: Iterable[Path], folder: str, called: Mapping[str, str]) -> dict[str, bytes]:
-    """Return what is in files that there are, as it will lie in `folder`; places are called as they are known there."""
+def _files(wanted: Iterable[Path], folder: Path, called: str) -> dict[str, bytes]:
+    """Return what is in files that there are, as it will lie in the folder `called`, by which name it knows itself."""
     found = {}
     for path in wanted:
         with suppress(FileNotFoundError):
-            content = path.read_bytes()
-            for here, there in called.items():
-                content = content.replace(here.encode(), there.encode())
-            found[f"{folder}/{path.name}"] = content
+            found[f"{called}/{path.name}"] = path.read_bytes().replace(str(folder).encode(), called.encode())
     return found

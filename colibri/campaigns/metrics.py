@@ -1,12 +1,12 @@
 """What is kept of each flight: numbers of its report, by their names there, or what functions make of a flight."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
 from colibri.campaigns.values import CampaignError
-from colibri.common.errors import nearest
+from colibri.common.errors import unknown
 
 if TYPE_CHECKING:
     from colibri.experiments.flight import Flight
@@ -60,10 +60,5 @@ def _metric(given: Any) -> Metric:
     if callable(given):
         return Metric(str(getattr(given, "__name__", type(given).__name__)), given)
     if given not in NAMES:
-        raise CampaignError(f"unknown metric {given}: {hint(given, NAMES)}")
+        raise CampaignError(unknown("metric", given, NAMES))
     return Metric(given)
-
-
-def hint(given: Any, known: Sequence[str]) -> str:
-    """Return the end of a refusal: the nearest of what is known, and all of it."""
-    return f"{nearest(str(given), known)} choose {', '.join(known)}".lstrip()

@@ -4,27 +4,19 @@ from argparse import Namespace
 
 from colibri.analysis.limits import limit
 from colibri.cli.shared.beside import add_view, viewed
-from colibri.cli.shared.options import add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail, loading
-from colibri.experiments.options import add_plan_options
+from colibri.common.spec import add_options as add_spec
+from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri fly`."""
-    add_plan_options(parser, link="udp")
+    start = "the profile's, and the track's first yaw"
+    add_spec(parser, FlightSpec, defaults={"link": "udp"}, shown={"start": start})
     add = parser.add_argument
-    add(
-        "--gcs",
-        action="append",
-        default=[],
-        metavar="URL",
-        help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
-        "serial:DEVICE:BAUD; may be repeated",
-    )
     add_view(add)
-    add_signing(add)
-    add_out(add, "out", "logs and figures")
+    add("--quiet", action="store_true", help="print errors only")
     add(
         "--fail-above",
         type=limit,
@@ -35,7 +27,6 @@ def add_options(parser: ArgumentParser) -> None:
         "ground_contact_s=0 say; may be repeated",
     )
     add("--no-figures", action="store_true", help="draw no PNG figures")
-    add("--no-ulog", action="store_true", help="write no flight.ulg")
 
 
 def run(args: Namespace) -> int:

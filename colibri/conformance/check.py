@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from colibri.common.errors import Error
+from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.conformance.flight_checks import flight_checks, time_checks
 from colibri.conformance.interface_checks import interface_checks
@@ -107,7 +107,7 @@ def check_controller(
     """
     for area in only:
         if area not in CHECKS:
-            raise AreaError(f"unknown area {area}: choose {', '.join(CHECKS)}")
+            raise AreaError(unknown("area", area, CHECKS))
     subject = Subject.of(controller, profile, vehicle, seed, duration)
     subject.build()
 

@@ -123,7 +123,8 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
         recorded: Any = recorders[-1]
         return recorded  # type: ignore[no-any-return]
 
-    plan = replace(subject.plan(track, **options), law=law)
+    plan = subject.plan(track, **options)
+    plan = replace(plan, spec=replace(plan.spec, controller=law))
     try:
         autopilot, plant = put_together(plan, perf_counter)
     except Error:
@@ -132,7 +133,7 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
         return Flown([], in_words(error), error)
     exchange = Direct(autopilot)
     try:
-        while plant.world.time_us + plant.interval_us <= plan.duration_s * 1e6:
+        while plant.world.time_us + plant.interval_us <= plan.spec.duration * 1e6:
             _, command = exchange(plant)
             plant.answer(command)
     except DecisionError as error:

@@ -11,9 +11,9 @@ from colibri.autopilot.control.interface import Controller
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile, profile_names
 from colibri.autopilot.control.registry import Factory, load_controller
-from colibri.experiments.flight import law_name, plan_of
-from colibri.flights.command_lines import options_of
+from colibri.autopilot.spec import LawSpec
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle
 
 _DEFAULT_PROFILE = "flight"
@@ -53,9 +53,9 @@ class Subject:
         """
         named = isinstance(controller, str)
         law = load_controller(controller) if named else controller
-        profile = profile or profile_for(controller if named else law_name(law))
+        profile = profile or profile_for(LawSpec(controller=controller).law_name or "")
         given = {"controller": controller, "profile": profile} | ({"vehicle": vehicle} if vehicle else {})
-        plan = plan_of("hover", {**given, "link": "direct"}, Path())
+        plan = FlightPlan.of(FlightSpec.of("hover", **given, link="direct"))
         return cls(law, plan.profile, plan.vehicle, seed, duration_s, given)
 
     @property
@@ -87,13 +87,14 @@ class Subject:
         Raises:
             Error: It cannot be flown: the vehicle cannot start like that, say.
         """
-        return plan_of(track, {**self.given, "link": "direct", "seed": self.seed, **options}, out)
+        every = {**self.given, "link": "direct", "seed": self.seed, "out": out, **options}
+        return FlightPlan.of(FlightSpec.of(track, **every))
 
     def command(self, track: str, **options: Any) -> str:
         """Return what flies the same flight again: a command, or Python where no command knows the law."""
         every = {**self.given, "link": "direct", "seed": self.seed, **options}
         if all(isinstance(value, str) for value in self.given.values()):
-            return f"colibri fly {join([track, *options_of(**every)])}"
+            return f"colibri fly {join([track, *(_option(*each) for each in every.items())])}"
         return f"colibri.fly({track!r}, {_words(every)})"
 
     def snippet(self, code: str, track: str, **options: Any) -> str:
@@ -148,3 +149,9 @@ def _word(value: Any) -> str:
     if isinstance(value, str | int | float | dict):
         return repr(value)
     return str(getattr(value, "__name__", type(value).__name__.lower()))
+
+
+def _option(name: str, value: Any) -> str:
+    """Return an option as a command line has it."""
+    said = ",".join(f"{key}={each!r}" for key, each in value.items()) if isinstance(value, Mapping) else value
+    return f"--{name.replace('_', '-')}={said}"

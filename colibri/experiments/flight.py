@@ -1,35 +1,28 @@
 """`colibri.fly`: one flight from Python, and what came of it as an object."""
 
-from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from shutil import copytree, rmtree
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 from weakref import finalize
 
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.recording import FlightReader
 from colibri.analysis.report import Report, report_rows
 from colibri.analysis.series.figure_series import FigureSeries
-from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.control.registry import Factory
-from colibri.autopilot.process.options import delay_s
+from colibri.common.errors import unknown
+from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
-from colibri.experiments.options import OptionError, read_keywords
 from colibri.experiments.table import Table, read_table
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan
-from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from colibri.flights.spec import FlightSpec, OptionError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-BY_NAME = ("profile", "vehicle", "plant_vehicle", "controller", "wind")
-"""Options whose value may be an object in place of the name that the command line has."""
-
-T = TypeVar("T", Profile, Vehicle)
 
 
 class Flight:
@@ -89,7 +82,7 @@ class Flight:
             if name == what:
                 return figure
             known.append(name)
-        raise OptionError(f"plot: unknown figure {what}: choose {', '.join(known)}")
+        raise OptionError(unknown("figure", what, known))
 
     def save(self, folder: str | Path) -> Path:
         """Write logs, tables, report and figures of the flight into a folder that is new or empty; return it.
@@ -108,7 +101,7 @@ class Flight:
 
     def _repr_html_(self) -> str:
         """Return the report as a table, and the error over time, as a notebook shows them."""
-        title = f"{self.plan.track_name}, {self.plan.flown_by}"
+        title = f"{self.plan.spec.track}, {self.plan.flown_by}"
         return table_html(title, report_rows(self.report).items()) + figure_html(self.plot())
 
 
@@ -127,51 +120,11 @@ def fly(track: str, **options: Any) -> Flight:
     """
     folder = Path(mkdtemp(prefix="colibri-"))
     try:
-        plan = plan_of(track, options, folder)
+        given = {"track": track, **options}
+        spec = from_values(FlightSpec, given, OptionError, keywords_of(FlightSpec))
+        plan = FlightPlan.of(replace(spec, out=folder))
         prepare(folder)
         return Flight(plan, keep_flight(plan, fly_plan(plan)))
     except BaseException:
         rmtree(folder, ignore_errors=True)
         raise
-
-
-def plan_of(track: str, options: Mapping[str, Any], out: Path) -> FlightPlan:
-    """Return the plan of a flight by keywords, see `fly`; its logs will be in `out`.
-
-    Raises:
-        Error: There is no such option, or what it names cannot be flown.
-    """
-    objects = {name: options[name] for name in BY_NAME if not isinstance(options.get(name), str | None)}
-    args = read_keywords(track, {name: value for name, value in options.items() if name not in objects})
-    if objects and args.link == "udp":
-        raise OptionError(
-            f"{next(iter(objects))}: over udp two processes fly, which know it by its name or file: fly link='memory'"
-        )
-    law: Factory | None = objects.get("controller")
-    args.controller = law_name(law) if law else args.controller
-    args.wind = objects.get("wind", args.wind)
-    profile = _loaded(objects.get("profile"), args.profile, Profile, load_profile)
-    profile = profile.with_choices(args.controller, args.solver, delay_s(args.delay))
-    named = args.vehicle or profile.simulation.vehicle
-    vehicle = _loaded(objects.get("vehicle"), named, Vehicle, load_vehicle)
-    flown = objects.get("plant_vehicle") or (None if args.plant_vehicle else vehicle)
-    plant_vehicle = _loaded(flown, args.plant_vehicle, Vehicle, load_vehicle).without(args.without)
-    args.profile = profile.name if "profile" in objects else args.profile
-    args.vehicle = vehicle.name if "vehicle" in objects else args.vehicle
-    args.plant_vehicle = plant_vehicle.name if "plant_vehicle" in objects else args.plant_vehicle
-    args.gcs, args.signing_key, args.insecure, args.out = (), None, False, out
-    return FlightPlan.of_contents(args, track, profile, vehicle, plant_vehicle, law)
-
-
-def law_name(law: Any) -> str:
-    """Return by which name a control law goes that was handed over: the class's, or the function's."""
-    return str(getattr(law, "__name__", type(law).__name__))
-
-
-def _loaded(given: Any, name: str, kind: type[T], load: Any) -> T:
-    if given is None:
-        loaded: T = load(name)
-        return loaded
-    if not isinstance(given, kind):
-        raise OptionError(f"expected a {kind.__name__} or its name, not {type(given).__name__}")
-    return given

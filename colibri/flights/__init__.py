@@ -1,4 +1,4 @@
-"""A planned flight and how it is flown: in this process, as two, as a fleet, or again from its log."""
+"""A flight, described once, and how it is flown: in this process, as two, as a fleet, or again from its log."""
 
 from typing import TYPE_CHECKING
 
@@ -15,5 +15,7 @@ if TYPE_CHECKING:
     from colibri.flights.replay import Replayed as Replayed
     from colibri.flights.replay import ReplayError as ReplayError
     from colibri.flights.replay import replay_flight as replay_flight
+    from colibri.flights.spec import FlightSpec as FlightSpec
+    from colibri.flights.spec import OptionError as OptionError
 else:
     __getattr__, __dir__ = public(__name__)

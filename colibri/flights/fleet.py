@@ -1,27 +1,31 @@
 """`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until interrupted."""
 
-import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import isfinite
+from math import inf
+from pathlib import Path
 from time import perf_counter, time
+from typing import Annotated, Any, Literal
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.spec import AutopilotSpec, GroundSpec, name_of
 from colibri.common.earth.geodesy import geodetic_of
-from colibri.common.earth.home import HomePlace
+from colibri.common.earth.home import DEFAULT_HOME, HomePlace
+from colibri.common.earth.home import home as read_home
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.common.process.log_files import set_aside
-from colibri.flights.children import Child, end_children, events_of, how_it_ended
-from colibri.flights.command_lines import options_of, plant_options
+from colibri.common.spec import Option, part_of
 from colibri.flights.fleet_status import StatusLines
 from colibri.flights.folder import LOGS, occupied, prepare
+from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
+from colibri.flights.spec import VehiclesSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
 from colibri.plant.physics.start import Start
-from colibri.plant.simulation.setting import WorldSetting, world_values
+from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 
 PLANT_PORT = 14560
@@ -32,6 +36,39 @@ _MAX_DEATHS, _LOOP_S = 3, 60.0
 """A vehicle whose processes die more often than that in that time is not started again."""
 _OF_AUTOPILOT = ("autopilot.csv", "estimate.csv", "filter.csv")
 """What an autopilot writes anew; `inputs.jsonl` goes on where the one before has died."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FleetSpec(VehiclesSpec, GroundSpec):
+    """Vehicles that ground stations connect to."""
+
+    instance: Annotated[int, Option("number of the (first) vehicle: its system id is N + 1", "N", least=0)] = 0
+    count: Annotated[int, Option("how many vehicles", "N", least=0)] = 1
+    home: Annotated[
+        HomePlace,
+        Option("where they stand, degrees and m, yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
+    ] = DEFAULT_HOME
+    spacing: Annotated[
+        float, Option("how far each vehicle of a fleet stands east of the one before", "M", "m", least=0.0)
+    ] = 3.0
+    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
+    out: Annotated[
+        Path | None,
+        Option("record in DIR/N what `colibri replay` flies again: both processes' logs (default: not)", "DIR"),
+    ] = None
+    plant_port: Annotated[
+        int | None, Option("the plant's (default: 14560 + N; 0: any that is free)", "PORT", least=0, most=65535)
+    ] = None
+    speed: Annotated[float, Option("times real time, or max", "N", above=0.0, endless=True)] = 1.0
+    duration: Annotated[
+        float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
+    ] = inf
+    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
+
+    def folder(self, instance: int) -> Path | None:
+        """Return the folder of a vehicle's logs; None where none are written."""
+        return None if self.out is None else self.out / str(instance)
 
 
 @dataclass(slots=True, eq=False)
@@ -62,56 +99,55 @@ class Member:
         return self.instance + 1
 
 
-def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
+def ground_links(spec: FleetSpec, instance: int) -> list[str]:
     """Return the URLs that instance `instance` serves: those of the options, or the two that clients listen on."""
-    if args.gcs:
-        return list(args.gcs)
+    if spec.gcs:
+        return list(spec.gcs)
     return [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
 
 
-def sitl(args: argparse.Namespace) -> int:
-    """Fly as the command line says, until interrupted; return the exit code."""
-    _check(args)
-    instances = range(args.instance, args.instance + args.count)
-    fleet = [Member(it, number * args.spacing, ground_links(args, it)) for number, it in enumerate(instances)]
+def sitl(spec: FleetSpec, *, quiet: bool) -> int:
+    """Fly vehicles until interrupted; return the exit code."""
+    _check(spec)
+    instances = range(spec.instance, spec.instance + spec.count)
+    fleet = [Member(it, number * spec.spacing, ground_links(spec, it)) for number, it in enumerate(instances)]
     with ExitStack() as held:
-        for instance in instances if args.out else ():
-            held.enter_context(occupied(args.out / str(instance)))
-            prepare(args.out / str(instance))
+        for folder in filter(None, map(spec.folder, instances)):
+            held.enter_context(occupied(folder))
+            prepare(folder)
         stop = Stop()
-        lines = StatusLines(quiet=args.quiet)
-        lines.begin(args.count)
+        lines = StatusLines(quiet=quiet)
+        lines.begin(spec.count)
         try:
             for member in fleet:
-                _start_plant(member, args)
-            _watch(fleet, args, stop, lines)
+                _start_plant(member, spec)
+            _watch(fleet, spec, stop, lines)
         finally:
             end_children(child for member in fleet for child in member.children)
             lines.close()
     return EXIT_FAILED if any(child.code() == EXIT_FAILED for member in fleet for child in member.children) else 0
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check(spec: FleetSpec) -> None:
     """End with one line where the options cannot be flown."""
     try:
-        profile = load_profile(args.profile).with_choices(args.controller, None)
-        name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
-        vehicle = load_vehicle(name).without(args.without)
-        assumed = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        check_reach(ground_links(args, args.instance), signed=args.signing_key is not None, insecure=args.insecure)
+        profile, assumed = spec.load()
+        name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
+        vehicle = (load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed).without(spec.without)
+        check_reach(ground_links(spec, spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
     except Error as error:
         fail(str(error))
-    if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or assumed.sensors is None):
+    if spec.feedback is Feedback.SENSORS and (vehicle.sensors is None or assumed.sensors is None):
         fail(f"--feedback sensors: vehicle {(assumed if vehicle.sensors else vehicle).name} has no table sensors")
-    if vehicle.ground is None and "z" not in args.start:
+    if vehicle.ground is None and "z" not in spec.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
-    if not 1 <= args.count <= MAX_FLEET - args.instance:
+    if not 1 <= spec.count <= MAX_FLEET - spec.instance:
         fail(f"--instance and --count: at least one vehicle, instances from 0 to {MAX_FLEET - 1}")
-    if args.count > 1 and any(_taken_by_one(url) for url in args.gcs):
+    if spec.count > 1 and any(_taken_by_one(url) for url in spec.gcs):
         fail("--gcs: several vehicles cannot have one port; let them call, by udpout: or tcp:, or fly one")
     try:
-        for instance in range(args.instance, args.instance + args.count):
-            open_link(_plant_url(args, instance)).close()
+        for instance in range(spec.instance, spec.instance + spec.count):
+            open_link(_plant_url(spec, instance)).close()
     except LinkError as error:
         fail(str(error))
 
@@ -120,70 +156,64 @@ def _taken_by_one(url: str) -> bool:
     return url.startswith("serial:") or (url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0"))
 
 
-def _plant_url(args: argparse.Namespace, instance: int) -> str:
+def _plant_url(spec: FleetSpec, instance: int) -> str:
     port = PLANT_PORT + instance
-    if args.plant_port is not None:
-        port = args.plant_port + instance - args.instance if args.plant_port else 0
+    if spec.plant_port is not None:
+        port = spec.plant_port + instance - spec.instance if spec.plant_port else 0
     return f"udpin:127.0.0.1:{port}"
 
 
-def place_of(member: Member, args: argparse.Namespace) -> HomePlace:
+def place_of(member: Member, spec: FleetSpec) -> HomePlace:
     """Return where a vehicle stands: in a row to the east, each with an origin of its own."""
-    home: HomePlace = args.home
+    home = spec.home
     if not member.east_m:
         return home
     return HomePlace(*geodetic_of((member.east_m, 0.0, 0.0), home.origin)._replace(altitude_m=home.altitude_m), home[3])
 
 
-def _start_plant(member: Member, args: argparse.Namespace) -> None:
+def _start_plant(member: Member, spec: FleetSpec) -> None:
     member.boot_unix_us = round(time() * 1e6)
-    home = place_of(member, args)
-    start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
-    vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
-    world = WorldSetting(**(world_values(args) | {"start": start, "seed": args.seed + member.instance}))
-    options = plant_options(
-        world,
-        json=True,
-        link=_plant_url(args, member.instance),
-        vehicle=vehicle,
-        duration=args.duration if isfinite(args.duration) else None,
-        speed=args.speed,
-        home=home,
-        system_id=member.system_id,
-        boot_unix_us=member.boot_unix_us,
-        out=args.out and args.out / str(member.instance),
+    home = place_of(member, spec)
+    plant = part_of(
+        spec,
+        PlantSpec,
+        link=_plant_url(spec, member.instance),
+        vehicle=spec.plant_vehicle or spec.vehicle or load_profile(spec.profile).simulation.vehicle,
+        start=spec.started(Start(psi=home.yaw_enu_deg))._asdict(),
+        seed=spec.seed + member.instance,
+        **_common(member, spec),
     )
-    member.children.append(Child("plant", options))
+    member.children.append(Child(plant))
 
 
-def _start_autopilot(member: Member, args: argparse.Namespace) -> None:
-    options = options_of(
-        json=True,
+def _start_autopilot(member: Member, spec: FleetSpec) -> None:
+    autopilot = part_of(
+        spec,
+        AutopilotSpec,
         plant=member.plant_url.replace("udpin", "udpout"),
-        gcs=member.links,
-        profile=args.profile,
-        vehicle=args.vehicle,
-        controller=args.controller,
-        feedback=args.feedback,
-        home=place_of(member, args),
-        identity=args.identity,
-        state=args.state / str(member.instance),
-        signing_key=args.signing_key,
-        insecure=args.insecure,
-        strict=args.strict,
-        system_id=member.system_id,
-        boot_unix_us=member.boot_unix_us,
-        out=args.out and args.out / str(member.instance),
+        gcs=tuple(member.links),
+        state=spec.state / str(member.instance),
+        **_common(member, spec),
     )
-    member.children.append(Child("autopilot", options))
+    member.children.append(Child(autopilot))
 
 
-def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> None:
+def _common(member: Member, spec: FleetSpec) -> dict[str, Any]:
+    """Return what plant and autopilot of a vehicle have alike, and no other vehicle."""
+    return {
+        "home": place_of(member, spec),
+        "system_id": member.system_id,
+        "boot_unix_us": member.boot_unix_us,
+        "out": spec.folder(member.instance),
+    }
+
+
+def _watch(fleet: Sequence[Member], spec: FleetSpec, stop: Stop, lines: StatusLines) -> None:
     """Show the events of the processes until the last vehicle ends or the user interrupts."""
     flying = list(fleet)
     while flying and not stop:
         codes = {member: [child.code() for child in member.children] for member in flying}
-        _hear(flying, args, lines)
+        _hear(flying, spec, lines)
         lines.show(perf_counter())
         for member, of_children in codes.items():
             if 0 in of_children:  # its time is over, or a ground station has shut it down
@@ -191,10 +221,10 @@ def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines:
                 lines.forget(member.instance)
                 flying.remove(member)
             elif any(of_children):
-                start_again(member, args, lines)
+                start_again(member, spec, lines)
 
 
-def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:
+def _hear(fleet: Sequence[Member], spec: FleetSpec, lines: StatusLines) -> None:
     """Read the events of the processes of `fleet`."""
     members = {child: member for member in fleet for child in member.children}
     for child, event in events_of(members):
@@ -202,7 +232,7 @@ def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines)
         match event["event"]:
             case "listening" if child.name == "plant":
                 member.plant_url = event["url"]
-                _start_autopilot(member, args)
+                _start_autopilot(member, spec)
             case "ground":
                 member.links[event["link"]] = event["url"]
             case "status":
@@ -210,7 +240,7 @@ def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines)
         lines.add(member.instance, child.name, event)
 
 
-def start_again(member: Member, args: argparse.Namespace, lines: StatusLines) -> None:
+def start_again(member: Member, spec: FleetSpec, lines: StatusLines) -> None:
     """Start again what has died of a vehicle: the autopilot, which goes on; or the plant, and with it both.
 
     Where a process cannot begin, or dies again and again, everything ends.
@@ -226,17 +256,19 @@ def start_again(member: Member, args: argparse.Namespace, lines: StatusLines) ->
     lines.died(member.instance, child.name, f"{how_it_ended(code)}; started again")
     if child.name == "plant":
         end_children(reversed(member.children))
-        _set_aside(member, args, LOGS)
+        _set_aside(member, spec, LOGS)
         member.children.clear()
-        _start_plant(member, args)
+        _start_plant(member, spec)
     else:
         end_children([child])
-        _set_aside(member, args, _OF_AUTOPILOT)
+        _set_aside(member, spec, _OF_AUTOPILOT)
         member.children.remove(child)
-        _start_autopilot(member, args)
+        _start_autopilot(member, spec)
 
 
-def _set_aside(member: Member, args: argparse.Namespace, names: Sequence[str]) -> None:
+def _set_aside(member: Member, spec: FleetSpec, names: Sequence[str]) -> None:
     """Give logs of processes that have died names of their own: autopilot.csv becomes autopilot-1.csv."""
-    for name in names if args.out else ():
-        set_aside(args.out / str(member.instance) / name)
+    folder = spec.folder(member.instance)
+    if folder is not None:
+        for name in names:
+            set_aside(folder / name)

@@ -25,7 +25,7 @@ def fly_plan(
         FlightError: It came to an early end; why is also in `FAILURE`, with the traceback where foreign code raised.
     """
     write_provenance(plan)
-    if plan.link == "udp":
+    if plan.spec.link == "udp":
         return fly_processes(plan, progress, say, compiling)
     with loading():
         from colibri.common.jit import on_compile

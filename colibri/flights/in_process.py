@@ -10,10 +10,8 @@ from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
-from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.autopilot.process.logs import AutopilotLog
-from colibri.autopilot.process.options import delay_s
-from colibri.autopilot.process.recorded_inputs import Setup
+from colibri.autopilot.process.run import setup_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading
 from colibri.common.types import Address
@@ -22,13 +20,11 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.physics.integrators import Integrator
 from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.options import nudged
+from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import Plant, PlantBuilder
 
 SYSTEM_ID = 1
-DEFAULT_IDENTITY = "px4"
 _ADDRESS: Address = ("memory", 0)
 _NEVER_LATE_S = 0.0
 
@@ -54,20 +50,20 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
         autopilot, plant = put_together(plan, perf_counter)
     interval_us = plant.interval_us
     plant_logs, log = (
-        PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.ulog),
-        AutopilotLog(plan.out, _setup(plan), ulog=plan.ulog),
+        PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.spec.ulog),
+        AutopilotLog(plan.out, setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle), ulog=plan.spec.ulog),
     )
     exchange: Exchange = Direct(autopilot)
-    if plan.link == "memory":
-        exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
-    end_us, is_paced = plan.duration_s * 1e6, isfinite(plan.speed)
+    if plan.spec.link == "memory":
+        exchange = InMemory(autopilot, interval_us, plan.spec.feedback, plant_logs)
+    end_us, is_paced = plan.spec.duration * 1e6, isfinite(plan.spec.pace)
     try:
         plant_logs.write_world(plant.world)
         with gc_frozen():
             began_s = perf_counter()
             while plant.world.time_us + interval_us <= end_us:
                 if is_paced:
-                    sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.speed - perf_counter()))
+                    sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.spec.pace - perf_counter()))
                 step, command = exchange(plant)
                 plant.answer(command)
                 log.write(step)
@@ -88,32 +84,11 @@ def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages]
     Raises:
         ControllerError, ProfileError, SolverError: As `fly_locally`.
     """
-    estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
-    autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.law)
-    integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    starts = {plan.feedback: nudged(plan.start)}
-    builder = PlantBuilder(plan, plan.plant_vehicle, starts, integrator=integrator)
-    return autopilot, builder.build(plan.feedback, autopilot.frame_interval_us)
-
-
-def _setup(plan: FlightPlan) -> Setup:
-    return Setup(
-        profile=plan.profile_name,
-        controller=plan.profile.controller,
-        solver=plan.solver,
-        delay_s=delay_s(plan.delay),
-        vehicle=plan.vehicle_name,
-        feedback=plan.feedback,
-        track=plan.track_name,
-        floor_m=plan.floor_m,
-        origin=DEFAULT_ORIGIN,
-        system_id=SYSTEM_ID,
-        identity=DEFAULT_IDENTITY,
-        ground=False,
-        profile_tables=plan.profile,
-        vehicle_tables=plan.vehicle,
-        track_file=file_text(plan.track_name),
-    )
+    estimator = estimator_for(plan.spec.feedback, plan.vehicle, DEFAULT_ORIGIN)
+    autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.spec.law)
+    starts = {plan.spec.feedback: nudged(plan.start)}
+    builder = PlantBuilder(plan.spec, plan.plant_vehicle, starts, integrator=plan.integrator)
+    return autopilot, builder.build(plan.spec.feedback, autopilot.frame_interval_us)
 
 
 class Direct:

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterable
 
 from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import kept_failure
-from colibri.flights.children import Child, end_children, events_of, how_it_ended
-from colibri.flights.command_lines import options_of, plant_options
+from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
 from colibri.flights.plan import FlightPlan, Summary, unseen
 
 _SHOWN = ("ground", "heard", "said")
@@ -41,7 +40,7 @@ def fly_processes(
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     try:
-        children["plant"] = Child("plant", _plant_options(plan), fork=True)
+        children["plant"] = Child(plan.plant_spec("udpin:127.0.0.1:0"), fork=True)
         over = False
         while not over:
             over = any(child.code() is not None for child in children.values())
@@ -53,7 +52,8 @@ def fly_processes(
                     if event["event"] in _SHOWN:
                         say(event["text"])
                 elif event["event"] == "listening":
-                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]), fork=True)
+                    autopilot = plan.autopilot_spec(event["url"].replace("udpin", "udpout"))
+                    children["autopilot"] = Child(autopilot, fork=True)
                 elif event["event"] == "progress":
                     progress(event["sim_time_s"])
                 elif event["event"] == "ended":
@@ -61,40 +61,6 @@ def fly_processes(
         raise _failure(children.values(), plan)
     finally:
         end_children(children.values())
-
-
-def _plant_options(plan: FlightPlan) -> list[str]:
-    return plant_options(
-        plan,
-        json=True,
-        link="udpin:127.0.0.1:0",
-        vehicle=plan.plant_vehicle_name,
-        integrator=plan.integrator,
-        duration=plan.duration_s,
-        speed=plan.speed,
-        out=plan.out,
-        no_ulog=not plan.ulog,
-    )
-
-
-def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
-    return options_of(
-        json=True,
-        plant=plant_url.replace("udpin", "udpout"),
-        track=plan.track_name,
-        floor=plan.floor_m,
-        profile=plan.profile_name,
-        vehicle=plan.vehicle_name,
-        controller=plan.profile.controller,
-        feedback=plan.feedback,
-        solver=plan.solver,
-        delay=plan.delay,
-        gcs=plan.ground.links,
-        signing_key=plan.ground.signing_key,
-        insecure=plan.ground.insecure,
-        out=plan.out,
-        no_ulog=not plan.ulog,
-    )
 
 
 def _failure(children: Iterable[Child], plan: FlightPlan) -> FlightError:

@@ -1,22 +1,16 @@
 """The flights of one test: begun by its marks, on the link that the command line chose, and ended with it."""
 
 import json
-from argparse import ArgumentTypeError
-from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
 
-from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.parameters.definitions import definitions
-from colibri.common.earth.geodesy import Geodetic
-from colibri.common.earth.home import DEFAULT_HOME, home
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import freeze_once
-from colibri.mavlink.parameters.file import write
-from colibri.mavlink.parameters.store import Parameters
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.common.spec import values_of
+from colibri.plant.spec import PlantSpec
+from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.launcher import Launcher
 from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
@@ -51,31 +45,33 @@ class Flights:
         Raises:
             SettingError: It cannot begin so.
         """
-        setting = setting_of([asdict(self.setting), changes])
+        setting = setting_of([values_of(self.setting), changes])
         state = self._folder / f"vehicle-{len(self.flown)}"
-        sitl = Sitl(setting, self._lockstep(setting, state), origin_of(setting))
+        sitl = Sitl(setting, self._lockstep(setting, state), setting.home.origin)
         self.flown.append(sitl)
         sitl.begin()
         return sitl
 
     def _lockstep(self, setting: Setting, state: Path) -> LockstepSession:
         state.mkdir()
-        _write_parameters(setting, state)
-        plant = self._plant(setting.plant_options(_hover_rpm(setting)), state)
+        try:
+            plant = self._plant(setting.plant_spec(), state)
+        except VehicleError as error:
+            raise SettingError(str(error)) from error
         self._ends.callback(plant.close)
-        autopilot = self._autopilot(setting.autopilot_options(state), state)
+        autopilot = self._autopilot(setting.autopilot_spec(state), state)
         self._ends.callback(autopilot.close)
         return LockstepSession(plant, autopilot, setting.system, setting.seed)
 
-    def _plant(self, options: Sequence[str], state: Path) -> Plant:
+    def _plant(self, spec: PlantSpec, state: Path) -> Plant:
         if self._launcher is None:
-            return MemoryPlant(options)
+            return MemoryPlant(spec)
         if not self._launcher.starts_plants:
-            return MemoryPlant(options, QuickClock())
-        return UdpPlant(self._launcher, options, state)
+            return MemoryPlant(spec, QuickClock())
+        return UdpPlant(self._launcher, spec, state)
 
-    def _autopilot(self, options: Sequence[str], state: Path) -> Autopilot:
-        return MemoryAutopilot(options) if self._launcher is None else UdpAutopilot(self._launcher, options, state)
+    def _autopilot(self, spec: AutopilotSpec, state: Path) -> Autopilot:
+        return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
         """Write all that is known of the flights below `folder`; return where each is.
@@ -97,7 +93,7 @@ class Flights:
             facts = {
                 "test": title,
                 "reason": reason,
-                "setting": asdict(sitl.setting),
+                "setting": values_of(sitl.setting),
                 "sha256": sitl.sha256,
                 "simulated_s": sitl.time_s,
                 "ended": str(sitl),
@@ -122,48 +118,3 @@ class Flights:
     def __exit__(self, *_: object) -> None:
         """End every flight."""
         self._ends.close()
-
-
-def origin_of(setting: Setting) -> Geodetic:
-    """Return the origin of a flight's ENU frame.
-
-    Raises:
-        SettingError: There is no such place.
-    """
-    try:
-        return (DEFAULT_HOME if setting.home is None else home(setting.home)).origin
-    except ArgumentTypeError as error:
-        raise SettingError(f"home: {error}") from error
-
-
-def _hover_rpm(setting: Setting) -> float:
-    try:
-        vehicle = load_vehicle(setting.vehicle)
-    except VehicleError as error:
-        raise SettingError(str(error)) from error
-    return vehicle.hover_speed / vehicle.speed_from_rpm(1.0)
-
-
-def _write_parameters(setting: Setting, state: Path) -> None:
-    """Write the parameters that the autopilot is to begin with, as it would have kept them.
-
-    Raises:
-        SettingError: There is no such parameter, or it cannot have the value.
-    """
-    if not setting.params:
-        return
-    profile = load_profile(setting.profile).with_choices(setting.controller, None)
-    vehicle = load_vehicle(setting.believed or setting.vehicle)
-    parameters = Parameters(definitions(profile, vehicle, setting.system))
-    _set(parameters, setting.params)
-    name = f"{profile.controller}-{vehicle.name.lower().replace(' ', '-')}.params"
-    (state / name).write_text(write(parameters, setting.system), encoding="utf-8")
-
-
-def _set(parameters: Parameters, values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        if name not in parameters:
-            raise SettingError(f"the vehicle has no parameter {name}")
-        refusal = parameters.set(name, value)
-        if refusal is not None:
-            raise SettingError(f"parameter {name} cannot be {value:g}: {refusal.name}")

@@ -14,7 +14,7 @@ from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, Win
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
-from colibri.plant.process.options import constant_wind
+from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.lockstep import LockstepSession

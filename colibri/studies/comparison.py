@@ -17,9 +17,10 @@ from colibri.campaigns.flights import Common, Flown, check, common_of, fly_point
 from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.values import CampaignError, shown
+from colibri.common.spec import keywords_of
 from colibri.flights.folder import make_folder, prepare
-from colibri.flights.plan import OPTIONS
 from colibri.flights.provenance import provenance_of
+from colibri.flights.spec import FlightSpec
 from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_of
 
 
@@ -52,12 +53,13 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
 
 
 def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:
-    """Return the campaign that a command line asks for; options as texts where they are objects."""
-    options = {option: getattr(args, option) for option in ("link", *OPTIONS) if option != "seed"}
+    """Return the campaign that a command line asks for."""
+    names = set(keywords_of(FlightSpec)) - {"track", "profile", "controller", "seed"}
+    options = {option: value for option, value in vars(args).items() if option in names}
     tables = CampaignTables(
         name=name,
         seeds=args.seeds or args.seed,
-        fly=options | {"wind": args.wind and str(args.wind)},
+        fly=options,
         grid={
             "contender": contenders_of(args.profile or DEFAULT_PROFILES, args.controller),
             "track": list(dict.fromkeys(args.track or THESIS_TRACKS)),

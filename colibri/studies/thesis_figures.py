@@ -24,6 +24,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 
 FORMATS = ("png", "svg")
 FIRST_SECONDS = (0.0, 5.0)
@@ -101,7 +102,9 @@ def draw(job: Job) -> list[Path]:
     """Fly once and draw the figures of that flight; return what was written."""
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
-    plan = FlightPlan.of_options(folder, track=job.flight.track, profile="thesis", controller=job.flight.controller)
+    plan = FlightPlan.of(
+        FlightSpec.of(job.flight.track, profile="thesis", controller=job.flight.controller, link="direct", out=folder)
+    )
     flown = FigureSeries(plan)
     keep_flight(plan, fly_locally(plan), flown.add)
     series = flown.over_time()

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.campaigns.flights import Flown, Verdict
-from colibri.campaigns.metrics import NAMES, Metric, hint, read_metrics
+from colibri.campaigns.metrics import NAMES, Metric, read_metrics
 from colibri.campaigns.values import is_number
+from colibri.common.errors import unknown
 from colibri.common.types import Array
 from colibri.tuning.space import TuningError
 
@@ -95,7 +96,7 @@ def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
     if name in _NOT_SMALL:
         raise TuningError(f"objectives: {name} is none that is to become small: choose {SHARE_LOST}")
     if name not in known:
-        raise TuningError(f"objectives: unknown metric {name}: {hint(name, known)}")
+        raise TuningError(f"objectives: {unknown('metric', name, known)}")
     if name == SHARE_LOST:
         if pooling != "mean":
             raise TuningError(f'objectives: {SHARE_LOST} is a mean: write {SHARE_LOST} = "mean"')

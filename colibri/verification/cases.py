@@ -10,7 +10,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan
-from colibri.plant.process.options import wind
+from colibri.flights.spec import FlightSpec
 from colibri.sitl.backends.setting import setting_of
 
 if TYPE_CHECKING:
@@ -34,10 +34,10 @@ class Case(NamedTuple):
 
     def plan(self, out: Path, **more: Any) -> FlightPlan:
         """Return the plan of the flight with its logs in `out`, and with `more` options."""
-        options = self.options | ({"wind": wind(self.options["wind"])} if "wind" in self.options else {})
+        options = dict(self.options)
         if self.waypoints:
             options["track"] = f"waypoints:{out / _WAYPOINTS_FILE}"
-        return FlightPlan.of_options(out, **(options | more))
+        return FlightPlan.of(FlightSpec.of(**(options | {"out": out} | more)))
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
         """Fly over `link`, `udp` or `memory`, with the logs in `out`; return the hash of the trajectory.

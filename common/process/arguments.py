@@ -4,7 +4,6 @@ import argparse
 import re
 from argparse import ArgumentTypeError
 from math import inf, isfinite
-from pathlib import Path
 from typing import Any, NoReturn
 
 from colibri.common.process.lifecycle import fail
@@ -80,20 +79,3 @@ def seeds(text: str) -> range:
     if not chosen:
         raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
     return chosen
-
-
-def add_common_arguments(parser: ArgumentParser, log: str) -> None:
-    """Add the options that both processes have; `log` names what `--out` writes."""
-    add = parser.add_argument
-    add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
-    add("--out", type=Path, metavar="DIR", help=f"write {log} there")
-    add("--no-ulog", action="store_true", help="write no flight.ulg there")
-    add(
-        "--boot-unix-us",
-        type=natural,
-        default=0,
-        metavar="N",
-        help="Unix time at simulated time 0, µs, by which telemetry logs are dated; the same for plant and autopilot",
-    )
-    add("--json", action="store_true", help="status as JSON lines on standard output")
-    add("--parent", type=natural, metavar="PID", help="end when that process, which started this one, ends")

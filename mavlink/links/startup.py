@@ -1,11 +1,11 @@
 """A process's first steps: its link opened, its status line, its end by a signal."""
 
-import argparse
 import gc
 from collections.abc import Callable
 from typing import TypeVar
 
 from colibri.common.process.lifecycle import Stop, end_quickly, escape_what_no_stream_encodes, fail, use_one_thread
+from colibri.common.process.spec import Starter
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import LinkError
 
@@ -14,7 +14,7 @@ Link = TypeVar("Link")
 COMPILING = "compiling, once: half a minute and more"
 
 
-def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
+def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
     """Open the link at `url` by `opened` and take over signals, or end with one line.
 
     To be called before numpy is loaded.
@@ -23,13 +23,13 @@ def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str],
     use_one_thread()
     end_quickly()
     gc.disable()  # until all is loaded, see `gc_frozen`: what is loaded stays
-    stop = Stop(parent=args.parent, starting=True)
+    stop = Stop(parent=starter.parent, starting=True)
     try:
         link = opened(url)
     except LinkError as error:
         fail(str(error))
-    status = Status(name, as_json=args.json)
-    if args.json:
+    status = Status(name, as_json=starter.as_json)
+    if starter.as_json:
         status.take_standard_output()
     return link, status, stop
 

@@ -4,9 +4,10 @@ Velocities are those of the air, ENU, m/s. `air` makes one velocity of them.
 """
 
 from bisect import bisect_right
+from dataclasses import dataclass
 from math import pi, radians
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from colibri.common.elementary import cos, sin
 from colibri.common.types import Vector
@@ -44,7 +45,8 @@ class Wind(NamedTuple):
         return f"{self.speed_m_s!r}@{self.from_deg!r}"
 
 
-class RecordedWind(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class RecordedWind:
     """A wind from a file: linear between its times, constant before the first and after the last."""
 
     path: Path
@@ -108,8 +110,3 @@ class Weather(NamedTuple):
 
 NO_WIND = Wind(0.0, 0.0)
 NO_WEATHER = Weather(NO_WIND)
-
-
-def weather_of(said: Any) -> Weather:
-    """Return the weather that a command line, or a `WorldSetting` of what it reads, asks for."""
-    return Weather(said.wind or NO_WIND, tuple(said.gusts), said.turbulence, said.seed)

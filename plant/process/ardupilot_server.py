@@ -1,6 +1,5 @@
 """The plant as a server of ArduPilot: it answers on a link, and ArduPilot's clock is the only one."""
 
-import argparse
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -10,35 +9,35 @@ from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
 from colibri.mavlink.links.udp import UdpLink
-from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.options import nudged
 from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, all_parameters_by, closing, report_end
+from colibri.plant.process.start import nudged
+from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.parameter_files import ardupilot_thrust_curve
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve ArduPilot on `link` as the command line asks; return the exit code."""
     try:
-        weather = weather_of(args)
-        vehicle = load_vehicle(args.vehicle).without(args.without)
+        weather = spec.weather
+        vehicle = load_vehicle(spec.vehicle).without(spec.without)
         motors = vehicle.rotors.numbering()
-        start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
+        start = starting_world(nudged(spec.started(Start(psi=spec.home.yaw_enu_deg))), vehicle, weather)
     except Error as error:
         fail(str(error))
     frame_type = motors.ardupilot_frame_type
     _, expo = ardupilot_thrust_curve(vehicle.rotors)
     text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
-    text = f"{text}; {all_parameters_by(args.vehicle, 'ardupilot')}"
+    text = f"{text}; {all_parameters_by(str(spec.vehicle), 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
-    end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors, vehicle.rotors)
-    logs = PlantLogs(args.out, vehicle, speaks_mavlink=False, ulog=not args.no_ulog) if args.out else None
+    end = ArduPilotEnd(Physics(vehicle, spec.integrator, weather), start, motors, vehicle.rotors)
+    logs = PlantLogs(spec.out, vehicle, speaks_mavlink=False, ulog=spec.ulog) if spec.out else None
     with closing(link, logs):
-        ArduPilotServer(end, link, status, stop, logs).serve(duration_s=args.duration)
+        ArduPilotServer(end, link, status, stop, logs).serve(duration_s=spec.duration)
     return EXIT_INTERRUPTED if stop else 0
 
 

@@ -1,6 +1,5 @@
 """The plant as a simulator of PX4: in lockstep with it, or, while it starts, at the pace of the wall clock."""
 
-import argparse
 from math import hypot
 from time import perf_counter, sleep
 from typing import Any
@@ -13,11 +12,9 @@ from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
-from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.options import nudged
 from colibri.plant.process.reports import (
     MAX_WAIT_S,
     SILENT_AFTER_S,
@@ -28,15 +25,17 @@ from colibri.plant.process.reports import (
     report_end,
 )
 from colibri.plant.process.server import Pace
+from colibri.plant.process.start import nudged
 from colibri.plant.sensors.suite import SensorSuite
+from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.plant.vehicle.parameter_files import px4_gps_delay_ms
 
 
-def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
+def run(spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> int:
     """Serve PX4 on `link` as the command line asks; return the exit code."""
     try:
-        simulator = Simulator(args, link, status, stop)
+        simulator = Simulator(spec, link, status, stop)
     except Error as error:
         fail(str(error))
     with closing(link, simulator):
@@ -50,30 +49,30 @@ class Simulator:
     It has more attributes than most classes: all that a flight begins with is kept, to begin the next one with.
     """
 
-    def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> None:
+    def __init__(self, spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> None:
         """Fly as the command line asks.
 
         Raises:
             VehicleError: There is no such vehicle, or PX4 cannot fly it.
         """
-        weather = weather_of(args)
-        vehicle = load_vehicle(args.vehicle).without(args.without)
+        weather = spec.weather
+        vehicle = load_vehicle(spec.vehicle).without(spec.without)
         if vehicle.sensors is None:
             raise VehicleError(f"{vehicle.name} has no sensors: PX4 flies a vehicle with a table sensors")
         delay_ms = px4_gps_delay_ms(vehicle)
         text = f"{vehicle.name}'s GPS is {delay_ms} ms late, SENS_GPS0_DELAY {delay_ms}"
-        status.say("sensors", f"{text}; {all_parameters_by(args.vehicle, 'px4')}", gps_delay_ms=delay_ms)
+        status.say("sensors", f"{text}; {all_parameters_by(str(spec.vehicle), 'px4')}", gps_delay_ms=delay_ms)
         self._sensors = vehicle.sensors
         self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2
-        self._start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
-        self._physics = Physics(vehicle, args.integrator, weather)
-        self._origin: Geodetic = args.home.origin
-        self._interval_us = round(1e3 / args.rate) * 1000
-        self._seed, self._speed, self._duration_us = args.seed, args.speed, args.duration * 1e6
+        self._start = starting_world(nudged(spec.started(Start(psi=spec.home.yaw_enu_deg))), vehicle, weather)
+        self._physics = Physics(vehicle, spec.integrator, weather)
+        self._origin: Geodetic = spec.home.origin
+        self._interval_us = round(1e3 / spec.rate) * 1000
+        self._seed, self._speed, self._duration_us = spec.seed, spec.pace, spec.duration * 1e6
         self._link, self._status, self._stop = link, status, stop
-        self._end = SimulatorEnd(system_id=args.system_id)
-        self._logs = PlantLogs(args.out, vehicle, args.boot_unix_us, ulog=not args.no_ulog) if args.out else None
+        self._end = SimulatorEnd(system_id=spec.system_id)
+        self._logs = PlantLogs(spec.out, vehicle, spec.boot_unix_us, ulog=spec.ulog) if spec.out else None
         self._logged_calls = 1
         self._time_us = 0
 

@@ -10,13 +10,13 @@ from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedF
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, WorldChange
-from colibri.plant.environment.weather import Wind, weather_of
+from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.simulation.faults import Faults
-from colibri.plant.simulation.setting import WorldSetting
+from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -132,26 +132,26 @@ class PlantBuilder:
 
     def __init__(
         self,
-        setting: WorldSetting,
+        spec: WorldSpec,
         vehicle: Vehicle,
         starts: Mapping[Feedback, Start],
         *,
         integrator: Integrator = "rk4",
         origin: Geodetic = DEFAULT_ORIGIN,
     ) -> None:
-        """Fly `vehicle` from one of `starts` in the world of `setting`; what is compiled is loaded here.
+        """Fly `vehicle` from one of `starts` in the world of `spec`; what is compiled is loaded here.
 
-        `vehicle` and `starts` have their part of `setting` already.
+        `vehicle` and `starts` have their part of `spec` already.
 
         Raises:
             VehicleError: It cannot start like that.
         """
-        weather = weather_of(setting)
+        weather = spec.weather
         self.vehicle = vehicle
         self.starts = starts
         self._worlds = {it: starting_world(start, vehicle, weather) for it, start in starts.items()}
         self._physics = Physics(vehicle, integrator, weather)
-        self._setting = setting
+        self._spec = spec
         self._origin = origin
 
     def build(self, feedback: Feedback, interval_us: int) -> Plant:
@@ -162,9 +162,9 @@ class PlantBuilder:
             self._physics,
             feedback,
             self._origin,
-            seed=self._setting.seed,
+            seed=self._spec.seed,
             interval_us=interval_us,
-            latency_us=round(self._setting.latency * 1e3),
+            latency_us=round(self._spec.latency * 1e3),
         )
 
 

@@ -263,13 +263,13 @@ def vehicle_text(name: str) -> str:
     return named_text("vehicle", _FOLDER, name, VehicleError)
 
 
-def load_vehicle(name_or_path: str) -> Vehicle:
-    """Read a vehicle by its name, or from a file if the argument ends in `.toml`.
+def load_vehicle(given: str | Vehicle) -> Vehicle:
+    """Read a vehicle by its name, or from a file if the name ends in `.toml`; one that is given is returned.
 
     Raises:
         VehicleError: There is no such vehicle, or the file has a missing, unknown or impossible key.
     """
-    return read_named("vehicle", _FOLDER, name_or_path, Vehicle, VehicleError)
+    return given if isinstance(given, Vehicle) else read_named("vehicle", _FOLDER, given, Vehicle, VehicleError)
 
 
 def _allocation(rotors: Rotors) -> Array:

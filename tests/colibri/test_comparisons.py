@@ -228,9 +228,12 @@ def test_a_law_that_cannot_be_built_is_found_before_anything_flies(
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--profile", "fast"], "unknown profile fast: choose flight, path, se3, thesis, thesis-euler or a .toml file"),
-        (["--profile", "thesis:pid"], f"unknown controller pid: installed are {INSTALLED}"),
-        (["--track", "loop"], f"unknown track loop: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
+        (
+            ["--profile", "fast"],
+            'unknown profile "fast" (choose flight, path, se3, thesis, thesis-euler, a .toml file)',
+        ),
+        (["--profile", "thesis:pid"], f'unknown controller "pid" (choose {INSTALLED})'),
+        (["--track", "loop"], f'unknown track "loop" (choose {", ".join([*THESIS_TRACKS, *OPTIONS])}'),
     ],
 )
 def test_bad_contenders_are_one_line(

@@ -128,9 +128,9 @@ def exit_code(*command: str) -> int | str | None:
     ("command", "line"),
     [
         (["replay", "nowhere.tlog"], "cannot read nowhere.tlog: No such file or directory"),
-        (["compare", "--profile", "fast"], "unknown profile fast: choose"),
-        (["compare", "--seeds", "1-2", "--track", "loop"], "unknown track loop: choose"),
-        (["sitl", "--vehicle", "dragonfly"], "unknown vehicle dragonfly: choose"),
+        (["compare", "--profile", "fast"], 'unknown profile "fast" (choose'),
+        (["compare", "--seeds", "1-2", "--track", "loop"], 'unknown track "loop" (choose'),
+        (["sitl", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly" (choose'),
     ],
 )
 def test_what_cannot_begin_is_one_line_and_exit_code_2(
@@ -148,7 +148,7 @@ def test_a_process_that_cannot_begin_says_one_line_and_exits_with_2() -> None:
     command = [sys.executable, "-m", "colibri", "autopilot", "--profile", "fast"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.startswith("colibri: error: unknown profile fast: choose ")
+    assert done.stderr.startswith('colibri: error: unknown profile "fast" (choose ')
     assert done.stderr.count("\n") == 1
 
 

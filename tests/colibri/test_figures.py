@@ -1,6 +1,5 @@
 """The figures of a flight: the files, and that what they draw is what was flown."""
 
-from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,8 +26,7 @@ from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.series.figure_series import FigureSeries, Series
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
-from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.environment.weather import NO_WIND
+from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import load_vehicle
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -46,34 +44,8 @@ class Flight(NamedTuple):
 
 
 def fly(out: Path, duration_s: float) -> Flight:
-    arguments = {
-        "profile": "thesis",
-        "link": "direct",
-        "speed": np.inf,
-        "seed": 0,
-        "feedback": Feedback.STATE,
-        "latency": 0.0,
-        "duration": duration_s,
-        "out": out,
-    }
-    files = {
-        "controller": None,
-        "solver": None,
-        "vehicle": None,
-        "plant_vehicle": None,
-        "integrator": "rk4",
-        "floor": None,
-    }
-    world: dict[str, Any] = {
-        "wind": NO_WIND,
-        "gusts": (),
-        "turbulence": None,
-        "without": (),
-        "start": {},
-        "delay": None,
-    }
-    ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
-    plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
+    options = {"profile": "thesis", "link": "direct", "duration": duration_s, "integrator": "rk4", "out": out}
+    plan = FlightPlan.of(FlightSpec.of("spiral", **options))
     fly_locally(plan)
     recording = read_recording(plan)
     flown = figure_series(recording, plan)
@@ -170,7 +142,7 @@ def test_an_attitude_reference_is_held_up_to_its_row(short: Flight) -> None:
 @pytest.mark.parametrize("vehicle", ["hummingbird-thesis", "hummingbird"])
 def test_rotor_limits(short: Flight, vehicle: str) -> None:
     rotors = load_vehicle(vehicle).rotors
-    plan = replace(short.plan, plant_vehicle=load_vehicle(vehicle))
+    plan = replace(short.plan, contents=short.plan.contents._replace(plant_vehicle=load_vehicle(vehicle)))
     series = figure_series(short.recording, plan).over_time()
     (figure,) = (figure for figure in flight_figures(series, plan) if figure.name == "rotors")
     for axes in draw_times(series, figure, "rotors").axes:

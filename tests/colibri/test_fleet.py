@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,16 +13,18 @@ import psutil
 import pytest
 from rich.console import Console
 
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.cli.main import main
 from colibri.common.earth.geodesy import enu_of
 from colibri.common.earth.home import DEFAULT_HOME
-from colibri.flights.children import Child, end_children
-from colibri.flights.fleet import Member, ground_links, place_of, start_again
+from colibri.flights.fleet import FleetSpec, Member, ground_links, place_of, start_again
 from colibri.flights.fleet_status import StatusLines, status_table
+from colibri.flights.launcher import Child, end_children
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode
+from colibri.plant.spec import PlantSpec
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import wait_for
 from tools.harness.sitl_process import WAITING, Vehicle, vehicle
@@ -38,9 +39,9 @@ NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecu
         (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
         (("--home", "0,181,0,0"), "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180"),
         (("--identity", "ardupilot"), "argument --identity: invalid choice: 'ardupilot'"),
-        (("--profile", "fast"), "unknown profile fast: choose flight"),
-        (("--vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
-        (("--plant-vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
+        (("--profile", "fast"), 'unknown profile "fast" (choose flight'),
+        (("--vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
+        (("--plant-vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
         (("--profile", "thesis"), "vehicle hummingbird-thesis has no ground to stand on"),
         (
             ("--profile", "thesis", "--feedback", "sensors"),
@@ -94,7 +95,7 @@ def test_what_only_the_autopilot_can_refuse(tmp_path: Path) -> None:
 
 
 def test_each_instance_has_its_own_port_for_sdks() -> None:
-    asked = Namespace(gcs=[])
+    asked = FleetSpec()
     assert ground_links(asked, 0) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14540"]
     assert ground_links(asked, 2) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14542"]
 
@@ -162,10 +163,9 @@ def test_a_process_that_dies_is_started_again(tmp_path: Path, name: str) -> None
 
 def dead(name: str, code: int) -> Child:
     """Return a process that has ended."""
-    child = Child(name, ("--no-such-option",), stdout=subprocess.PIPE)
-    child.process.kill()
-    child.process.wait()
-    child.process.returncode = code
+    child = Child(AutopilotSpec() if name == "autopilot" else PlantSpec(link="udpin:127.0.0.1:0"))
+    child.kill()
+    child.code = lambda: code  # type: ignore[method-assign]
     return child
 
 
@@ -174,7 +174,7 @@ def test_what_dies_again_and_again_ends_it_in_words(
 ) -> None:
     logs = tmp_path / "0"
     logs.mkdir()
-    member, args = Member(0, 0.0, []), Namespace(out=tmp_path)
+    member, args = Member(0, 0.0, []), FleetSpec(out=tmp_path)
     monkeypatch.setattr("colibri.flights.fleet._start_autopilot", lambda *_: (logs / "autopilot.csv").touch())
     lines = StatusLines(quiet=True)
     for _ in range(3):
@@ -195,13 +195,13 @@ def test_what_dies_again_and_again_ends_it_in_words(
 def test_what_cannot_begin_is_not_started_again() -> None:
     member = Member(0, 0.0, [], [dead("autopilot", 2)])
     with pytest.raises(SystemExit) as ended:
-        start_again(member, Namespace(out=None), StatusLines(quiet=True))
+        start_again(member, FleetSpec(), StatusLines(quiet=True))
     end_children(member.children)
     assert ended.value.code == 2
 
 
 def test_a_fleet_stands_in_a_row() -> None:
-    args = Namespace(home=DEFAULT_HOME)
+    args = FleetSpec()
     assert place_of(Member(4, 0.0, []), args) == DEFAULT_HOME
     place = place_of(Member(5, 6.0, []), args)
     assert enu_of(place.origin, DEFAULT_HOME.origin) == pytest.approx((6.0, 0.0, 0.0), abs=1e-3)

@@ -14,7 +14,8 @@ from colibri.analysis.lost import ground_contact_s, lost
 from colibri.analysis.recording import COLUMNS, Samples
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.cli.main import main
-from colibri.flights.plan import FlightPlan, GroundAccess
+from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import fly
 
@@ -24,7 +25,7 @@ T = np.arange(0.0, 30.0, 0.01)
 
 @pytest.fixture
 def plan(tmp_path: Path) -> FlightPlan:
-    return FlightPlan.of_options(tmp_path, track="hover", profile="flight", link="memory")
+    return FlightPlan.of(FlightSpec.of("hover", out=tmp_path))
 
 
 def flown(until_s: float = 30.0, **columns: Any) -> FlightSeries:
@@ -95,7 +96,7 @@ def test_one_too_short_to_settle_is_lost_where_it_gets_further_away(
 
 
 def test_one_that_ground_stations_command_does_not_follow_its_track(plan: FlightPlan) -> None:
-    served = replace(plan, ground=GroundAccess(("udpout:127.0.0.1:1",)))
+    served = replace(plan, spec=replace(plan.spec, gcs=("udpout:127.0.0.1:1",)))
     assert lost(served, flown(z=0.0)) is None
 
 

@@ -69,8 +69,8 @@ def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: 
     assert len({case.row for case in cases}) * len({case.group for case in cases}) == len(cases)
     flights = [case.flight for case in cases]
     for flight, plan in zip(flights, plans(flights, tmp_path), strict=True):
-        assert plan.duration_s == flight.get("duration", 100.0)
-        assert plan.track_name == flight["track"]
+        assert plan.spec.duration == flight.get("duration", 100.0)
+        assert plan.spec.track == flight["track"]
 
 
 def case(study: str, row: tuple[str, ...], group: str) -> Settings:
@@ -87,9 +87,9 @@ def test_a_flight_changes_what_it_says_and_nothing_else() -> None:
     start = plan_of(**case("recovery", ("inverted", "φ = 170°"), "LPV-MPC")).start
     assert start == plan_of(track="hover:height=20").start._replace(y=0.0, z=20.0, phi=170.0)
     windy = plan_of(**case("robustness", ("spiral", "wind 5 m/s"), "LPV-MPC"))
-    assert str(windy.weather.wind) == "5.0@270.0"
+    assert str(windy.spec.wind) == "5.0@270.0"
     assert windy.plant_vehicle == windy.vehicle
-    assert {windy.link, plain.link} == {"memory"}
+    assert {windy.spec.link, plain.spec.link} == {"memory"}
 
 
 def test_a_perturbation_is_the_plants_alone() -> None:

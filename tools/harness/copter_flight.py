@@ -32,9 +32,9 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.environment.air import CALM
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import World, starting_world, state_frame
-from colibri.plant.process.options import nudged
+from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
-from colibri.plant.simulation.setting import WorldSetting
+from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.stepping import Steered, Stepped
 from colibri.sitl.vehicle import FORCE
@@ -102,7 +102,7 @@ class CopterFlight(Stepped, Steered):
         )
         self._weather = blowing(wind_enu_m_s)
         self.autopilot = self._copter(values, first)
-        world = WorldSetting(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
+        world = WorldSpec(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
         builder = PlantBuilder(world, vehicle or self._assumed, {feedback: nudged(start)}, origin=origin)
         self.plant = builder.build(feedback, self.autopilot.frame_interval_us)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)

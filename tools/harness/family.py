@@ -5,7 +5,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Array
 from colibri.flights.in_process import Direct, put_together
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 from colibri.plant.physics.start import Start
 
 APART_M = 1e-3
@@ -56,7 +56,7 @@ def starts(start: Start, count: int) -> Iterator[Start]:
 
 def fly_family(track: str, count: int, duration_s: float, **start: float) -> list[Flown]:
     """Fly profile `flight` from each of `count` starts; `start` as in `Start`, in place of the profile's."""
-    plan = FlightPlan.of_options(Path(), track=track, profile="flight", link="direct", start=start)
+    plan = FlightPlan.of(FlightSpec.of(track, link="direct", start=start))
     return [_fly(plan, it, duration_s) for it in starts(plan.start, count)]
 
 

@@ -12,7 +12,7 @@ from colibri.plant.environment.weather import RecordedWind, Weather
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.process.options import PARTS
+from colibri.plant.spec import PARTS
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 OFF = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)

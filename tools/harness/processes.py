@@ -1,6 +1,9 @@
 """Flights for tests: one command line in, report and rows out."""
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +17,6 @@ from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
 from colibri.common.process.lifecycle import nudge_m
 from colibri.common.types import Array
-from colibri.flights.children import Child
 
 REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 GIVE_UP_AFTER_S = 60.0
@@ -70,15 +72,20 @@ def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_
         sleep(0.01)
 
 
-class Process(Child):
-    """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file."""
+class Process:
+    """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file.
+
+    Attributes:
+        process: The process.
+    """
 
     def __init__(self, folder: Path, package: str, *options: str) -> None:
         """Start it; `folder` takes its output."""
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
         self._errors = self._said.with_suffix(".err")
         with self._said.open("wb") as said, self._errors.open("wb") as errors:
-            super().__init__(package, ["--json", *options], stdout=said, stderr=errors)
+            command = [sys.executable, "-P", "-m", f"colibri.{package}", "--json", "--parent", str(os.getpid())]
+            self.process = subprocess.Popen([*command, *options], stdout=said, stderr=errors, process_group=0)
 
     def events(self, name: str) -> list[dict[str, Any]]:
         """Return the events of that name said so far."""
@@ -95,6 +102,11 @@ class Process(Child):
     def errors(self) -> str:
         """Return what it wrote to standard error."""
         return self._errors.read_text(encoding="utf-8")
+
+    def kill(self) -> None:
+        """Kill it, and wait until it is gone."""
+        self.process.kill()
+        self.process.wait()
 
     def wait(self) -> int:
         """Wait for its end; return the exit code."""

@@ -1,7 +1,6 @@
 """Autopilots killed in flight: one mission after another, each with as many kills as it has time for, each judged."""
 
 import random
-from dataclasses import replace
 from pathlib import Path
 from time import sleep
 from typing import NamedTuple
@@ -9,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.common.types import Array
-from colibri.flights.command_lines import options_of, plant_options
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.simulation.setting import WorldSetting
 from colibri.sitl.flight_record import tilt_deg
 from tools.harness.processes import Process, rows
 from tools.kills.between import COMPILES_S, Between, Phase
@@ -21,7 +18,7 @@ _APART_S, _SPREAD_S = 1.8, 1.6
 _JUDGED_S = 2.0
 _SLOW_M_S = 0.3
 _COMPUTES_S = 1.5e-3
-STANDING = WorldSetting(start={"y": 0.0, "z": 0.0, "psi": 90.0, "rotors": 0.0})
+STANDING = "y=0,z=0,psi=90,rotors=0"
 
 
 class Kill(NamedTuple):
@@ -96,14 +93,14 @@ def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int =
 
 def start(folder: Path, url: str, station: Station, feedback: Feedback) -> Process:
     """Start an autopilot that keeps its flight."""
-    options = options_of(plant=url, gcs=[station.url], feedback=feedback, state=folder / "state")
+    options = ("--plant", url, "--gcs", station.url, "--feedback", feedback, "--state", str(folder / "state"))
     return Process(folder, "autopilot", *options)
 
 
 def start_plant(folder: Path, url: str, seed: int, out: Path | None = None) -> Process:
     """Start a plant whose vehicle stands."""
-    world = replace(STANDING, seed=seed)
-    return Process(folder, "plant", *plant_options(world, vehicle="hummingbird", link=url, out=out))
+    kept = () if out is None else ("--out", str(out))
+    return Process(folder, "plant", "--start", STANDING, "--seed", str(seed), "--link", url, *kept)
 
 
 class _Killed(NamedTuple):

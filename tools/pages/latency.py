@@ -15,6 +15,7 @@ from colibri.campaigns.engines.progress import in_order
 from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 
 LAWS = ("whole-lpv-mpc", "lpv-mpc", "geometric-se3")
 ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
@@ -156,17 +157,17 @@ def fly(flight: Flight) -> Merit | None:
     """Fly in simulated time; return how it went."""
     law, case, round_trip_ms, told = flight
     with TemporaryDirectory() as folder:
-        plan = FlightPlan.of_options(
-            Path(folder),
-            track=case.track,
-            profile="flight",
+        spec = FlightSpec.of(
+            case.track,
             controller=law,
             link="direct",
             latency=0.5 * round_trip_ms,
             delay=told,
             start=case.start,
             duration=case.duration_s,
+            out=Path(folder),
         )
+        plan = FlightPlan.of(spec)
         try:
             fly_locally(plan)
             return merit(read_recording(plan), case)

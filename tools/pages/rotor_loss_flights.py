@@ -21,7 +21,7 @@ from colibri.plant.environment.weather import Intensity, Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import state_frame
 from colibri.plant.simulation.plant import Plant, PlantBuilder
-from colibri.plant.simulation.setting import WorldSetting
+from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 
 HEIGHT_M = 10.0
@@ -138,7 +138,7 @@ def fly(case: Case, seed: int) -> Flown:
     profile = load_profile("flight")
     vehicle = load_vehicle(profile.simulation.vehicle)
     wind = Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0)
-    world = WorldSetting(wind=wind, turbulence=case.turbulence, seed=seed)
+    world = WorldSpec(wind=wind, turbulence=case.turbulence, seed=seed)
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
     values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
     autopilot = copter_autopilot(profile, vehicle, settings, lambda: 0.0, values=values)

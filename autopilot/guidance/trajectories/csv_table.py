@@ -66,14 +66,14 @@ class CsvTable:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 
 
-def read_table(path: Path, required: Collection[str], optional: Collection[str]) -> CsvTable:
-    """Read a CSV file of at least two rows whose header has all columns `required`, and any of those `optional`.
+def read_table(path: Path, required: Collection[str], optional: Collection[str], text: str | None = None) -> CsvTable:
+    """Read a CSV file, or its `text`: at least two rows, all columns `required`, and any of those `optional`.
 
     Raises:
         TrackFileError: The file cannot be read, or is not that.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
         raise TrackFileError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:

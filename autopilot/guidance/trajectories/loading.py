@@ -10,7 +10,7 @@ from colibri.autopilot.guidance.trajectories.fitting import dips_of, fit
 from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
 from colibri.autopilot.guidance.trajectories.registry import TrackError, read_options, track
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, SamplesFile, Track, WaypointFile
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, FileOptions, Track
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.plant.vehicle.description import Vehicle
 
@@ -26,7 +26,9 @@ class LoadedTrack(NamedTuple):
     note: str
 
 
-def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None) -> LoadedTrack:
+def load_track(
+    name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None, text: str | None = None
+) -> LoadedTrack:
     """Return the track of that name as `vehicle` will fly it under `profile`.
 
     One through waypoints is held above the floor and slowed down to what the vehicle can fly, or made as fast as that.
@@ -35,11 +37,12 @@ def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | N
     Args:
         name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
         floor_m: Below which no track may lead, m, ENU; None for the ground, if the vehicle has any.
+        text: What was in the track's file; None for what is in it now.
 
     Raises:
         TrackError: There is no such track, its file cannot be flown, or it leads below the floor.
     """
-    found = track(name)
+    found = track(name, text)
     if found.waypoints is not None:
         return track_through(found.waypoints, vehicle, profile, floor_m)
     reach, floor = Reach(vehicle, profile, exact_drag=False), _floor(vehicle, floor_m)
@@ -94,4 +97,4 @@ def with_file(name: str, path: Path) -> str:
 def _file(name: str) -> str | None:
     base, colon, text = name.partition(":")
     options = read_options(base, OPTIONS[base], text) if colon and base in OPTIONS else None
-    return options.file if isinstance(options, WaypointFile | SamplesFile) else None
+    return options.file if isinstance(options, FileOptions) else None

@@ -14,8 +14,15 @@ import numpy as np
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.taylor import in_series
-from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, TrackOptions, YawChoice
-from colibri.common.errors import Error
+from colibri.autopilot.guidance.trajectories.tracks import (
+    OPTIONS,
+    THESIS_TRACKS,
+    FileOptions,
+    Track,
+    TrackOptions,
+    YawChoice,
+)
+from colibri.common.errors import Error, unknown
 
 GROUP = "colibri.tracks"
 
@@ -24,28 +31,29 @@ class TrackError(AutopilotError):
     """There is no such track, or it cannot be flown; one line says what there is."""
 
 
-def track(name: str) -> Track:
-    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`. One through waypoints reads its file.
+def track(name: str, text: str | None = None) -> Track:
+    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`; `text` stands for what its file has now.
 
     Raises:
         TrackError: There is no such track or option, a value is impossible, or its file cannot be flown.
     """
-    base, colon, text = name.partition(":")
+    base, colon, given = name.partition(":")
     if base in THESIS_TRACKS and not colon:
         return THESIS_TRACKS[base]
     if base in THESIS_TRACKS:
         raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
     if base in OPTIONS:
+        options = read_options(base, OPTIONS[base], given if colon else None)
         try:
-            return read_options(base, OPTIONS[base], text if colon else None).track()
+            return options.track_of(text) if isinstance(options, FileOptions) else options.track()
         except TrackFileError as error:
             raise TrackError(str(error)) from error
     kind = _load_installed(base)
     if kind is None:
-        raise TrackError(f"unknown track {base}: choose {', '.join(track_names())}")
+        raise TrackError(unknown("track", base, track_names()))
     if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
         raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
-    return _tried(base, read_options(base, kind, text if colon else None))
+    return _tried(base, read_options(base, kind, given if colon else None))
 
 
 def track_names() -> list[str]:

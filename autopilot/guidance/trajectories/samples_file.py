@@ -32,13 +32,13 @@ class Samples:
     yaw_rad: Array | None
 
 
-def read_samples(path: Path) -> Samples:
+def read_samples(path: Path, text: str | None = None) -> Samples:
     """Read a CSV file with a header of t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and if wanted yaw (degrees).
 
     Raises:
         TrackFileError: The file cannot be read, or its columns contradict each other.
     """
-    table = read_table(path, _REQUIRED, _OPTIONAL)
+    table = read_table(path, _REQUIRED, _OPTIONAL, text)
     times_s = table.times(_MIN_STEP_S)
     motion = np.stack([table.matrix(columns) for columns in (_PLACE, _VELOCITY, _ACCELERATION)], axis=1)
     _check(table, np.diff(times_s)[:, None], motion)

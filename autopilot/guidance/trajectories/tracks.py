@@ -190,30 +190,43 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
         return self.speed / self.radius * t
 
 
-class WaypointFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly through the points of a CSV file with the least snap, or as fast as a vehicle can."""
+class FileOptions(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The options of a track that is read from a file."""
 
     lone: ClassVar[str | None] = "file"
 
     file: str
+
+    def track(self) -> Track:
+        """Return the track of the file."""
+        return self.track_of(None)
+
+    def track_of(self, text: str | None) -> Track:
+        """Return the track of what is in the file; `text` stands for what is in it now.
+
+        Raises:
+            TrackFileError: It cannot be flown.
+        """
+        raise NotImplementedError
+
+
+class WaypointFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fly through the points of a CSV file with the least snap, or as fast as a vehicle can."""
+
     speed: Speed | Literal["max"] | None = None
     margin: Annotated[float, msgspec.Meta(ge=0.0, le=0.4)] | None = None
 
-    def track(self) -> Track:
+    def track_of(self, text: str | None) -> Track:
         """Return the track, before a vehicle is known."""
-        return through(read_waypoints(Path(self.file), self.speed, self.margin))
+        return through(read_waypoints(Path(self.file), self.speed, self.margin, text))
 
 
-class SamplesFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SamplesFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fly what a CSV file has samples of, as it is."""
 
-    lone: ClassVar[str | None] = "file"
-
-    file: str
-
-    def track(self) -> Track:
+    def track_of(self, text: str | None) -> Track:
         """Return the track."""
-        return sampled(read_samples(Path(self.file)))
+        return sampled(read_samples(Path(self.file), text))
 
 
 OPTIONS: dict[str, type[TrackOptions]] = {

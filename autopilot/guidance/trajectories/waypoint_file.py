@@ -57,9 +57,12 @@ class Waypoints:
 
 
 def read_waypoints(
-    path: Path, speed_m_s: float | Literal["max"] | None = None, margin: float | None = None
+    path: Path,
+    speed_m_s: float | Literal["max"] | None = None,
+    margin: float | None = None,
+    text: str | None = None,
 ) -> Waypoints:
-    """Read a CSV file with a header of x, y, z (m, ENU), and if wanted t (s) and yaw (degrees).
+    """Read a CSV file, or its `text`, with a header of x, y, z (m, ENU), and if wanted t (s) and yaw (degrees).
 
     Without `t`, the legs are flown at `speed_m_s` on average, 2 m/s if it is None, or "max" until a vehicle is known;
     the first and the last, which begin and end at rest, at half of it.
@@ -67,7 +70,7 @@ def read_waypoints(
     Raises:
         TrackFileError: The file cannot be read, or not be flown.
     """
-    table = read_table(path, _REQUIRED, _OPTIONAL)
+    table = read_table(path, _REQUIRED, _OPTIONAL, text)
     points, timed = table.matrix(_REQUIRED), "t" in table.values
     for option, value in (("speed", speed_m_s), ("margin", margin)):
         if timed and value is not None:

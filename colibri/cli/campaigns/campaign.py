@@ -1,30 +1,13 @@
 """`colibri campaign`: its options, and its call."""
 
-from argparse import SUPPRESS, Action, Namespace
+from argparse import SUPPRESS, Namespace
 from pathlib import Path
-from typing import Any
 
 from colibri.cli.shared.options import add_engine, add_out
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import loading
-from colibri.experiments.options import add_plan_options
-
-
-class _GivenOnly(ArgumentParser):
-    """Adds options to another parser that leave nothing where they are not given: a file may have them."""
-
-    def __init__(self, parser: ArgumentParser) -> None:
-        """Add to `parser`."""
-        super().__init__(add_help=False)
-        self._parser = parser
-
-    def add_argument(self, *names: Any, **options: Any) -> Action:
-        """Add an option, unless it is of a single flight alone."""
-        if names[0] in ("track", "--seed", "--speed"):
-            return super().add_argument(*names, **options)
-        said = str(options.pop("default", ""))
-        words = options.get("help", "").replace("%(default)s", said)
-        return self._parser.add_argument(*names, default=SUPPRESS, **(options | {"help": words}))
+from colibri.common.spec import add_options as add_spec
+from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -59,7 +42,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--resume", action="store_true", help="go on with what --out has of this campaign")
     add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")
-    add_plan_options(_GivenOnly(parser), link="memory")
+    add_spec(parser, FlightSpec, leave_out=("track", "seed", "speed"), given_only=True, keywords_only=True)
     add_out(add, "out/campaign", "table, summary, figure, and what it takes to go on")
 
 

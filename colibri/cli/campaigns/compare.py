@@ -4,7 +4,8 @@ from argparse import Namespace
 
 from colibri.cli.shared.options import add_out
 from colibri.common.process.arguments import ArgumentParser, seeds
-from colibri.experiments.options import add_flight_options
+from colibri.common.spec import add_options as add_spec
+from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -19,12 +20,6 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add("--track", action="append", metavar="TRACK", help="a track; may be repeated (default: the thesis's five)")
     add(
-        "--link",
-        default="memory",
-        choices=("memory", "direct", "udp"),
-        help="one process, with or without the codec; or two (default %(default)s)",
-    )
-    add(
         "--controller",
         action="append",
         metavar="NAME",
@@ -37,7 +32,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="fly each by all of these in place of --seed, and show how errors spread",
     )
     add("--resume", action="store_true", help="do not fly again what --out has already by the same contents")
-    add_flight_options(parser)
+    add_spec(parser, FlightSpec, leave_out=("track", "profile", "controller", "speed"), keywords_only=True)
     add_out(add, "out/compare", "the tables")
 
 

@@ -13,7 +13,8 @@ from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.campaigns.values import CampaignError, first_twice
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, fail
-from colibri.experiments.options import option_names
+from colibri.common.spec import keywords_of
+from colibri.flights.spec import FlightSpec
 
 _SHOWN = 5
 _TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
@@ -34,7 +35,7 @@ def fly(args: Namespace) -> int:
     try:
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}
-        options = {name: said[name] for name in (*OF_ALL, *option_names()) if name in said}
+        options = {name: said[name] for name in (*OF_ALL, *keywords_of(FlightSpec)) if name in said}
         given = tables | {"fly": options, "grid": _grid(args), "draw": _once(_draw, args.draws)}
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
         engine = engine_of(args.workers, args.dask)

@@ -64,7 +64,7 @@ def _complete(action: Action, command: str, names: dict[str, Callable[[], Sequen
         return
     if metavar in ("NAME", "TRACK", "PROFILE") and named in names:
         action.choices = names[named]()
-    elif re.fullmatch(r"[a-z]+(\|[a-z]+)+", metavar):
+    elif re.fullmatch(r"[a-z0-9-]+(\|[a-z0-9-]+)+", metavar):
         action.choices = metavar.split("|")
     elif metavar in ("DIR", "FOLDER"):
         action.complete = DIRECTORY  # type: ignore[attr-defined]

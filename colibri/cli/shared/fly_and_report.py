@@ -3,17 +3,18 @@
 import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from colibri.analysis.limits import exceeded
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.spec import from_namespace
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import occupied, prepare
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
+from colibri.flights.spec import FlightSpec
 from colibri.mavlink.links.startup import COMPILING
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _UPDATES = 500
 def fly(args: argparse.Namespace) -> int:
     """Fly as the command line says; return the exit code."""
     try:
-        plan = replace(FlightPlan.from_arguments(args), ulog=not args.no_ulog)
+        plan = FlightPlan.of(from_namespace(FlightSpec, args))
     except Error as error:
         fail(str(error))
     with occupied(plan.out):
@@ -111,7 +112,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
     )
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
-    task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
+    task = bar.add_task(escape(plan.spec.track), total=plan.spec.duration, speed="", start=False)
     counted = (TextColumn("{task.completed} functions"), BarColumn(), TimeElapsedColumn())
     compiler = Progress(*counted, console=console, disable=not console.is_terminal, transient=True)
     compilation = compiler.add_task("", total=None)
@@ -122,7 +123,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
         nonlocal due_s
         if sim_time_s < due_s:
             return
-        due_s = sim_time_s + plan.duration_s / _UPDATES
+        due_s = sim_time_s + plan.spec.duration / _UPDATES
         if not first_s:
             compiler.stop()
             bar.start()  # not before something flies: an error of the start stands alone
@@ -143,7 +144,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
 
     try:
         yield Shown(show, say, compiling)
-        bar.update(task, completed=plan.duration_s)
+        bar.update(task, completed=plan.spec.duration)
     finally:
         compiler.stop()
         bar.stop()

@@ -6,7 +6,7 @@ from math import inf
 from colibri.cli.shared.options import add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.common.process.lifecycle import loading
-from colibri.experiments.options import TRACK_HELP
+from colibri.flights.spec import TRACK_HELP
 
 
 def add_options(parser: ArgumentParser) -> None:

@@ -1,19 +1,20 @@
 """A program of its own: loads what plant and autopilot need, then forks one or the other on request.
 
-A request is a line on standard input, a JSON list: "start", the package, a file for its output, and its options;
-"code" or "kill" and a process. The answer is a line on standard output: the process, or its exit code, or null.
+A request is a line on standard input, a JSON list: "start", the package, a file for its output, and its specification
+as JSON; "code" or "kill" and a process. The answer is a line on standard output: the process, its exit code, or null.
 """
 
 import gc
 import json
-import os
-import signal
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import use_one_thread
-from colibri.flights.forked import fork
+from colibri.common.spec import from_json
+from colibri.flights.launcher import Child
+from colibri.plant.spec import PlantSpec
 
 _FLIGHTS = ({"feedback": "state"}, {"feedback": "sensors", "turbulence": "light"})
 
@@ -24,22 +25,22 @@ def main() -> None:
     _load()
     gc.collect()
     gc.freeze()
-    living: set[int] = set()
+    children: dict[int, Child] = {}
     for line in sys.stdin:
         what, first, *rest = json.loads(line)
         if what == "start":
-            pid = _fork(first, *rest)
-            living.add(pid)
-            answer: int | None = pid
+            child = _fork(first, *rest)
+            children[child.number] = child
+            answer: int | None = child.number
         else:
-            pid = int(first)
-            answer = _end(pid) if what == "kill" else _code(pid, os.WNOHANG)
-            if answer is not None:
-                living.discard(pid)
+            child = children[int(first)]
+            if what == "kill":
+                child.kill()
+            answer = child.code()
         sys.stdout.write(json.dumps(answer) + "\n")
         sys.stdout.flush()
-    for pid in living:
-        _end(pid)
+    for child in children.values():
+        child.kill()
 
 
 def _load() -> None:
@@ -51,28 +52,15 @@ def _load() -> None:
     with TemporaryDirectory(prefix="sitl-") as folder:
         for flight in _FLIGHTS:
             setting = setting_of([flight])
-            autopilot = MemoryAutopilot(setting.autopilot_options(Path(folder)))
-            lockstep = LockstepSession(MemoryPlant(setting.plant_options(0.0)), autopilot, setting.system)
+            autopilot = MemoryAutopilot(setting.autopilot_spec(Path(folder)))
+            lockstep = LockstepSession(MemoryPlant(setting.plant_spec()), autopilot, setting.system)
             lockstep.advance(())
             autopilot.close()
 
 
-def _fork(package: str, log: str, *options: str) -> int:
-    out = os.open(log, os.O_WRONLY | os.O_APPEND)
-    try:
-        return fork(package, options, out, out)
-    finally:
-        os.close(out)
-
-
-def _code(pid: int, options: int) -> int | None:
-    ended, status = os.waitpid(pid, options)
-    return os.waitstatus_to_exitcode(status) if ended else None
-
-
-def _end(pid: int) -> int | None:
-    os.kill(pid, signal.SIGKILL)
-    return _code(pid, 0)
+def _fork(package: str, log: str, text: str) -> Child:
+    kind: type[PlantSpec | AutopilotSpec] = PlantSpec if package == "plant" else AutopilotSpec
+    return Child(from_json(kind, text.encode()), fork=True, log=Path(log))
 
 
 if __name__ == "__main__":

@@ -4,31 +4,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
-from colibri.flights.children import Child, how_it_ended
+from colibri.common.spec import to_json
+from colibri.flights.launcher import Child, ProcessSpec, Running, how_it_ended, name_of
 from colibri.sitl.backends.lockstep import SessionError
 
 _LAST_WORDS_BYTES = 2000
-
-
-class Running(Protocol):
-    """A process that was started.
-
-    Attributes:
-        number: Of the process.
-    """
-
-    number: int
-
-    def code(self) -> int | None:
-        """Return its exit code, negative for a signal; None while it runs."""
-
-    def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
 
 
 class Launcher(Protocol):
@@ -40,8 +25,8 @@ class Launcher(Protocol):
 
     starts_plants: bool
 
-    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
-        """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
+    def start(self, spec: ProcessSpec, log: Path) -> Running:
+        """Start what `spec` describes; its output goes into file `log`."""
 
     def close(self) -> None:
         """End what is left."""
@@ -56,11 +41,11 @@ class LoggedChild:
         log: The file of its output.
     """
 
-    def __init__(self, launcher: Launcher, package: str, options: Sequence[str], log: Path) -> None:
+    def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
         """Start it."""
-        self.name = package
+        self.name = name_of(spec)
         self.log = log
-        self._running = launcher.start(package, options, log)
+        self._running = launcher.start(spec, log)
         self.number = self._running.number
 
     def check(self) -> None:
@@ -91,10 +76,9 @@ class FromScratch:
 
     starts_plants = True
 
-    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
-        """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
-        with log.open("wb") as out:
-            return Child(package, options, stdout=out, stderr=out)
+    def start(self, spec: ProcessSpec, log: Path) -> Running:
+        """Start what `spec` describes; its output goes into file `log`."""
+        return Child(spec, log=log)
 
     def close(self) -> None:
         """Leave nothing: each flight ends its own."""
@@ -114,10 +98,10 @@ class Forked:
         command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
         self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
-    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
-        """Start what `python -m colibri.PACKAGE` with `options` is; its output goes into file `log`."""
+    def start(self, spec: ProcessSpec, log: Path) -> Running:
+        """Start what `spec` describes; its output goes into file `log`."""
         log.touch()
-        pid = self._request("start", package, str(log), *options)
+        pid = self._request("start", name_of(spec), str(log), to_json(spec).decode())
         assert pid is not None, "whatever is forked has a number"
         return _ForkedChild(pid, self._request)
 

@@ -1,29 +1,23 @@
 """Plant and autopilot in this process: what their processes do, without sockets and without a clock."""
 
-import io
-from argparse import Namespace
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr
 from time import perf_counter
 from typing import Any
 
-from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.step import answer
 from colibri.autopilot.process.ground import Ground
-from colibri.autopilot.process.run import loaded
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.errors import Error
-from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.status import Status
 from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.plant.__main__ import command_line as plant_command_line
 from colibri.plant.physics.start import IntegrationError
 from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
+from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.link_clocks import LinkClock, StoppedClock
 from colibri.sitl.backends.lockstep import SessionError
@@ -38,20 +32,19 @@ class MemoryPlant:
 
     process = None
 
-    def __init__(self, options: Sequence[str], clock: LinkClock | None = None) -> None:
-        """Begin with the options of a command line; without a `clock` the autopilot is in this process, too.
+    def __init__(self, spec: PlantSpec, clock: LinkClock | None = None) -> None:
+        """Begin as `spec` says; without a `clock` the autopilot is in this process, too.
 
         Raises:
             SettingError: It cannot begin so.
         """
-        args = parsed(plant_command_line, options)
         try:
-            self._builder = builder_of(args)
+            self._builder = builder_of(spec)
         except VehicleError as error:
             raise SettingError(str(error)) from error
         serves = tuple(self._builder.starts)
         self._answered = False
-        self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
+        self._end = PlantEnd(system_id=spec.system_id, frame_interval_us=round(1e3 / spec.rate) * 1000, serves=serves)
         self._plant: Plant | None = None
         self._clock = clock or StoppedClock()
 
@@ -115,13 +108,13 @@ class MemoryAutopilot:
 
     process = None
 
-    def __init__(self, options: Sequence[str]) -> None:
-        """Begin with the options of a command line.
+    def __init__(self, spec: AutopilotSpec) -> None:
+        """Begin as `spec` says.
 
         Raises:
             SettingError: It cannot begin so.
         """
-        self._args = parsed(autopilot_command_line, options)
+        self._spec = spec
         self.start()
 
     def start(self) -> None:
@@ -130,18 +123,18 @@ class MemoryAutopilot:
         Raises:
             SettingError: It cannot start.
         """
-        args = self._args
+        spec = self._spec
         try:
             self._conductor = _MemoryConductor()
-            self._ground = Ground(args, *loaded(args), _Silence(), self._conductor)
+            self._ground = Ground(spec, *spec.load(), _Silence(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
         self._autopilot = self._ground.autopilot
         self._end = AutopilotEnd(
-            system_id=args.system_id,
+            system_id=spec.system_id,
             frame_interval_us=self._autopilot.frame_interval_us,
             now_s=NEVER_LATE_S,
-            feedback=args.feedback,
+            feedback=spec.feedback,
         )
 
     def call(self) -> bytes:
@@ -223,17 +216,3 @@ class _Silence(Status):
 
     def say(self, event: str, text: str, **facts: Any) -> None:
         """Say nothing."""
-
-
-def parsed(command_line: Callable[[], ArgumentParser], options: Sequence[str]) -> Namespace:
-    """Read a command line.
-
-    Raises:
-        SettingError: It cannot be read.
-    """
-    errors = io.StringIO()
-    try:
-        with redirect_stderr(errors):
-            return command_line().parse_args(options)
-    except SystemExit as error:
-        raise SettingError(errors.getvalue().strip().removeprefix("colibri: error: ")) from error

@@ -1,21 +1,25 @@
-"""The setting of a flight, and the command lines of its two processes.
+"""The setting of a flight, and the specifications of its two processes."""
 
-Nothing here loads plant or autopilot: pytest imports it in every run.
-"""
-
+from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path, PurePath
-from typing import Any
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-import msgspec
-
-from colibri.flights.command_lines import options_of, plant_options
-from colibri.plant.simulation.setting import WorldSetting
+from colibri.autopilot.spec import AutopilotSpec, LawSpec
+from colibri.common.earth.home import DEFAULT_HOME, HomePlace
+from colibri.common.earth.home import home as read_home
+from colibri.common.errors import unknown
+from colibri.common.spec import Option, part_of, read_values
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.physics.start import Start
+from colibri.plant.spec import PlantSpec, WorldSpec
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.errors import SitlError
 
-_STANDING = {"x": 0.0, "y": 0.0, "z": 0.0, "psi": 90.0, "rotors": 0.0}
+_STANDING = Start(psi=90.0)
 """On its feet at the origin, its nose to the north."""
 
 
@@ -23,130 +27,96 @@ class SettingError(SitlError):
     """A flight that cannot begin so; the message is the one line that a user needs."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Setting(WorldSetting):
-    """The setting of a flight; each field is the option of the same name of `colibri plant` or `autopilot`.
+def _numbers(text: str) -> dict[str, int | float]:
+    """Read KEY=VALUE,... in numbers; whole ones stay whole."""
+    try:
+        return {key: _number(value) for key, _, value in (pair.partition("=") for pair in text.split(","))}
+    except ValueError:
+        raise ArgumentTypeError(f"must be KEY=VALUE,... in numbers, not {text}") from None
 
-    Beside what a `WorldSetting` has, whose seed is that of the links' faults, too. What is left out of `start` is that
-    of a vehicle that stands, nose to the north; x, y, z count from there.
 
-    Attributes:
-        vehicle: That the plant flies, name or .toml.
-        believed: That the autopilot controls; None for the same.
-        profile: Control profile, name or .toml.
-        controller: Control law; None for the profile's.
-        feedback: What the plant sends to the autopilot: "state" or "sensors".
-        airborne: Picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed.
-            With feedback "state" only: an estimator begins at rest.
-        params: Parameters that were changed before.
-        track: Flown from time 0 on; the vehicle must be in the air.
-        home: "LAT,LON,ALT,YAW": the origin of the ENU frame.
-        ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
-        identity: Towards ground stations: "px4" or "generic".
-        system: MAVLink system id.
-        strict: Whether what a part of the autopilot raises in flight fails the test, rather than being replaced.
-        ready: Whether the flight is handed over only after the first HEARTBEAT.
+def _number(text: str) -> int | float:
+    return int(text) if text.strip().lstrip("+-").isdigit() else float(text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting(WorldSpec, LawSpec):
+    """The setting of a flight; most fields are options of `colibri plant` and `autopilot`.
+
+    The seed is that of the links' faults, too. What is left out of `start` is that of a vehicle that stands, nose to
+    the north; x, y, z count from there.
     """
 
-    vehicle: str = "hummingbird"
-    believed: str | None = None
-    profile: str = "flight"
-    controller: str | None = None
-    feedback: str = "state"
-    airborne: float | None = None
-    params: Mapping[str, int | float] = field(default_factory=dict)
-    track: str | None = None
-    home: str | None = None
-    ground: Mapping[str, float] = field(default_factory=dict)
-    identity: str = "px4"
-    system: int = 1
-    strict: bool = True
-    ready: bool = True
+    vehicle: Annotated[str | Vehicle, Option("vehicle that the plant flies, name or .toml")] = "hummingbird"
+    believed: Annotated[str | Vehicle | None, Option("vehicle that the autopilot controls (default: the same)")] = None
+    airborne: Annotated[
+        float | None,
+        Option(
+            "picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed; with "
+            'feedback "state" only',
+            unit="m",
+        ),
+    ] = None
+    params: Annotated[Mapping[str, int | float], Option("parameters that were changed before", read=_numbers)] = field(
+        default_factory=dict
+    )
+    track: Annotated[str | None, Option("flown from time 0 on; the vehicle must be in the air (default: none)")] = None
+    home: Annotated[HomePlace, Option("LAT,LON,ALT,YAW: the origin of the ENU frame", read=read_home)] = DEFAULT_HOME
+    ground: Annotated[
+        Mapping[str, float],
+        Option(
+            "links to ground stations: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`",
+            read=_numbers,
+        ),
+    ] = field(default_factory=dict)
+    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    system: Annotated[int, Option("MAVLink system id", least=1, most=255)] = 1
+    strict: Annotated[
+        bool, Option("what a part of the autopilot raises in flight fails the test, rather than being replaced")
+    ] = True
+    ready: Annotated[bool, Option("the flight is handed over only after the first HEARTBEAT")] = True
 
-    def plant_options(self, hover_rpm: float) -> list[str]:
-        """Return the command line of the plant, whose rotors hover at `hover_rpm`."""
-        start = dict(_STANDING)
+    def plant_spec(self) -> PlantSpec:
+        """Return the plant.
+
+        Raises:
+            VehicleError: There is no such vehicle.
+        """
+        start = _STANDING
         if self.airborne is not None:
-            start |= {"z": self.airborne, "rotors": hover_rpm}
-        world = replace(self, start=start | dict(self.start))
-        return plant_options(world, vehicle=self.vehicle, system_id=self.system, home=self.home, truth=True)
+            vehicle = load_vehicle(self.vehicle)
+            hover_rpm = vehicle.hover_speed / vehicle.speed_from_rpm(1.0)
+            start = start._replace(z=self.airborne, rotors=hover_rpm)
+        begins = self.started(start)._asdict()
+        return part_of(self, PlantSpec, system_id=self.system, start=begins, truth=True, speed=inf)
 
-    def autopilot_options(self, state: Path) -> list[str]:
-        """Return the command line of an autopilot that keeps its files in folder `state`."""
-        return options_of(
-            vehicle=self.believed or self.vehicle,
-            profile=self.profile,
-            controller=self.controller,
-            feedback=self.feedback,
-            track=self.track,
-            home=self.home,
-            identity=self.identity,
-            system_id=self.system,
-            state=state,
-            strict=self.strict,
-        )
+    def autopilot_spec(self, state: Path) -> AutopilotSpec:
+        """Return an autopilot that keeps its files in folder `state`."""
+        vehicle = self.believed or self.vehicle
+        return part_of(self, AutopilotSpec, vehicle=vehicle, system_id=self.system, state=state)
 
 
-KEYS = frozenset(each.name for each in fields(Setting))
-DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
-_NUMBERS = ("start", "ground")
-"""What is read from KEY=VALUE,... where it is text."""
+DOES = frozenset(Trouble.__slots__) - {"down"}
 
 
 def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
     """Return the setting that several marks describe together, where a later one overrides; params add up.
 
     Raises:
-        SettingError: One has a key that no setting has, or a wrong value.
+        SettingError: An option is unknown, or cannot have its value.
     """
-    values: dict[str, Any] = {"params": {}}
+    values: dict[str, Any] = {}
     for mark in marks:
-        unknown = sorted(set(mark) - KEYS)
-        if unknown:
-            raise SettingError(f"a flight has no {unknown[0]}: choose {', '.join(sorted(KEYS))}")
-        params = _numbers("params", mark.get("params", {}))
-        values |= {**mark, "params": values["params"] | params}
-    for name in ("gusts", "without"):
-        if isinstance(values.get(name), str):
-            values[name] = (values[name],)
-    values |= {name: _numbers(name, values[name]) for name in _NUMBERS if name in values}
-    unknown = sorted(set(values.get("ground", ())) - DOES)
-    if unknown:
-        raise SettingError(f"a link has no {unknown[0]} to begin with: choose {', '.join(sorted(DOES))}")
+        read = read_values(Setting, mark, SettingError)
+        values |= read | {"params": {**values.get("params", {}), **read.get("params", {})}}
+    setting = Setting(**values)
+    unknown_faults = sorted(set(setting.ground) - DOES)
+    if unknown_faults:
+        raise SettingError(f"ground: {unknown('fault', unknown_faults[0], sorted(DOES))}")
     try:
-        Trouble(**values.get("ground", {}))
-        setting = msgspec.convert({name: _plain(value) for name, value in values.items()}, Setting)
-    except msgspec.ValidationError as error:
-        wrong, _, where = str(error).partition(" - at `$.")
-        raise SettingError(f"{where.rstrip('`')}: {wrong.replace('`', '').replace('null', 'None')}") from None
+        Trouble(**dict[str, Any](setting.ground))
     except ValueError as error:
         raise SettingError(str(error)) from None
-    if setting.airborne is not None and setting.feedback == "sensors":
-        raise SettingError('airborne is for feedback "state": an estimator begins at rest, so stand, and take off')
+    if setting.airborne is not None and setting.feedback is Feedback.SENSORS:
+        raise SettingError('airborne requires feedback="state": the estimator must start at rest')
     return setting
-
-
-def _numbers(name: str, given: object) -> Mapping[str, int | float]:
-    """Return numbers by name, given so or as KEY=VALUE,...; whole ones stay whole.
-
-    Raises:
-        SettingError: They are not.
-    """
-    try:
-        pairs = [pair.split("=", 1) for pair in given.split(",")] if isinstance(given, str) else given
-        return {str(key): _number(value) for key, value in dict(pairs).items()}  # type: ignore[call-overload]
-    except (ValueError, TypeError):
-        raise SettingError(f"{name} is KEY=VALUE,... in numbers, not {given!r}") from None
-
-
-def _number(value: Any) -> int | float:
-    if isinstance(value, str) and value.strip().lstrip("+-").isdigit():
-        return int(value)
-    return value if isinstance(value, int) else float(value)
-
-
-def _plain(value: Any) -> Any:
-    """Return a path as text, and a number of numpy's as Python's."""
-    if isinstance(value, PurePath):
-        return str(value)
-    return value.item() if hasattr(value, "item") else value

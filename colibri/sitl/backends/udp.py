@@ -2,13 +2,16 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, sleep
 
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import Gathering, StepMessage, packets
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
+from colibri.plant.spec import PlantSpec
 from colibri.sitl.backends.launcher import Launcher, LoggedChild
 from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import SessionError, answers, parted
@@ -22,9 +25,9 @@ _HERE = "udpin:127.0.0.1:0"
 class UdpPlant:
     """A plant in another process."""
 
-    def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
+    def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         """Start it; `folder` takes its output."""
-        self._child = LoggedChild(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
+        self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
         self._link: UdpLink | None = None
         self._clock = QuickClock()
         self._last = self._answer = b""
@@ -97,11 +100,11 @@ class UdpPlant:
 class UdpAutopilot:
     """An autopilot in another process."""
 
-    def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
+    def __init__(self, launcher: Launcher, spec: AutopilotSpec, folder: Path) -> None:
         """Start it; `folder` takes its output."""
         self._launcher = launcher
         self._folder = folder
-        self._options = options
+        self._spec = spec
         self._starts = 0
         self.start()
 
@@ -116,8 +119,7 @@ class UdpAutopilot:
         self._link, self._stations = opened(_HERE), opened(_HERE)
         plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
         log = self._folder / f"autopilot-{self._starts}.said"
-        options = ["--plant", plant, "--stepped", stations, *self._options]
-        self._child = LoggedChild(self._launcher, "autopilot", options, log)
+        self._child = LoggedChild(self._launcher, replace(self._spec, plant=plant, stepped=stations), log)
         self._gathering = Gathering()
         self._time_us = 0
 

@@ -115,7 +115,7 @@ class RecordedFlight:
             wind_enu_m_s=_vector(_between(times_s, self._truth.columns("wind_east", "wind_north", "wind_up"), at_s)),
             estimate_enu_m=estimate,
             sigma_m=sigma,
-            mode=f"track {self.plan.track_name}, {self.plan.profile.controller}",
+            mode=f"track {self.plan.spec.track}, {self.plan.profile.controller}",
             armed=True,
             battery=_battery(float(_between(times_s, self._truth.columns("voltage_v"), at_s)[0])),
             texts=self._said(at_s),

@@ -23,7 +23,7 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
         Error: The flight cannot be replayed, or its control law does not plan ahead.
     """
     plan = plan_of(folder)
-    loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.law)
+    loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
     forecaster = _forecaster(plan, loop)
     decisions = 0
     for answer in answers_of(folder / TLOG):

@@ -12,8 +12,10 @@ from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.error_log import FILE, ErrorLog
 from colibri.autopilot.process.ground import Ground
 from colibri.autopilot.process.run import run
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop
 from colibri.common.process.status import Status
+from colibri.common.spec import from_namespace
 from colibri.mavlink.links.open import open_link
 
 
@@ -61,7 +63,9 @@ def test_the_process_ends_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         ground.serve(0.0)
 
     monkeypatch.setattr(Client, "fly", fly)
-    args = command_line().parse_args(["--gcs", "udpin:127.0.0.1:0", "--state", str(tmp_path)])
+    spec = from_namespace(
+        AutopilotSpec, command_line().parse_args(["--gcs", "udpin:127.0.0.1:0", "--state", str(tmp_path)])
+    )
     link = open_link("udpout:127.0.0.1:9")
-    assert run(args, link, Status("autopilot", as_json=False), Stop()) == EXIT_FAILED
+    assert run(spec, link, Status("autopilot", as_json=False), Stop()) == EXIT_FAILED
     assert b"ValueError: no" in (tmp_path / FILE).read_bytes()

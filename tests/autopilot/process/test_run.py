@@ -8,8 +8,10 @@ import pytest
 
 from colibri.autopilot.__main__ import command_line
 from colibri.autopilot.process.run import run
+from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
+from colibri.common.spec import from_namespace
 from colibri.mavlink.links.open import open_link
 
 Prepare = Callable[[Path], str]
@@ -41,10 +43,10 @@ def taken() -> Iterator[str]:
 def start(*options: str) -> int:
     """Start the process as the command line says, and end it before its first frame; return the exit code."""
     plant = "udpout:127.0.0.1:9"
-    args = command_line().parse_args(["--plant", plant, *options])
+    spec = from_namespace(AutopilotSpec, command_line().parse_args(["--plant", plant, *options]))
     link = open_link(plant)
     try:
-        return run(args, link, Status("autopilot", as_json=False), AtOnce())
+        return run(spec, link, Status("autopilot", as_json=False), AtOnce())
     finally:
         link.close()
 
@@ -152,10 +154,10 @@ def test_a_remote_link_needs_a_key_or_an_explicit_option(tmp_path: Path, allows:
         (("--identity", "ardupilot"), "argument --identity: invalid choice: 'ardupilot'"),
         (("--system-id", "0"), "argument --system-id: must be from 1 to 255, not 0"),
         (("--system-id", "256"), "argument --system-id: must be from 1 to 255, not 256"),
-        (("--profile", "fast"), "unknown profile fast: choose flight"),
-        (("--vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
+        (("--profile", "fast"), 'unknown profile "fast" (choose flight'),
+        (("--vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
         (("--controller", "pid"), "unknown controller pid: installed are"),
-        (("--track", "loop"), "unknown track loop: choose spiral"),
+        (("--track", "loop"), 'unknown track "loop" (choose spiral'),
         (("--solver", "simplex"), "unknown solver simplex: installed are"),
     ],
 )

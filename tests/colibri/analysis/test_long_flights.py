@@ -20,7 +20,7 @@ from colibri.analysis.series.figure_series import FigureSeries
 from colibri.analysis.series.flight_series import read_flight
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan, Summary
-from colibri.mavlink.hil.feedback import Feedback
+from colibri.flights.spec import FlightSpec
 
 ONE_ROW, SOME_ROWS, ALL_ROWS = 50, 10_000, 1 << 30
 SUMMARY = Summary(1.0, 1, 0)
@@ -31,9 +31,7 @@ MAX_BYTES_A_SAMPLE = 100
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> FlightPlan:
     out = tmp_path_factory.mktemp("flown")
-    plan = FlightPlan.of_options(
-        out, track="lemniscate", profile="path", link="memory", feedback=Feedback.SENSORS, duration=5.0
-    )
+    plan = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", feedback="sensors", duration=5.0, out=out))
     fly_locally(plan)
     return plan
 
@@ -160,18 +158,17 @@ def test_figures_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.M
 
 def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
     """Return the plan of a flight that repeats another again and again, its logs written in `out`."""
-    longer = FlightPlan.of_options(
-        out, track="lemniscate", profile="path", link="memory", duration=rounds * plan.duration_s
-    )
+    lasts_s = plan.spec.duration
+    longer = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", duration=rounds * lasts_s, out=out))
     out.mkdir()
     for name in ("plant.csv", "autopilot.csv"):
         header, *lines = (plan.out / name).read_text(encoding="utf-8").splitlines()
         rows = [(float(time), rest) for time, _, rest in (line.partition(",") for line in lines)]
         with (out / name).open("w", encoding="utf-8") as log:
             print(header, file=log)
-            for began_s in np.arange(rounds) * plan.duration_s:
+            for began_s in np.arange(rounds) * lasts_s:
                 for time_s, rest in rows:
-                    if time_s < plan.duration_s:  # the last is the first of the next
+                    if time_s < lasts_s:  # the last is the first of the next
                         print(f"{round(began_s + time_s, 6)},{rest}", file=log)
     return longer
 

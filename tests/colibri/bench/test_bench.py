@@ -2,7 +2,6 @@
 
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench import commands, run, sensing, serving, simulators, speed, stages
-from colibri.bench.variants import plan_of, toml_lines, with_blocks, with_intervals
+from colibri.bench.variants import plan_of, with_blocks, with_intervals
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -156,11 +155,6 @@ def test_a_profile_written_is_the_profile_read(tmp_path: Path) -> None:
     read = plan_of(profile, tmp_path, 1.0, "memory").profile
     assert (read.name, read.file) == ("profile", str(tmp_path / "profile.toml"))
     assert msgspec.structs.replace(read, name=profile.name, file=profile.file) == profile
-
-
-def test_toml_leaves_out_what_is_not_given() -> None:
-    table = {"a": 1, "b": None, "c": {"d": [1.5, 1e-8], "e": {"f": 'g "h"'}}}
-    assert tomllib.loads("\n".join(toml_lines(table))) == {"a": 1, "c": {"d": [1.5, 1e-8], "e": {"f": 'g "h"'}}}
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:

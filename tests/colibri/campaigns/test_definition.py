@@ -116,14 +116,14 @@ def test_what_is_no_seed_is_refused(given: Any) -> None:
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ({"grid": {"trck": ["hover"]}}, "unknown factor trck: did you mean track?"),
-        ({"grid": {"track": ["hover"], "colour": [1]}}, "unknown factor colour: choose controller, delay,"),
+        ({"grid": {"trck": ["hover"]}}, 'unknown factor "trck" (did you mean "track"?)'),
+        ({"grid": {"track": ["hover"], "colour": [1]}}, 'unknown factor "colour" (choose controller, delay,'),
         ({"grid": {"track": ["hover"], "seed": [1]}}, "seed is no factor: say which by seeds"),
         ({"grid": {"track": ["hover"], "link": ["udp"]}}, "link is no factor"),
         ({"fly": {"speed": 1.0}}, "speed is no factor"),
         ({"grid": {}}, "no track: say which is flown"),
         ({"fly": {"track": "hover"}}, "track is said twice: keep it in one of fly, grid and draw"),
-        ({"metrics": ["rmse"]}, "unknown metric rmse: did you mean rmse_m? choose rmse_after_20s_m,"),
+        ({"metrics": ["rmse"]}, 'unknown metric "rmse" (did you mean "rmse_m"?)'),
         ({"metrics": []}, "metrics: name at least one: rmse_after_20s_m,"),
         ({"metrics": ["rmse_m", "rmse_m"]}, "rmse_m: the table would have two columns of that name: choose another"),
         ({"metrics": {"seed": len}}, "seed: the table would have two columns"),

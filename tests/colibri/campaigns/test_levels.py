@@ -72,7 +72,7 @@ def test_a_campaign_is_another_one_if_a_level_is() -> None:
 def test_every_level_is_tried_before_anything_flies(level: str) -> None:
     levels: dict[str, dict[str, Any]] = {name: {} for name in ("one", "two", "three")}
     campaign = planned(grid={"track": ["hover"], "plant": levels | {level: {"plant-vehicle.body.mas_kg": 1.0}}})
-    with pytest.raises(Error, match="did you mean mass_kg"):
+    with pytest.raises(Error, match='did you mean "mass_kg"'):
         check(campaign.samples(), common_of(campaign))
 
 

@@ -28,14 +28,14 @@ def plain(text: str) -> Callable[[Path], str]:
 
 
 BAD_INPUT = {
-    "track": ((plain("loop"),), "unknown track loop: choose spiral, expanding-spiral, line, wave"),
+    "track": ((plain("loop"),), 'unknown track "loop" (choose spiral, expanding-spiral, line, wave'),
     "track option": ((plain("circle:speed=fast"),), "track circle: speed=fast: Expected `float`, got `str`"),
     "waypoints": ((plain("waypoints:nowhere.csv"),), "nowhere.csv: No such file or directory"),
     "profile": (
         (plain("spiral"), plain("--profile"), plain("fast")),
-        "unknown profile fast: choose flight, path, se3, ",
+        'unknown profile "fast" (choose flight, path, se3, ',
     ),
-    "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
+    "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), 'unknown vehicle "dragonfly" (choose'),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
     "feedback": (
@@ -135,7 +135,7 @@ BAD_INPUT = {
     "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
     "start key": (
         (plain("spiral"), plain("--start"), plain("z=1,roll=3")),
-        "argument --start: unknown key roll: choose x, y, z, phi, theta, psi, vx, vy, vz, p, q, r, rotors",
+        'argument --start: unknown key "roll" (choose x, y, z, phi, theta, psi, vx, vy, vz, p, q, r, rotors',
     ),
     "start value": (
         (plain("spiral"), plain("--start"), plain("z=high")),

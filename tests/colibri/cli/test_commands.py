@@ -176,7 +176,7 @@ def test_a_vehicle_is_written_as_parameters_of_another_autopilot(
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("dragonfly", "unknown vehicle dragonfly: choose "),
+        ("dragonfly", 'unknown vehicle "dragonfly" (choose '),
         (edited(VEHICLE, "max_speed = 838.0", "max_speed = 500.0"), "AscTec Hummingbird: hover thrust is 0.9"),
     ],
 )

@@ -13,16 +13,16 @@ from tools.harness.processes import wait_for
 
 FORKING = """
 import threading
-from colibri.flights.children import Child, end_children, how_it_ended
-from colibri.flights.forked import ForkedProcess
+from colibri.flights.launcher import Child, end_children, how_it_ended
+from colibri.plant.spec import PlantSpec
 
-def begun(*options):
-    child = Child("plant", ("--json", "--link", "udpin:127.0.0.1:0", *options), fork=True)
-    print("forked" if isinstance(child.process, ForkedProcess) else "anew", end=": ")
+def begun(link="udpin:127.0.0.1:0"):
+    child = Child(PlantSpec(link=link), fork=True)
+    print("forked" if child.forked else "anew", end=": ")
     return child
 
-wrong = begun("--no-such-option")
-print(how_it_ended(wrong.process.wait()))
+wrong = begun("nothing")
+print(how_it_ended(wrong.wait()))
 for end in (Child.kill, lambda child: end_children([child])):
     child = begun()
     print(child.read()[0]["event"], end=", ")
@@ -31,7 +31,7 @@ for end in (Child.kill, lambda child: end_children([child])):
 waiting = threading.Event()
 other = threading.Thread(target=waiting.wait)
 other.start()
-print(begun("--no-such-option").process.wait())
+print(begun("nothing").wait())
 waiting.set()
 """
 

@@ -4,7 +4,7 @@ import pytest
 
 from colibri.companion.settings import CompanionSettings
 from colibri.sitl.backends.link_faults import Trouble
-from colibri.sitl.backends.setting import Setting
+from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.session import Flights
 from tests.colibri.companion.in_memory import Ride
 
@@ -12,7 +12,7 @@ from tests.colibri.companion.in_memory import Ride
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(50))
 def test_a_bad_link_loses_no_flight(seed: int) -> None:
-    with Flights(Setting(feedback="sensors", turbulence="light", seed=seed), None) as flights:
+    with Flights(setting_of([{"feedback": "sensors", "turbulence": "light", "seed": seed}]), None) as flights:
         sitl = flights.begin()
         track = "lemniscate:lap=8" if seed % 2 else "spiral"
         settings = CompanionSettings(may_arm=True, duration_s=18.0)

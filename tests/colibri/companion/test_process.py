@@ -17,7 +17,7 @@ MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [
 {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397752, 8.545594, 3]}]}}"""
 BAD_INPUT = {
     "no track": ((), "name a TRACK to fly, or --identify"),
-    "unknown track": (("spirl",), "unknown track spirl"),
+    "unknown track": (("spirl",), 'unknown track "spirl"'),
     "below the floor": (("hover:height=-3",), "below the floor"),
     "arms in a dry run": (("spiral", "--arm", "--dry-run"), "--dry-run arms nothing"),
     "identifies on a track": (("spiral", "--identify"), "--identify hovers"),

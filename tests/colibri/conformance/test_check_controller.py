@@ -199,11 +199,11 @@ def test_the_command_prints_the_table_what_failed_and_how_to_see_it(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["lpv-mcp"], "unknown controller lpv-mcp: did you mean lpv-mpc?"),
+        (["lpv-mcp"], 'unknown controller "lpv-mcp" (did you mean "lpv-mpc"?)'),
         (["pid"], "unknown controller pid: installed are cascade"),
         (["lpv-mpc", "--profile", "thesis"], "profile thesis has no numbers for controller lpv-mpc"),
-        (["lpv-mpc", "--profile", "fligt"], "unknown profile fligt"),
-        (["lpv-mpc", "--vehicle", "dragonfly"], "unknown vehicle dragonfly"),
+        (["lpv-mpc", "--profile", "fligt"], 'unknown profile "fligt"'),
+        (["lpv-mpc", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly"'),
         (["lpv-mpc", "--only", "memories"], "unknown area memories: choose interface, memory, limits"),
         (["lpv-mpc", "--duration", "0"], "argument --duration: must be above zero"),
     ],

@@ -214,8 +214,8 @@ def test_a_fleet_flies_as_each_flies_alone() -> None:
 
 def test_a_process_that_cannot_begin_is_quoted() -> None:
     with (
-        Flights(Setting(wind="three"), FromScratch()) as flights,
-        pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*must be SPEED@FROM"),
+        Flights(Setting(vehicle="three", believed="iris"), FromScratch()) as flights,
+        pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*unknown vehicle"),
     ):
         flights.begin()
 

@@ -69,13 +69,17 @@ def test_what_there_is_not_is_refused_with_what_there_is() -> None:
 @pytest.mark.parametrize(
     ("mark", "line"),
     [
-        ({"airborne": 5, "feedback": "sensors"}, 'airborne is for feedback "state": an estimator begins at rest'),
-        ({"airborne": "five"}, "airborne: Expected float | None, got str"),
-        ({"vehicle": 3}, "vehicle: Expected str, got int"),
-        ({"params": 3}, "params is KEY=VALUE,... in numbers, not 3"),
-        ({"start": "q"}, "start is KEY=VALUE,... in numbers, not 'q'"),
+        (
+            {"airborne": 5, "feedback": "sensors"},
+            'airborne requires feedback="state":',
+        ),
+        ({"airborne": "five"}, "airborne: must be a number m, not five"),
+        ({"vehicle": 3}, "vehicle: must be a name or a Vehicle, not int"),
+        ({"params": 3}, "params: must be a Mapping, not int"),
+        ({"params": "q"}, "params: must be KEY=VALUE,... in numbers, not q"),
+        ({"start": "q"}, "start: q: must be a number, not nothing"),
         ({"ground": {"loss": 7}}, "loss of a link must be from 0 to 1, not 7"),
-        ({"ground": "down=1"}, "a link has no down to begin with: choose corrupt, "),
+        ({"ground": "down=1"}, 'ground: unknown fault "down" (choose corrupt, '),
     ],
 )
 def test_what_no_flight_begins_with(mark: dict[str, Any], line: str) -> None:
@@ -89,5 +93,5 @@ def test_what_differs_for_one_flight_is_read_as_a_mark() -> None:
         sitl = flights.begin(start="x=3", params={"RTL_RETURN_ALT": 7.0})
         assert sitl.position[0] == 3.0
         assert [sitl.get_param(name) for name in ("MIS_TAKEOFF_ALT", "RTL_RETURN_ALT")] == [1.5, 7.0]
-        with pytest.raises(SettingError, match="a flight has no place"):
+        with pytest.raises(SettingError, match='unknown option "place"'):
             flights.begin(place=3)

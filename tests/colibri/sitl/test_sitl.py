@@ -230,9 +230,9 @@ def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester)
     result.assert_outcomes(errors=4)
     result.stdout.fnmatch_lines(
         [
-            "a flight has no winds: choose airborne, *",
-            "argument --wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three*",
-            "the vehicle has no parameter NO_SUCH",
+            'unknown option "winds" (did you mean "wind"?)',
+            "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three",
+            'unknown parameter "NO_SUCH" (choose *',
             "*no-such*",
         ]
     )
@@ -254,7 +254,7 @@ def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester:
     run(pytester, source, "--sitl-ground", "loss=0.3,jitter_s=0.05").assert_outcomes(passed=2)
     result = run(pytester, source, "--sitl-ground", "lost=0.3")
     result.assert_outcomes(errors=1, passed=1)
-    result.stdout.fnmatch_lines(["a link has no lost to begin with: choose corrupt, delay_s, *"])
+    result.stdout.fnmatch_lines(['ground: unknown fault "lost" (did you mean "loss"?)'])
 
 
 def test_who_does_not_fly_does_not_load_what_flies(pytester: pytest.Pytester) -> None:

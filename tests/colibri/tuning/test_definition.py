@@ -21,7 +21,7 @@ def range_of(**given: Any) -> dict[str, Any]:
     ("tables", "said"),
     [
         ({"tune": {}}, "tune: say which numbers,"),
-        ({"tune": {"controllers.whole-lpv-mpc.weights.positon": {"uniform": [1, 200]}}}, "did you mean position?"),
+        ({"tune": {"controllers.whole-lpv-mpc.weights.positon": {"uniform": [1, 200]}}}, 'did you mean "position"?)'),
         ({"tune": {"track": {"choice": ["hover", "spiral"]}}}, "tune: track is no number of a profile"),
         ({"tune": {"vehicle.body.mass_kg": {"uniform": [0.6, 0.8]}}}, "vehicle.body.mass_kg is no number of a profile"),
         ({"tune": {f"{WEIGHTS}": {"uniform": [1, 2]}}}, f"{WEIGHTS}: the profile has "),
@@ -54,7 +54,7 @@ def range_of(**given: Any) -> dict[str, Any]:
         ({"fly": TABLES["fly"] | {"link": "udp"}}, "link: over udp two processes fly, which know files"),
         ({"grid": {}}, "no track: say which is flown"),
         ({"objectives": {}}, "objectives: say what is to become small"),
-        ({"objectives": {"rmse": "mean"}}, "objectives: unknown metric rmse: did you mean rmse_m?"),
+        ({"objectives": {"rmse": "mean"}}, 'objectives: unknown metric "rmse" (did you mean "rmse_m"?)'),
         ({"objectives": {"rmse_m": "best"}}, "objectives: rmse_m: choose mean, rms, median, largest or "),
         ({"objectives": {"rmse_m": {"quantile": 90}}}, "objectives: rmse_m: quantile: expected 0 to 1, not 90"),
         ({"objectives": {"share_lost": "median"}}, "objectives: share_lost is a mean"),
@@ -118,7 +118,7 @@ def test_keywords_take_precedence_over_the_file(tmp_path: Path) -> None:
     assert tables.fly == {"duration": 5, "turbulence": "light"}
     grid = tables_of(TuningTables, file, {"grid": {"turbulence": ["light", "severe"]}})
     assert (grid.fly, grid.grid) == ({"duration": 3}, {"turbulence": ["light", "severe"]})
-    with pytest.raises(colibri.Error, match="unknown option trails: did you mean trials"):
+    with pytest.raises(colibri.Error, match='unknown option "trails"'):
         tables_of(TuningTables, file, {"trails": 9})
     file.write_text("trails = 7\n", encoding="utf-8")
     with pytest.raises(colibri.Error, match=r"gusts.toml: .*trails"):

@@ -15,6 +15,7 @@ from time import perf_counter, sleep
 
 from colibri.analysis.recording import read_recording
 from colibri.flights.plan import FlightPlan
+from colibri.flights.spec import FlightSpec
 from tools.harness.processes import Process, running
 from tools.harness.relay import Relay
 from tools.pages.latency import LEMNISCATE, STEP, Case, Merit, merit
@@ -49,10 +50,9 @@ def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, f
     with TemporaryDirectory() as temporary:
         logs, out = Path(temporary) / "logs", Path(temporary) / "flight"
         logs.mkdir()
-        plan = FlightPlan.of_options(
-            out, track=case.track, profile="flight", link="udp", start=case.start, duration=case.duration_s
-        )
-        options = (
+        options = {"link": "udp", "start": case.start, "duration": case.duration_s, "out": out}
+        plan = FlightPlan.of(FlightSpec.of(case.track, **options))
+        words = (
             "--start",
             str(plan.start),
             "--duration",
@@ -62,7 +62,7 @@ def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, f
             "--out",
             str(out),
         )
-        plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *options)
+        plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *words)
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
         with DelayRelay(url, 0.5e-3 * round_trip_ms / speed) as relay:
             to_fly = ("--plant", relay.url, "--track", case.track, "--delay", "0", "--out", str(out))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
-from colibri.plant.process.options import PARTS
+from colibri.plant.spec import PARTS
 from tools.harness.processes import begins_as_recorded, fly_thesis, max_difference, reference, rows
 
 TRACKS = ("spiral", "line")

@@ -8,7 +8,7 @@ import pytest
 
 from colibri.common.process.lifecycle import nudge_m
 from colibri.plant.process.logs import TRUTH_COLUMNS
-from colibri.plant.process.options import PARTS
+from colibri.plant.spec import PARTS
 from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import fly, fly_thesis, rows
 

@@ -11,7 +11,7 @@ from colibri.common.types import Array
 from colibri.plant.environment.air import Air
 from colibri.plant.environment.turbulence import MIN_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
 from colibri.plant.environment.weather import Intensity, Weather
-from colibri.plant.process.options import wind
+from colibri.plant.texts import wind
 
 FOOT = 0.3048
 KNOT = 1852.0 / 3600.0

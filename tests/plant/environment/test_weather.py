@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.common.process.arguments import ArgumentParser, natural
-from colibri.flights.command_lines import options_of
+from colibri.common.spec import from_values
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.weather import (
     INTENSITIES,
@@ -19,12 +18,12 @@ from colibri.plant.environment.weather import (
     RecordedWind,
     Weather,
     Wind,
-    weather_of,
 )
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.process.options import add_weather_arguments, gust
-from colibri.plant.process.options import wind as read_wind
+from colibri.plant.spec import WorldSpec
+from colibri.plant.texts import gust
+from colibri.plant.texts import wind as read_wind
 from tools.harness.plant_flights import FRAME_US, hover, hummingbird, rpm
 
 VEHICLE = hummingbird("drag", "rotor-lag")
@@ -124,12 +123,11 @@ def test_what_is_no_gust(text: str, line: str) -> None:
 
 
 @given(WINDS, st.lists(GUSTS, max_size=3), st.sampled_from([None, *INTENSITIES]), st.integers(0, 2**32))
-def test_the_command_line_is_read_back(wind: Wind, gusts: list[Gust], turbulence: Intensity | None, seed: int) -> None:
-    weather = Weather(wind, tuple(gusts), turbulence, seed)
-    parser = ArgumentParser()
-    add_weather_arguments(parser)
-    parser.add_argument("--seed", type=natural)
-    assert weather_of(parser.parse_args(options_of(**weather._asdict()))) == weather
+def test_weather_is_read_back_from_texts(
+    wind: Wind, gusts: list[Gust], turbulence: Intensity | None, seed: int
+) -> None:
+    texts = {"wind": str(wind), "gusts": [str(each) for each in gusts], "turbulence": turbulence, "seed": str(seed)}
+    assert from_values(WorldSpec, texts).weather == Weather(wind, tuple(gusts), turbulence, seed)
 
 
 def test_air_that_may_change_but_does_not_is_a_constant_wind(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from colibri.common.types import Vector
 from colibri.plant.physics.start import Start
-from colibri.plant.process.options import wind
+from colibri.plant.texts import wind
 from tests.support.strategies import reals, vectors
 from tools.harness.plant_flights import OFF, command, flight, hover, hummingbird, rpm, states
 

@@ -14,7 +14,7 @@ from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
-from colibri.plant.process.options import wind
+from colibri.plant.texts import wind
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from tests.support.strategies import quaternions, vectors
 from tools.harness.plant_flights import OFF, flight, hover, hummingbird, rpm, states

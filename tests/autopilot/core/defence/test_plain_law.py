@@ -15,7 +15,7 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import state_frame
 from colibri.plant.simulation.plant import Plant, PlantBuilder
-from colibri.plant.simulation.setting import WorldSetting
+from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 
 INTERVAL_US = 8000
@@ -28,7 +28,7 @@ def state_of(frame: StateFrame) -> VehicleState:
 
 
 def plant_at(start: Start, vehicle: str = "hummingbird") -> Plant:
-    builder = PlantBuilder(WorldSetting(), load_vehicle(vehicle), {Feedback.STATE: start})
+    builder = PlantBuilder(WorldSpec(), load_vehicle(vehicle), {Feedback.STATE: start})
     return builder.build(Feedback.STATE, INTERVAL_US)
 
 

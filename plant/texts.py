@@ -1,80 +1,41 @@
-"""The world on a command line: start, weather, latency, and what is left out."""
+"""The world's options as texts: wind, gusts, how a flight begins."""
 
 from argparse import ArgumentTypeError
 from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 
-from colibri.common.process.arguments import ArgumentParser, number
-from colibri.common.process.lifecycle import nudge_m
-from colibri.plant.environment.weather import INTENSITIES, MAX_SPEED_M_S, NO_WIND, Gust, RecordedWind, Wind
+from colibri.common.errors import unknown
+from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
 
-PARTS = ("rotor-lag", "drag", "ground", "battery")
-"""What `Vehicle.without` can leave out."""
 
-MAX_LATENCY_MS = 1000.0
-
-
-def nudged(start: Start) -> Start:
-    """Return where a flight really begins: `nudge_m` east and north of its start, which is at it except in tests."""
-    return start._replace(x=start.x + nudge_m(), y=start.y + nudge_m())
+def number(text: str) -> float:
+    """Read a finite number."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError
+    return value
 
 
 def start_values(text: str) -> dict[str, float]:
-    """Read values of a start of the command line, `KEY=VALUE[,KEY=VALUE...]`."""
+    """Read how a flight begins, `KEY=VALUE[,KEY=VALUE...]`."""
     return dict(_start_value(pair) for pair in text.split(","))
 
 
 def _start_value(pair: str) -> tuple[str, float]:
     key, _, value = pair.partition("=")
     if key not in Start._fields:
-        raise ArgumentTypeError(f"unknown key {key}: choose {', '.join(Start._fields)}")
+        raise ArgumentTypeError(unknown("key", key, Start._fields))
     try:
         return key, number(value)
     except ValueError:
         raise ArgumentTypeError(f"{key}: must be a number, not {value or 'nothing'}") from None
 
 
-def latency(text: str) -> float:
-    """Read a latency of the command line, ms: none is negative, and a second is more than anything could fly with."""
-    value = number(text)
-    if not 0.0 <= value <= MAX_LATENCY_MS:
-        raise ArgumentTypeError(f"must be 0 to {MAX_LATENCY_MS:g} ms, not {text}")
-    return value
-
-
-def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
-    """Add the options of `WorldSetting` but for `--seed`; `start` and `of_whom` are words of the helps."""
-    add_weather_arguments(parser)
-    add = parser.add_argument
-    add(
-        "--without",
-        action="append",
-        default=[],
-        choices=PARTS,
-        help=f"leave a part of the vehicle file out of the model{of_whom}; may be repeated",
-    )
-    add(
-        "--start",
-        type=start_values,
-        default={},
-        metavar="KEY=VALUE,...",
-        help="begin otherwise: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s, ENU), p, q, r (rad/s, "
-        f"FLU), rotors (rpm) (default: {start})",
-    )
-    add(
-        "--latency",
-        type=latency,
-        default=0.0,
-        metavar="MS",
-        help="between plant and autopilot, one way, simulated: the command that answers a frame acts twice that later, "
-        "and the one before it is held until then (default 0)",
-    )
-
-
 _FULL_TURN_DEG = 360.0
-_COLUMNS = "t,east,north,up"
-_GUST = "SPEED@FROM:start=S,duration=S"
+COLUMNS = "t,east,north,up"
+GUST = "SPEED@FROM:start=S,duration=S"
 
 
 def wind(text: str) -> Wind | RecordedWind:
@@ -90,9 +51,9 @@ def gust(text: str) -> Gust:
     try:
         start_s, duration_s = number(values.pop("start")), number(values.pop("duration"))
     except (KeyError, ValueError):
-        raise ArgumentTypeError(f"must be {_GUST}, 6@270:start=10,duration=2 say, not {text}") from None
+        raise ArgumentTypeError(f"must be {GUST}, 6@270:start=10,duration=2 say, not {text}") from None
     if values or times.count(",") > 1:
-        raise ArgumentTypeError(f"must be {_GUST} and nothing else, not {text}")
+        raise ArgumentTypeError(f"must be {GUST} and nothing else, not {text}")
     if start_s < 0.0 or duration_s <= 0.0:
         raise ArgumentTypeError(f"the start must not be negative, the duration above zero, not {text}")
     return Gust(peak, start_s, duration_s)
@@ -110,8 +71,8 @@ def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
         raise ArgumentTypeError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:
         raise ArgumentTypeError(f"{path}: {reason}") from reason
-    if not lines or lines[0].replace(" ", "") != _COLUMNS:
-        raise ArgumentTypeError(f"{path}: line 1: must be {_COLUMNS}")
+    if not lines or lines[0].replace(" ", "") != COLUMNS:
+        raise ArgumentTypeError(f"{path}: line 1: must be {COLUMNS}")
     rows = [_row(path, i, line) for i, line in enumerate(lines[1:], start=2) if line.strip()]
     if not rows:
         raise ArgumentTypeError(f"{path}: line {len(lines)}: the file ends, and a wind needs a row")
@@ -125,7 +86,7 @@ def _row(path: Path, line: int, text: str) -> tuple[int, tuple[float, float, flo
     try:
         t, east, north, up = map(number, text.split(","))
     except ValueError:
-        raise ArgumentTypeError(f"{path}: line {line}: must be four numbers, {_COLUMNS}") from None
+        raise ArgumentTypeError(f"{path}: line {line}: must be four numbers, {COLUMNS}") from None
     if max(abs(east), abs(north), abs(up)) > MAX_SPEED_M_S:
         raise ArgumentTypeError(f"{path}: line {line}: no wind is faster than {MAX_SPEED_M_S:g} m/s")
     return line, (t, east, north, up)
@@ -147,31 +108,3 @@ def constant_wind(text: str) -> Wind:
     if value.speed_m_s > MAX_SPEED_M_S:
         raise ArgumentTypeError(f"no wind is faster than {MAX_SPEED_M_S:g} m/s, not {text}")
     return value
-
-
-def add_weather_arguments(parser: ArgumentParser) -> None:
-    """Add `--wind`, `--gust` and `--turbulence`."""
-    add = parser.add_argument
-    add(
-        "--wind",
-        type=wind,
-        default=NO_WIND,
-        metavar="SPEED@FROM|FILE",
-        help="m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east; or a .csv file with "
-        f"a header of {_COLUMNS} (s, m/s), linear in between (default: calm)",
-    )
-    add(
-        "--gust",
-        type=gust,
-        action="append",
-        default=[],
-        dest="gusts",
-        metavar=_GUST,
-        help="a gust on top of it, of the shape 1 - cosine; may be repeated",
-    )
-    add(
-        "--turbulence",
-        choices=INTENSITIES,
-        help="Dryden's, as MIL-F-8785C has it at low altitude, on top of it; --seed makes another of the same kind "
-        "(default: none)",
-    )

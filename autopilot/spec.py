@@ -1,0 +1,144 @@
+"""What flies a vehicle, and whom it serves: options of every command that flies, and of `colibri autopilot`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.common.earth.home import DEFAULT_HOME, HomePlace
+from colibri.common.earth.home import home as read_home
+from colibri.common.process.spec import ProcessSpec
+from colibri.common.spec import Option
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+DEFAULT_PLANT = "udpout:127.0.0.1:14560"
+TRACK = "spiral"
+"""The default track."""
+
+
+def name_of(given: str | Profile | Vehicle) -> str:
+    """Return the name of a profile or vehicle, or the name that is given."""
+    return given if isinstance(given, str) else given.name
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawSpec:
+    """The control law, and the vehicle it is made for."""
+
+    profile: Annotated[str | Profile, Option("control profile name or .toml", "NAME")] = "flight"
+    controller: Annotated[Any, Option("control law, also of another package (default: the profile's)", "NAME")] = None
+    solver: Annotated[str | None, Option("QP solver of qpsolvers (default: the profile's)", "NAME")] = None
+    delay: Annotated[
+        float | None,
+        Option(
+            "compensate this delay from a frame until its command takes effect; 0: none (default: the profile's, or "
+            "the one that the plant measures)",
+            "MS",
+            "ms",
+            least=0.0,
+            most=200.0,
+        ),
+    ] = None
+    vehicle: Annotated[
+        str | Vehicle | None, Option("vehicle to control, name or .toml (default: the profile's)", "NAME")
+    ] = None
+    floor: Annotated[
+        float | None, Option("height below which no track may lead, m (default: the ground, 0)", "M", "m", endless=True)
+    ] = None
+    feedback: Annotated[
+        Feedback,
+        Option("what the autopilot flies by: the true state (default), or what sensors measure", "state|sensors"),
+    ] = Feedback.STATE
+
+    @property
+    def law(self) -> Any:
+        """What makes the control law, where that is an object; None where it goes by a name."""
+        return None if isinstance(self.controller, str | None) else self.controller
+
+    @property
+    def law_name(self) -> str | None:
+        """The control law's name, that of its class or function for an object; None for the profile's law."""
+        return self.controller if self.law is None else getattr(self.law, "__name__", type(self.law).__name__)
+
+    @property
+    def delay_s(self) -> float | None:
+        """The delay in seconds."""
+        return None if self.delay is None else self.delay * 1e-3
+
+    def load(self) -> tuple[Profile, Vehicle]:
+        """Return the profile with the law, solver and delay of the options, and the vehicle to control.
+
+        Raises:
+            ProfileError: There is no such profile, or it is wrong.
+            VehicleError: There is no such vehicle.
+        """
+        profile = self.chosen(load_profile(self.profile))
+        return profile, load_vehicle(self.vehicle or profile.simulation.vehicle)
+
+    def chosen(self, profile: Profile) -> Profile:
+        """Return a profile with the law, solver and delay of the options.
+
+        Raises:
+            ProfileError: The control law has no QP to solve.
+        """
+        return profile.with_choices(self.law_name, self.solver, self.delay_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroundSpec:
+    """Which ground stations may watch and command a flight."""
+
+    gcs: Annotated[
+        tuple[str, ...],
+        Option(
+            "a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
+            "serial:DEVICE:BAUD",
+            "URL",
+            keyword=False,
+        ),
+    ] = ()
+    signing_key: Annotated[
+        Path | None,
+        Option("sign what is sent, refuse what is not signed with this key", "FILE", keyword=False),
+    ] = None
+    insecure: Annotated[bool, Option("let links leave this computer without a key", keyword=False)] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
+    """An autopilot as a process."""
+
+    plant: Annotated[str, Option("the plant to call", "URL")] = DEFAULT_PLANT
+    simulator: Annotated[
+        str | None,
+        Option(
+            "fly a simulator that speaks PX4's interface instead, jMAVSim say: tcp:127.0.0.1:4560; on its sensors",
+            "URL",
+        ),
+    ] = None
+    track: Annotated[
+        str | None,
+        Option("what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)", "TRACK"),
+    ] = None
+    stepped: Annotated[
+        str | None, Option("a program that speaks for all ground stations, frame by frame (for tests)", "URL")
+    ] = None
+    home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
+    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    state: Annotated[Path | None, Option("keeps parameters, logs, files (default: nothing is kept)", "DIR")] = None
+    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
+    params: Annotated[Mapping[str, int | float], Option("initial values of parameters", on_command_line=False)] = field(
+        default_factory=dict
+    )
+
+    @property
+    def served(self) -> bool:
+        """Whether ground stations are served."""
+        return bool(self.gcs or self.stepped)
+
+    @property
+    def flown(self) -> str | None:
+        """The track that is flown from the start; None where ground stations say what to fly."""
+        return self.track if self.served else self.track or TRACK

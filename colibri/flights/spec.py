@@ -1,0 +1,66 @@
+"""A flight, described once: all options of a plant, an autopilot and the link between them."""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from colibri.autopilot.spec import GroundSpec, LawSpec
+from colibri.common.errors import Error
+from colibri.common.spec import Option, from_values
+from colibri.plant.spec import WorldSpec
+from colibri.plant.vehicle.description import Vehicle
+
+TRACK_HELP = (
+    "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
+    "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
+    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2|max,margin=0.1], "
+    "samples:FILE; m, s, degrees"
+)
+
+
+class OptionError(Error):
+    """An unknown option of a flight, or a value that it cannot have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehiclesSpec(WorldSpec, LawSpec):
+    """The law, its vehicle, and the vehicle and world that the plant flies in its place."""
+
+    plant_vehicle: Annotated[
+        str | Vehicle | None,
+        Option("another vehicle for the plant alone, to fly what was not planned for", "NAME"),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightSpec(VehiclesSpec, GroundSpec):
+    """A flight: each attribute is an option of `colibri fly`, and a keyword of `colibri.fly`."""
+
+    track: Annotated[str, Option(TRACK_HELP, "TRACK")]
+    integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
+    link: Annotated[
+        Literal["udp", "memory", "direct"],
+        Option("udp: two processes; memory: one process, same codec, same flight; direct: without the codec"),
+    ] = "memory"
+    speed: Annotated[
+        float | None,
+        Option("times real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True),
+    ] = None
+    duration: Annotated[float, Option("simulated time", "S", "s", above=0.0)] = 100.0
+    out: Annotated[Path, Option("folder for logs and figures", "DIR", keyword=False)] = Path("out")
+    ulog: Annotated[bool, Option("write no flight.ulg", keyword=False)] = True
+
+    @classmethod
+    def of(cls, track: str, **options: Any) -> "FlightSpec":
+        """Return the flight of a track with options by name: Python's values, or texts as the command line has them.
+
+        Raises:
+            OptionError: An option is unknown, or cannot have its value.
+        """
+        return from_values(cls, {"track": track, **options}, OptionError)
+
+    @property
+    def pace(self) -> float:
+        """How many times real time to fly."""
+        return self.speed or (1.0 if self.gcs else inf)

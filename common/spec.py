@@ -1,0 +1,371 @@
+"""Options of a flight as typed fields of frozen dataclasses: read from a command line, keywords or JSON.
+
+A field carries all that is known of an option, and whatever takes options is derived from it:
+
+    latency: Annotated[float, Option("the delay of the link, one way", least=0.0, most=1000.0, unit="ms")] = 0.0
+
+Values are Python's, or the command line's texts: `wind="5@270"`, `start={"x": 1.0}`.
+"""
+
+from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import MISSING, fields
+from enum import StrEnum
+from functools import partial
+from math import inf, isfinite, isinf, nan
+from pathlib import Path, PurePath
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, get_args, get_origin
+
+import msgspec
+
+from colibri.common.errors import Error, unknown
+
+ENDLESS = "max"
+"""An infinite number as text."""
+_INFINITE = {ENDLESS: inf, f"-{ENDLESS}": -inf}
+
+S = TypeVar("S")
+
+
+class SpecError(Error):
+    """An unknown option, or a value that it cannot have; the message names both."""
+
+
+class Option(NamedTuple):
+    """What is known of a field beside its type and default.
+
+    Attributes:
+        help: One line for a user.
+        metavar: Its value on a command line; derived from choices and unit where it is left out.
+        unit: Of a number, in error messages.
+        least, above, most: The range of a number.
+        endless: Whether a number may be infinite, `max` as text.
+        read: Reads a text; without it, the type says how.
+        flag: Its name on a command line where that is another.
+        on_command_line: Whether command lines have it.
+        keyword: Whether Python and campaigns have it.
+    """
+
+    help: str
+    metavar: str | None = None
+    unit: str = ""
+    least: float = -inf
+    above: float = -inf
+    most: float = inf
+    endless: bool = False
+    read: Callable[[str], Any] | None = None
+    flag: str | None = None
+    on_command_line: bool = True
+    keyword: bool = True
+
+
+class Field(NamedTuple):
+    """An option of a specification.
+
+    Attributes:
+        name: Of the field and the keyword.
+        kind: Type of the value, of each of several where it is repeated; None left out.
+        repeated: Whether the value is a tuple.
+        default: The default; MISSING for none.
+        option: What else is known.
+    """
+
+    name: str
+    kind: Any
+    repeated: bool
+    default: Any
+    option: Option
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words that the value may be; empty where it is no word of a list."""
+        if get_origin(self.kind) is Literal:
+            return get_args(self.kind)
+        return tuple(self.kind) if isinstance(self.kind, type) and issubclass(self.kind, StrEnum) else ()
+
+    def read(self, given: Any) -> Any:
+        """Return the value for what is `given`: a value of Python, or a text; None is the default.
+
+        Raises:
+            ArgumentTypeError: It cannot be the value.
+        """
+        if given is None or given == "":
+            return self.default
+        if not self.repeated:
+            return self._one(given)
+        several = isinstance(given, Iterable) and not isinstance(given, str | Mapping) and not hasattr(given, "_fields")
+        return tuple(map(self._one, given if several else (given,)))
+
+    def read_text(self, text: str) -> Any:
+        """Return the value of a text, of each where it is repeated.
+
+        Raises:
+            ArgumentTypeError: It cannot be the value.
+        """
+        if self.option.read is not None:
+            return self.option.read(text)
+        if self.choices:
+            return self._choice(text)
+        if self.kind in (int, float):
+            return self._number(text)
+        return Path(text) if self.kind is Path else text
+
+    def _one(self, given: Any) -> Any:
+        if hasattr(given, "dtype"):  # a number of numpy's
+            given = given.item()
+        if isinstance(given, str | PurePath):
+            return self.read_text(str(given))
+        if hasattr(given, "_asdict") and get_origin(self.kind) is Mapping:
+            given = given._asdict()
+        if isinstance(given, Mapping) and self.option.read is not None and get_origin(self.kind) is Mapping:
+            return self.read_text(",".join(f"{key}={value}" for key, value in given.items())) if given else {}
+        if self.kind is Any:
+            return given
+        if self.kind in (int, float):
+            return self._number(given)
+        try:
+            return msgspec.convert(given, self.kind, dec_hook=lambda kind, value: kind(value))
+        except msgspec.ValidationError as error:
+            kinds = get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
+            words = " or ".join("a name" if kind is str else f"a {kind.__name__}" for kind in kinds)
+            where = str(error).partition(" - at ")[2]
+            reason = f"must be {words}, not {type(given).__name__}" if not where else str(error).replace("`", "")
+            raise ArgumentTypeError(reason) from error
+
+    def _choice(self, text: str) -> Any:
+        if text not in self.choices:
+            raise ArgumentTypeError(unknown("value", text, self.choices))
+        return self.kind(text) if isinstance(self.kind, type) else text
+
+    def _number(self, given: Any) -> float:
+        try:
+            if isinstance(given, bool):
+                raise ValueError
+            if self.kind is int and not isinstance(given, str) and given != int(given):
+                raise ValueError
+            value: float = _INFINITE[given] if given in _INFINITE else self.kind(given)
+        except (TypeError, ValueError, OverflowError):
+            value = nan
+        least, above, most = self.option.least, self.option.above, self.option.most
+        right = isfinite(value) or (isinf(value) and self.option.endless)
+        if not (right and least <= value <= most and (value > above or isinf(above))):
+            raise ArgumentTypeError(f"must be {self._range()}, not {given}")
+        return value
+
+    def _range(self) -> str:
+        """Return in words which numbers are valid."""
+        option = self.option
+        unit = f" {option.unit}" if option.unit else ""
+        whole = "a whole number" if self.kind is int else "a number"
+        words = f", or {ENDLESS}" if option.endless else ""
+        if isfinite(option.least) and isfinite(option.most):
+            return f"{whole} from {option.least:g} to {option.most:g}{unit}{words}"
+        if isfinite(option.above):
+            return f"{whole} above {option.above:g}{unit}{words}"
+        return (f"{whole} of at least {option.least:g}{unit}" if isfinite(option.least) else f"{whole}{unit}") + words
+
+
+def fields_of(spec: type) -> dict[str, Field]:
+    """Return the options of a specification by name, its own before those of its bases."""
+    if spec not in _FIELDS:
+        known = {each.name: each for each in fields(cast(Any, spec))}
+        names = [name for kind in spec.__mro__ for name in vars(kind).get("__annotations__", ()) if name in known]
+        _FIELDS[spec] = {name: _field(known[name]) for name in names}
+    return _FIELDS[spec]
+
+
+def _field(each: Any) -> Field:
+    kind, *notes = get_args(each.type)
+    assert get_origin(each.type) is Annotated, f"{each.name} carries an Option"
+    kinds = [it for it in get_args(kind) if it is not NoneType] if get_origin(kind) in (Union, UnionType) else [kind]
+    of = kinds[0] if len(kinds) == 1 else Union[tuple(kinds)]  # noqa: UP007
+    default = each.default if each.default_factory is MISSING else each.default_factory()
+    repeated = get_origin(of) is tuple and get_args(of)[-1] is Ellipsis
+    (option,) = (note for note in notes if isinstance(note, Option))
+    return Field(each.name, get_args(of)[0] if repeated else of, repeated, default, option)
+
+
+_FIELDS: dict[type, dict[str, Field]] = {}
+
+
+def add_options(
+    parser: ArgumentParser,
+    spec: type,
+    *,
+    leave_out: Collection[str] = (),
+    defaults: Mapping[str, Any] = {},
+    shown: Mapping[str, str] = {},
+    given_only: bool = False,
+    keywords_only: bool = False,
+) -> None:
+    """Add the options of a specification to a command line.
+
+    Args:
+        parser: Of the command line.
+        spec: The specification.
+        leave_out: Fields that this command does not have.
+        defaults: Other defaults than those of the fields.
+        shown: Defaults in words, by field.
+        given_only: Whether options that are not given leave nothing.
+        keywords_only: Whether the command flies many flights, and has only what Python and campaigns have.
+    """
+    for field in fields_of(spec).values():
+        wanted = field.option.keyword if keywords_only else field.option.on_command_line
+        if wanted and field.name not in leave_out:
+            _add(parser, field._replace(default=defaults.get(field.name, field.default)), shown, given_only=given_only)
+
+
+def _add(parser: ArgumentParser, field: Field, shown: Mapping[str, str], *, given_only: bool) -> None:
+    option, default = field.option, field.default
+    words = option.help
+    if field.name in shown:
+        words = f"{words} (default: {shown[field.name]})"
+    elif (
+        "(default" not in words and isinstance(default, int | float | str | PurePath) and not isinstance(default, bool)
+    ):
+        said = ENDLESS if default == inf else f"{default:g}" if isinstance(default, float) else default
+        words = f"{words} (default {said})"
+    words = words.replace("%", "%%")
+    name = f"--{(option.flag or field.name).replace('_', '-')}"
+    initial = SUPPRESS if given_only else default
+    if field.kind is bool:
+        action: Any = "store_false" if default else "store_true"
+        name = f"--no-{name[2:]}" if default else name
+        parser.add_argument(name, dest=field.name, action=action, default=initial, help=words)
+        return
+    metavar = option.metavar or ("|".join(field.choices) if field.choices else field.name.upper())
+    reader = partial(_told, field)
+    if default is MISSING:
+        parser.add_argument(field.name, type=reader, metavar=metavar, help=words)
+    elif field.repeated:
+        initial = SUPPRESS if given_only else list(default)
+        words = words if "may be repeated" in words else f"{words}; may be repeated"
+        parser.add_argument(
+            name, dest=field.name, type=reader, action="append", default=initial, metavar=metavar, help=words
+        )
+    else:
+        parser.add_argument(name, dest=field.name, type=reader, default=initial, metavar=metavar, help=words)
+
+
+def _is_shown(default: Any) -> bool:
+    """Return whether the help shows a default."""
+    plain = isinstance(default, int | float | str | PurePath) and not isinstance(default, bool)
+    return plain or hasattr(default, "_fields")
+
+
+def _told(field: Field, text: str) -> Any:
+    return field.read_text(text)
+
+
+def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:
+    """Return the specification that a command line was read into; `others` are values that it has not."""
+    given = vars(args) | others
+    values = {name: given[name] for name in fields_of(spec) if name in given}
+    return spec(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+
+
+def from_values(
+    spec: type[S],
+    values: Mapping[str, Any],
+    error: type[Error] = SpecError,
+    only: Collection[str] | None = None,
+) -> S:
+    """Return the specification of values by name: of Python, or texts as the command line has them.
+
+    Raises:
+        error: An option is unknown, or none of `only`, or cannot have its value; names it.
+    """
+    return spec(**read_values(spec, values, error, only))
+
+
+def read_values(
+    spec: type,
+    values: Mapping[str, Any],
+    error: type[Error] = SpecError,
+    only: Collection[str] | None = None,
+) -> dict[str, Any]:
+    """Return values by name as a specification has them, see `from_values`.
+
+    Raises:
+        error: An option is unknown, or none of `only`, or cannot have its value; names it.
+    """
+    known = fields_of(spec)
+    for name in values:
+        if name not in (known if only is None else only):
+            raise error(unknown("option", name, only or known))
+    return {name: _checked(known[name], value, error) for name, value in values.items()}
+
+
+def _checked(field: Field, value: Any, error: type[Error]) -> Any:
+    try:
+        read = field.read(value)
+    except ArgumentTypeError as reason:
+        raise error(f"{field.name}: {reason}") from None
+    if read is MISSING:
+        raise error(f"{field.name}: a value is required")
+    return read
+
+
+def keywords_of(spec: type) -> list[str]:
+    """Return the names of the options that Python and campaigns have, in alphabetical order."""
+    return sorted(name for name, field in fields_of(spec).items() if field.option.keyword)
+
+
+def values_of(spec: object) -> dict[str, Any]:
+    """Return the values of a specification by name."""
+    return {name: getattr(spec, name) for name in fields_of(type(spec))}
+
+
+def part_of(spec: object, kind: type[S], **others: Any) -> S:
+    """Return the specification of another kind that has the same values by name, but for `others`."""
+    known = fields_of(kind)
+    return kind(**({name: value for name, value in values_of(spec).items() if name in known} | others))
+
+
+def plain_values(spec: object, *, whole: bool = False) -> dict[str, Any]:
+    """Return values as JSON has them, those that are not defaults or the `whole`: an infinite number is `max`.
+
+    Raises:
+        SpecError: A value is code, which JSON cannot hold.
+    """
+    values = {}
+    for name, field in fields_of(type(spec)).items():
+        value = getattr(spec, name)
+        if value == field.default and not whole:
+            continue
+        if isinstance(value, float) and isinf(value):
+            value = ENDLESS if value > 0.0 else f"-{ENDLESS}"
+        try:
+            values[name] = msgspec.to_builtins(value, enc_hook=_plain)
+        except TypeError as error:
+            raise SpecError(f"{name}: an object cannot be passed to another process: use a name") from error
+    return values
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, PurePath):
+        return str(value)
+    raise TypeError
+
+
+def to_json(spec: object) -> bytes:
+    """Return a specification as JSON.
+
+    Raises:
+        SpecError: A value is code, which JSON cannot hold.
+    """
+    return msgspec.json.encode(plain_values(spec))
+
+
+def from_json(spec: type[S], text: bytes) -> S:
+    """Return the specification that `to_json` made a text of.
+
+    Raises:
+        SpecError: It is none.
+    """
+    try:
+        values = msgspec.json.decode(text, type=dict[str, Any])
+    except msgspec.MsgspecError as error:
+        raise SpecError(f"no specification: {error}") from error
+    return from_values(spec, values)

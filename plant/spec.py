@@ -1,0 +1,119 @@
+"""What a plant flies, in what, and how it begins: options of every command that flies, and of `colibri plant`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Annotated, Literal, TypeAlias, get_args
+
+from colibri.common.earth.home import DEFAULT_HOME, HomePlace
+from colibri.common.earth.home import home as read_home
+from colibri.common.process.spec import ProcessSpec
+from colibri.common.spec import Option
+from colibri.plant.environment.weather import NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
+from colibri.plant.physics.start import Start
+from colibri.plant.texts import COLUMNS, GUST, gust, start_values
+from colibri.plant.texts import wind as read_wind
+from colibri.plant.vehicle.description import Vehicle
+
+Part: TypeAlias = Literal["rotor-lag", "drag", "ground", "battery"]
+PARTS: tuple[Part, ...] = get_args(Part)
+"""What `Vehicle.without` can leave out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldSpec:
+    """The world of a flight."""
+
+    without: Annotated[
+        tuple[Part, ...],
+        Option("leave a part of the vehicle file out of the plant's model; the autopilot keeps its own"),
+    ] = ()
+    wind: Annotated[
+        Wind | RecordedWind,
+        Option(
+            "m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east; or a .csv file with "
+            f"a header of {COLUMNS} (s, m/s), linear in between (default: calm)",
+            "SPEED@FROM|FILE",
+            read=read_wind,
+        ),
+    ] = NO_WIND
+    gusts: Annotated[
+        tuple[Gust, ...],
+        Option("a gust on top of the wind, of the shape 1 - cosine", GUST, read=gust, flag="gust"),
+    ] = ()
+    turbulence: Annotated[
+        Intensity | None,
+        Option("Dryden turbulence on top of the wind, by MIL-F-8785C at low altitude; --seed chooses the sample"),
+    ] = None
+    seed: Annotated[int, Option("seed of everything random", "N", least=0)] = 0
+    start: Annotated[
+        Mapping[str, float],
+        Option(
+            "initial values: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s, ENU), p, q, r (rad/s, FLU), "
+            "rotors (rpm)",
+            "KEY=VALUE,...",
+            read=start_values,
+        ),
+    ] = field(default_factory=dict)
+    latency: Annotated[
+        float,
+        Option(
+            "simulated latency between plant and autopilot, one way: the command that answers a frame acts twice that "
+            "later, and the one before it is held until then",
+            "MS",
+            "ms",
+            least=0.0,
+            most=1000.0,
+        ),
+    ] = 0.0
+
+    @property
+    def weather(self) -> Weather:
+        """The weather of the flight."""
+        return Weather(self.wind, self.gusts, self.turbulence, self.seed)
+
+    def started(self, usual: Start) -> Start:
+        """Return the start: `usual` but for the values that are given."""
+        return usual._replace(**self.start)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantSpec(WorldSpec, ProcessSpec):
+    """A plant as a process."""
+
+    serve: Annotated[
+        Literal["colibri", "ardupilot-json", "px4"],
+        Option(
+            "colibri: colibri autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, which "
+            "sets rate and speed itself; px4: PX4's SITL, over TCP, or UDP where it waits to be called (udpout:)"
+        ),
+    ] = "colibri"
+    link: Annotated[str | None, Option("where to wait for the autopilot", "URL")] = None
+    vehicle: Annotated[str | Vehicle, Option("vehicle name or .toml", "NAME")] = "hummingbird"
+    integrator: Annotated[
+        Literal["rk4", "adaptive"],
+        Option("rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9"),
+    ] = "rk4"
+    home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
+    rate: Annotated[float, Option("frames, if the autopilot asks for no other rate", "HZ", "Hz", above=0.0)] = 250.0
+    realtime: Annotated[
+        bool,
+        Option("run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command"),
+    ] = False
+    cut_after: Annotated[
+        float,
+        Option("with --realtime: stop the rotors where no command comes for so long", "S", "s", above=0.0),
+    ] = 0.5
+    duration: Annotated[
+        float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
+    ] = inf
+    speed: Annotated[
+        float | None,
+        Option("times real time, or max (default: max; with --realtime 1)", "N", above=0.0, endless=True),
+    ] = None
+    truth: Annotated[bool, Option("append the true state to each frame, for a program in between (for tests)")] = False
+
+    @property
+    def pace(self) -> float:
+        """How many times real time to fly."""
+        return self.speed or (1.0 if self.realtime else inf)
