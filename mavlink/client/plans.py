@@ -10,17 +10,23 @@ INVALID_SEQUENCE: int = mav.MAV_MISSION_INVALID_SEQUENCE
 
 
 class _PlanConversation(Conversation):
-    """A conversation about one plan; `result` is a MAV_MISSION_RESULT."""
+    """A conversation about one plan; `result` is a MAV_MISSION_RESULT.
+
+    Attributes:
+        opaque_id: The vehicle's id of the plan that was accepted or announced; 0 where it has none.
+    """
 
     def __init__(self, target: Target, plan: int, repeat: Repeat) -> None:
         super().__init__(target, ("plan", plan), repeat)
         self.plan = plan
+        self.opaque_id = 0
 
     def _read(self, message: Message) -> None:
         if message.fields.mission_type != self.plan:
             return
         if message.name == "MISSION_ACK":
             self._acknowledge(message.fields.type)
+            self.opaque_id = message.fields.opaque_id
         else:
             self._take(message)
 
@@ -90,7 +96,7 @@ class Download(_PlanConversation):
         fields = message.fields
         if message.name == "MISSION_COUNT":
             if self.count is None:
-                self.count = fields.count
+                self.count, self.opaque_id = fields.count, fields.opaque_id
                 self._go_on()
         elif self.count is not None and fields.seq < self.count and fields.seq not in self._items:
             item = item_of(message.name, fields)

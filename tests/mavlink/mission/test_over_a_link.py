@@ -7,56 +7,54 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.conversation import Repeat
+from colibri.mavlink.client.plans import Download, Upload
+from colibri.mavlink.mission.items import FENCE, PLAN_TYPES
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import mav
-from tests.support.mission_ends import FIRST, SECOND, VEHICLE, Ground, Link, Station, bits, fielded, some_item
+from tests.support.mission_ends import FIRST, SECOND, VEHICLE, Ground, bits, fielded, some_item
+from tests.support.unruly_link import MINUTE_US, TARGET, Link, Vehicle
 
-MINUTE_US = 60_000_000
 ITEMS_500 = [some_item(number) for number in range(500)]
+PATIENTLY = Repeat(1_500_000, 100)
+
+
+def linked(ground: Ground, clients: int, seed: int, **faults: float) -> tuple[Link, list[Client]]:
+    stations = [Client(255, 190, heartbeat_every_us=None) for _ in range(clients)]
+    return Link(Vehicle(ground.service), stations, seed, **faults), stations
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_500_items_survive_20_percent_loss(seed: int) -> None:
-    ground, station = Ground(), Station(FIRST)
-    link = Link(ground, [station], seed, loss=0.2, unruly=0.0)
-    station.upload(0, ITEMS_500, 0)
-    assert link.run(10 * MINUTE_US, lambda: station.result is not None)
-    assert station.result == ACCEPTED
+    ground = Ground()
+    link, (station,) = linked(ground, 1, seed, loss=0.2)
+    upload = station.begin(Upload(TARGET, ITEMS_500, repeat=PATIENTLY))
+    assert link.run(lambda: upload.accepted, 10 * MINUTE_US)
     assert bits(ground.service.plans[0].items) == bits(ITEMS_500)
-    station.download(0, ground.now_us)
-    assert link.run(10 * MINUTE_US, lambda: station.result is not None)
-    assert bits(station.received) == bits(ITEMS_500)
-    assert station.opaque_id == ground.service.plans[0].id
+    download = station.begin(Download(TARGET, repeat=Repeat(250_000, 100)))
+    assert link.run(lambda: download.accepted, 10 * MINUTE_US)
+    assert bits(download.items) == bits(ITEMS_500)
+    assert download.opaque_id == upload.opaque_id == ground.service.plans[0].id
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_two_stations_over_an_unruly_link(seed: int) -> None:
     """One reads what the other writes: it gets one plan or the other, never a mixture."""
-    ground, writer, reader = Ground(), Station(FIRST), Station(SECOND, asks_for="MISSION_REQUEST")
-    link = Link(ground, [writer, reader], seed, loss=0.1, unruly=0.3)
+    ground = Ground()
+    link, (writer, reader) = linked(ground, 2, seed, loss=0.1, unruly=0.3)
     plans = [[some_item(100 * number + index) for index in range(20 + number)] for number in range(2)]
     for plan in plans:
-        writer.upload(1, plan, ground.now_us)
-        reader.download(1, ground.now_us)
-        assert link.run(MINUTE_US, lambda: None not in (writer.result, reader.result))
-        assert bits(ground.service.plans[1].items) == bits(plan)
-        assert bits(reader.received) in ([], bits(plans[0]), bits(plans[1]))
-        link.run(200_000, lambda: False)  # a late copy of a MISSION_ACK would end the next upload, at the station
-    reader.download(1, ground.now_us)
-    assert link.run(MINUTE_US, lambda: reader.result is not None)
-    assert bits(reader.received) == bits(plans[-1])
-
-
-def test_copies_do_not_breed() -> None:
-    """A link that copies every datagram must not have every later item sent more and more often."""
-    ground, station = Ground(), Station(FIRST)
-    link = Link(ground, [station], 1, loss=0.0, unruly=1.0)
-    station.upload(0, ITEMS_500[:100], 0)
-    assert link.run(MINUTE_US, lambda: station.result is not None)
-    assert station.result == ACCEPTED
-    assert link.datagrams < 6 * 100
+        upload = writer.begin(Upload(TARGET, plan, FENCE, repeat=PATIENTLY))
+        download = reader.begin(Download(TARGET, FENCE))
+        assert link.run(lambda: None not in (upload.result, download.result))  # noqa: B023
+        assert bits(ground.service.plans[FENCE].items) == bits(plan)
+        assert not download.accepted or bits(download.items) in ([], bits(plans[0]), bits(plans[1]))
+        link.run(lambda: False, 200_000)  # a late copy of a MISSION_ACK would end the next upload, at the station
+    download = reader.begin(Download(TARGET, FENCE))
+    assert link.run(lambda: download.accepted)
+    assert bits(download.items) == bits(plans[-1])
 
 
 ANYTHING = st.integers(0, 255)
@@ -126,12 +124,12 @@ class Conversations(RuleBasedStateMachine):
         """What was under way is over after its time; then either station uploads afresh."""
         for _ in range(25):
             self.ground.poll(250_000)
-        for peer in (SECOND, FIRST):
-            station = Station(peer)
-            link = Link(self.ground, [station], 0, loss=0.0, unruly=0.0)
-            station.upload(0, ITEMS_500[:3], self.ground.now_us)
-            assert link.run(MINUTE_US, lambda station=station: station.result is not None)  # type: ignore[misc]
-            assert station.result == ACCEPTED
+        link, stations = linked(self.ground, 2, 0)
+        link.now_us = self.ground.now_us
+        for station in stations:
+            upload = station.begin(Upload(TARGET, ITEMS_500[:3]))
+            assert link.run(lambda upload=upload: upload.result is not None)  # type: ignore[misc]
+            assert upload.accepted
             assert bits(self.ground.service.plans[0].items) == bits(ITEMS_500[:3])
 
 
