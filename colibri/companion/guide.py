@@ -10,7 +10,6 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.rotations import tilt_deg
-from colibri.companion.conversation.vehicle_peer import ReceivedState, VehiclePeer
 from colibri.companion.identification import steps
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
@@ -28,6 +27,7 @@ from colibri.companion.supervision.ending import Ended, how_it_ended
 from colibri.companion.supervision.limits import FlightFacts, Limit, box_of, exceeded
 from colibri.companion.supervision.pace import Pace
 from colibri.companion.supervision.phases import Condition, Phase, next_phase
+from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
 from colibri.plant.vehicle.description import Vehicle
 
 _GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
@@ -328,7 +328,7 @@ class Companion:
             return []
         kind, target = self._settings.setpoints, self.peer.target
         name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
-        return [self.peer.codec.encode(name, *fields)]
+        return [self.peer.encode(name, *fields)]
 
     def _with_step(self, asked: Asked, now_us: int) -> Asked:
         """Return what is asked with a step of the identification added, and note both."""

@@ -2,11 +2,12 @@
 
 from math import isfinite, nan
 
-from colibri.companion.conversation.commands import UNANSWERED
-from colibri.companion.conversation.vehicle_peer import VehiclePeer
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.stack import ModeNumber, TakeOff
+from colibri.companion.stacks.stack import TakeOff
 from colibri.companion.supervision.phases import Phase
+from colibri.companion.vehicle_peer import VehiclePeer
+from colibri.mavlink.client.conversation import UNANSWERED
+from colibri.mavlink.client.modes import FlightMode
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_TEMPORARILY_REJECTED, mav
 
 _STREAMS_FIRST_US = 1_000_000
@@ -41,7 +42,7 @@ class Orders:
     @property
     def disarms(self) -> bool:
         """Whether a command to disarm is on its way, which must not be left there."""
-        return self._disarming and "disarm" not in self._peer.orders.results
+        return self._disarming and "disarm" not in self._peer.results
 
     @property
     def climbed(self) -> bool:
@@ -58,8 +59,7 @@ class Orders:
         if stack is None:
             return False
         return any(
-            self._peer.orders.results.get(f"mode {mode.name}") == RESULT_ACCEPTED
-            and self._peer.report.mode == mode.custom
+            self._peer.results.get(f"mode {mode.name}") == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
             for mode in (stack.hold, stack.last_resort)
         )
 
@@ -75,11 +75,11 @@ class Orders:
         elif phase in (Phase.TAKING_OVER, Phase.FLYING):
             self._own = frozenset({stack.offboard.custom})
         elif phase is Phase.HANDING_OVER:
-            self._peer.orders.clear()
+            self._peer.clear()
             self._own = frozenset({stack.hold.custom, stack.last_resort.custom})
             if before is Phase.ARMING:
                 self._disarming = True
-                self._peer.orders.ask("disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+                self._peer.ask("disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def own_modes(self, phase: Phase) -> frozenset[int]:
         """Return the modes that are no pilot's choice: those asked for, and until one is reported the one before."""
@@ -92,7 +92,7 @@ class Orders:
 
     def poll(self, phase: Phase, in_phase_us: int, *, ready: bool) -> None:
         """Have sent what a phase needs; `ready`: whether the vehicle may be told to hold."""
-        stack, results = self._peer.stack, self._peer.orders.results
+        stack, results = self._peer.stack, self._peer.results
         self._in_phase_us = in_phase_us
         if stack is None or self._settings.dry_run:
             return
@@ -111,7 +111,7 @@ class Orders:
             self._mode(wanted, in_phase_us)
 
     def _arm(self, take_off: TakeOff) -> None:
-        stack, results = self._peer.stack, self._peer.orders.results
+        stack, results = self._peer.stack, self._peer.results
         assert stack is not None, "it is connected"
         if take_off is TakeOff.COMMAND_THEN_ARM:
             above_sea_m = self._peer.report.altitude_amsl_m + self._climb_m
@@ -132,23 +132,23 @@ class Orders:
         self._climb_m = max(climb_m, _LEAST_HEIGHT_M)
         self.height_enu_m = ground_enu_m + self._climb_m
 
-    def _mode(self, mode: ModeNumber, in_phase_us: int) -> None:
+    def _mode(self, mode: FlightMode, in_phase_us: int) -> None:
         """Order a mode, and again after a while if it was refused, or taken and yet is not reported."""
         name = f"mode {mode.name}"
-        taken = self._peer.orders.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
+        taken = self._peer.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
         if not taken and in_phase_us >= self._again_us:
             self._again_us = in_phase_us + _AGAIN_US
-            self._peer.orders.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
+            self._peer.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:
         """Give a command, and again while it is refused for the time being; else a refusal, or silence, is the end."""
-        result = self._peer.orders.results.get(name)
+        result = self._peer.results.get(name)
         if result is None:
-            self._peer.orders.ask(name, number, *params)
+            self._peer.ask(name, number, *params)
         elif result == RESULT_TEMPORARILY_REJECTED:
             if self._in_phase_us >= self._again_us:
                 self._again_us = self._in_phase_us + _AGAIN_US
-                self._peer.orders.ask(name, number, *params)
+                self._peer.ask(name, number, *params)
         elif result != RESULT_ACCEPTED:
             said = "; ".join(self._peer.report.texts[-2:])
             how = "was not answered" if result == UNANSWERED else f"was refused (result {result})"

@@ -14,8 +14,8 @@ import numpy as np
 from colibri.autopilot.guidance.trajectories.waypoint_file import DEFAULT_SPEED_M_S, MIN_LEG_S, Waypoints, leg_times
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.types import Vector
-from colibri.companion.conversation.home import Home
 from colibri.companion.errors import CompanionError
+from colibri.companion.home import Home
 from colibri.mavlink.wire.dialect import mav
 
 SUFFIX = ".plan"

@@ -15,10 +15,9 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.common.types import Address
-from colibri.companion.conversation.home import Home, HomeSeeker
-from colibri.companion.conversation.vehicle_peer import VehiclePeer
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
+from colibri.companion.home import Home, HomeSeeker
 from colibri.companion.log import FlightSummary, LogRow
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
 from colibri.companion.report import report
@@ -26,6 +25,7 @@ from colibri.companion.response_file import read_response
 from colibri.companion.settings import CompanionSettings, SetpointKind
 from colibri.companion.stacks.recognition import STACKS
 from colibri.companion.supervision.limits import FlightLimits
+from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.flights.folder import occupied
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.links.open import check_reach, open_ground_link

@@ -4,14 +4,18 @@ from math import dist
 from typing import Any
 
 from colibri.autopilot.control.interface import FALLBACK_CODES
-from colibri.common.rotations import euler_from_quaternion
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Array, Vector
 from colibri.companion.log import LogRow
 from colibri.companion.settings import SetpointKind
 from colibri.companion.steering import response as model
-from colibri.companion.steering import setpoints
 from colibri.companion.steering.law_pilot import Asked
 from colibri.companion.steering.predictor import Predictor
+from colibri.mavlink.client.conversation import Encoded
+from colibri.mavlink.client.setpoints import attitude_target, position_target
+
+_PULL_1_S = 1.0
+"""Position error per second that a velocity setpoint corrects."""
 
 
 def message_of(
@@ -22,7 +26,7 @@ def message_of(
     decided: Asked | None,
     thrust: float,
     y: Array,
-) -> setpoints.Encoded:
+) -> Encoded:
     """Return name and fields of a setpoint's message.
 
     Args:
@@ -35,12 +39,18 @@ def message_of(
         y: The vehicle when it takes effect, as `response.carry` has it.
     """
     if kind is SetpointKind.RATES or decided is None or decided.reference is None or decided.decision is None:
-        return setpoints.rates(now_us, target, asked.rate_flu_rad_s, thrust)
+        return attitude_target(target, rates=asked.rate_flu_rad_s, thrust=thrust, time_us=now_us)
     if kind is SetpointKind.ATTITUDE:
-        return setpoints.attitude(now_us, target, decided.decision.attitude_reference, thrust)
+        attitude = quaternion_from_euler(*decided.decision.attitude_reference)
+        return attitude_target(target, attitude, thrust=thrust, time_us=now_us)
+    reference = decided.reference
+    place, velocity = first(reference.position_enu_m), first(reference.velocity_enu_m_s)
+    acceleration, yaw = first(reference.acceleration_enu_m_s2), float(reference.yaw_rad[0])
     if kind is SetpointKind.POSITION:
-        return setpoints.position(now_us, target, decided.reference)
-    return setpoints.velocity(now_us, target, decided.reference, first(y[None, model.POSITION]))
+        return position_target(target, place, velocity, acceleration, yaw, time_us=now_us)
+    here = first(y[None, model.POSITION])
+    vx, vy, vz = (v + _PULL_1_S * (p - at) for v, p, at in zip(velocity, place, here, strict=True))
+    return position_target(target, velocity=(vx, vy, vz), yaw=yaw, time_us=now_us)
 
 
 def row_of(

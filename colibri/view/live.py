@@ -94,8 +94,7 @@ class LiveVehicle:
                     if address not in self._peers:
                         self._peers.append(address)
                     self._observer.receive(datagram, now_s)
-                self._observer.poll(now_s)
-                outbox = self._observer.take_outbox()
+                outbox = self._observer.poll(now_s)
             for datagram in outbox:
                 for address in self._peers:
                     self._link.send(datagram, address)

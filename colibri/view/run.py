@@ -15,8 +15,7 @@ import numpy as np
 from colibri.common.process.lifecycle import Stop
 from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
-from colibri.view.modes import CHOICES
-from colibri.view.observer import Observer
+from colibri.view.observer import CHOICES, Observer
 from colibri.view.page.page import Page
 from colibri.view.page.server import PageServer, serve
 from colibri.view.recorded.flight import RecordedFlight

@@ -11,9 +11,9 @@ import numpy as np
 from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
 from colibri.common.rotations import quaternion_from_euler
 from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.mavlink.client.modes import mode_name
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
-from colibri.view.modes import mode_name
 from colibri.view.snapshot import NO_POINTS, NOWHERE, UNKNOWN_ROTORS, Chart, Snapshot
 
 CHART_S = 60.0

@@ -4,21 +4,17 @@ Sources: ArduPilot, Copter Commands in Guided Mode (SET_ATTITUDE_TARGET, GUID_OP
 AP_Motors_Thrust_Linearization.cpp.
 """
 
-from colibri.companion.stacks.stack import ModeNumber, ParameterRule, Parameters, Response, Stack, TakeOff
+from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOff
 from colibri.companion.stacks.thrust_curve import ThrustCurve
+from colibri.mavlink.client.modes import COPTER_MODES
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
-_CUSTOM = 1.0
 _THRUST_AS_THRUST = 8
 """Bit 3 of GUID_OPTIONS; without it a thrust is a climb rate."""
 _HOVER, _EXPO, _SPIN_MIN, _SPIN_MAX = 0.35, 0.65, 0.15, 0.95
 """ArduPilot's defaults."""
 _MAX_TIMEOUT_S = 3.0
-
-
-def _mode(name: str, number: int) -> ModeNumber:
-    return ModeNumber(name, number, (_CUSTOM, float(number), 0.0))
 
 
 def _thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
@@ -31,8 +27,7 @@ def _thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
     )
 
 
-GUIDED, LOITER, LAND = _mode("GUIDED", 4), _mode("LOITER", 5), _mode("LAND", 9)
-BRAKE = _mode("BRAKE", 17)
+GUIDED, LOITER, LAND, BRAKE = (COPTER_MODES[name] for name in ("Guided", "Loiter", "Land", "Brake"))
 
 ARDUPILOT = Stack(
     name="ardupilot",

@@ -1,6 +1,6 @@
 """Colibri's own autopilot: offboard mode, whose attitude setpoints its generator of demands slews."""
 
-from colibri.companion.stacks.px4_modes import HOLD, LAND, OFFBOARD, STEADY
+from colibri.companion.stacks.px4 import HOLD, LAND, OFFBOARD, STEADY
 from colibri.companion.stacks.stack import Parameters, Response, Stack, TakeOff
 from colibri.companion.stacks.thrust_curve import MiddleHovers
 from colibri.mavlink.wire.dialect import mav

@@ -3,12 +3,14 @@
 Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference (Multicopter Position Control, Motor Control, Geofence).
 """
 
-from colibri.companion.stacks.px4_modes import HOLD, LAND, OFFBOARD, STEADY
 from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOff
 from colibri.companion.stacks.thrust_curve import ThrustCurve
+from colibri.mavlink.client.modes import PX4_MODES
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
+OFFBOARD, HOLD, LAND = PX4_MODES["Offboard"], PX4_MODES["Hold"], PX4_MODES["Land"]
+STEADY = frozenset({HOLD.custom, PX4_MODES["Takeoff"].custom})
 _HOVER = 0.5
 _RATES_REACHED_S = 2.0
 

@@ -7,24 +7,11 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.common.types import Vector
 from colibri.companion.stacks.thrust_curve import Thrust
+from colibri.mavlink.client.modes import FlightMode
 from colibri.plant.vehicle.description import Vehicle
 
 Parameters: TypeAlias = Mapping[str, float]
 """Parameters that the vehicle has, by name."""
-
-
-class ModeNumber(NamedTuple):
-    """A flight mode on the wire.
-
-    Attributes:
-        name: As its pilots call it.
-        custom: `custom_mode` of HEARTBEAT.
-        command: Parameters 1 to 3 of MAV_CMD_DO_SET_MODE.
-    """
-
-    name: str
-    custom: int
-    command: tuple[float, float, float]
 
 
 class TakeOff(Enum):
@@ -92,9 +79,9 @@ class Stack:
 
     name: str
     autopilot: int
-    offboard: ModeNumber
-    hold: ModeNumber
-    last_resort: ModeNumber
+    offboard: FlightMode
+    hold: FlightMode
+    last_resort: FlightMode
     steady: frozenset[int]
     streams: Mapping[str, float]
     parameters: tuple[str, ...]

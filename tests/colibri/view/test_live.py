@@ -1,6 +1,5 @@
 """The page's end of a link: at our own vehicle in simulated time, and at what PX4 and ArduPilot send."""
 
-from functools import partial
 from math import pi, radians
 from typing import Any
 
@@ -8,12 +7,12 @@ import numpy as np
 import pytest
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.mavlink.client.modes import ARDUPILOT, MODES
 from colibri.mavlink.mission.items import FENCE
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.sitl.mission_items import land, takeoff, waypoint
 from colibri.sitl.vehicle import Sitl
-from colibri.view.modes import ARDUPILOT, PX4, mode_name, set_mode
-from colibri.view.observer import COMPONENT, SYSTEM, Observer
+from colibri.view.observer import CHOICES, COMPONENT, SYSTEM, Observer
 from colibri.view.snapshot import Snapshot
 from tools.pages.pictures.watched import watched
 
@@ -97,15 +96,16 @@ def test_a_fence_comes_item_by_item(others: tuple[Observer, Any]) -> None:
     observer, send = others
     send("GPS_GLOBAL_ORIGIN", round(HOME[0] * 1e7), round(HOME[1] * 1e7), round(HOME[2] * 1e3))
     corners = [geodetic_of((east, north, 0.0), HOME) for east, north in ((9.0, 9.0), (-9.0, 9.0), (0.0, -9.0))]
-    send("MISSION_COUNT", SYSTEM, COMPONENT, 4, FENCE)
     vertex, ring = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
-    item = partial(send, "MISSION_ITEM_INT", SYSTEM, COMPONENT)
-    for seq, there in enumerate(corners):
-        item(seq, 5, vertex, 0, 1, 3.0, 0.0, 0.0, 0.0, round(there[0] * 1e7), round(there[1] * 1e7), 0.0, FENCE)
+    items = [(vertex, 3.0, there) for there in corners] + [(ring, 2.5, HOME)]
     observer.poll(2.0)
-    assert not list(observer.surroundings.fence)
-    item(3, 5, ring, 0, 1, 2.5, 0.0, 0.0, 0.0, round(HOME[0] * 1e7), round(HOME[1] * 1e7), 0.0, FENCE)
-    observer.poll(2.0)
+    send("MISSION_COUNT", SYSTEM, COMPONENT, len(items), FENCE)
+    for seq, (command, p1, there) in enumerate(items):
+        assert names(observer, 2.0) == ["MISSION_REQUEST_INT"]
+        assert not list(observer.surroundings.fence)
+        place = (round(there[0] * 1e7), round(there[1] * 1e7), 0.0)
+        send("MISSION_ITEM_INT", SYSTEM, COMPONENT, seq, 5, command, 0, 1, p1, 0.0, 0.0, 0.0, *place, FENCE)
+    assert names(observer, 2.0) == ["MISSION_ACK"]
     inside, outside = observer.surroundings.fence
     assert inside.keeps_in
     assert not outside.keeps_in
@@ -115,13 +115,12 @@ def test_a_fence_comes_item_by_item(others: tuple[Observer, Any]) -> None:
 
 def test_an_order_is_said_again_until_it_is_answered(others: tuple[Observer, Any]) -> None:
     observer, send = others
-    observer.take_outbox()
     observer.land()
-    sent = [names(observer, at_s).count("COMMAND_LONG") for at_s in (10.0, 10.5, 11.1)]
+    sent = [landings(observer, at_s) for at_s in (10.0, 10.5, 11.1)]
     assert sent == [1, 0, 1]
     send("COMMAND_ACK", mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_DENIED, 0, 0, SYSTEM, COMPONENT)
     assert observer.telemetry.snapshot(11.1).texts[0] == "land: denied"
-    assert "COMMAND_LONG" not in names(observer, 13.0)
+    assert not landings(observer, 13.0)
 
 
 def test_nobody_answers() -> None:
@@ -132,22 +131,26 @@ def test_nobody_answers() -> None:
 
 def test_it_does_not_pass_for_a_ground_station() -> None:
     observer = Observer()
-    observer.poll(0.0)
-    (beat,) = Codec(1, 1).decode(observer.take_outbox()[0])
+    (beat,) = Codec(1, 1).decode(observer.poll(0.0)[0])
     assert beat.fields.type != mav.MAV_TYPE_GCS
 
 
-@pytest.mark.parametrize(("autopilot", "name"), [(PX4, "Hold"), (PX4, "Return"), (ARDUPILOT, "RTL")])
-def test_modes_are_set_as_they_are_read(autopilot: int, name: str) -> None:
-    params = set_mode(autopilot, name)
-    assert params is not None
-    _, main, sub = map(int, params)
-    custom = main << 16 | sub << 24 if autopilot == PX4 else main
-    assert mode_name(autopilot, custom) == name
-    assert set_mode(mav.MAV_AUTOPILOT_GENERIC, name) is None
+def test_offered_modes_exist() -> None:
+    for autopilot, offered in CHOICES.items():
+        assert set(offered) <= MODES[autopilot].keys()
+
+
+def messages(observer: Observer, at_s: float) -> list[Any]:
+    """Return what is sent at a time."""
+    return [message for each in observer.poll(at_s) for message in Codec(1, 1).decode(each)]
 
 
 def names(observer: Observer, at_s: float) -> list[str]:
-    """Return what is sent at a time, by the messages' names."""
-    observer.poll(at_s)
-    return [message.name for each in observer.take_outbox() for message in Codec(1, 1).decode(each)]
+    """Return the names of what is sent at a time, but for streams and commands."""
+    return [message.name for message in messages(observer, at_s) if message.name not in ("HEARTBEAT", "COMMAND_LONG")]
+
+
+def landings(observer: Observer, at_s: float) -> int:
+    """Return how many commands to land are sent at a time."""
+    numbers = [each.fields.command for each in messages(observer, at_s) if each.name == "COMMAND_LONG"]
+    return numbers.count(mav.MAV_CMD_NAV_LAND)

@@ -15,6 +15,7 @@ from PIL import Image
 
 from colibri.common.types import Vector
 from colibri.experiments.flight import fly
+from colibri.mavlink.client.modes import PX4
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, waypoint
@@ -22,8 +23,7 @@ from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
-from colibri.view.modes import CHOICES, PX4
-from colibri.view.observer import Observer
+from colibri.view.observer import CHOICES, Observer
 from colibri.view.page.page import Page
 from colibri.view.page.server import serve
 from colibri.view.run import WAITS_S, Show, read_flights

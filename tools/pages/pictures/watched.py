@@ -18,8 +18,7 @@ class Watching(Station):
 
     def departing(self, now_us: int) -> list[bytes]:
         """Send what the observer has to say."""
-        self.observer.poll(now_us / 1e6)
-        for datagram in self.observer.take_outbox():
+        for datagram in self.observer.poll(now_us / 1e6):
             self.send_raw(datagram)
         return super().departing(now_us)
 

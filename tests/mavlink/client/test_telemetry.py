@@ -1,4 +1,4 @@
-"""Clock, states, reports, commands and parameters of a vehicle, message by message."""
+"""What a client reads of telemetry: the vehicle's clock, its states, its reports."""
 
 from random import Random
 from typing import Any
@@ -7,17 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.companion.conversation.commands import AGAIN_US, TRIES, UNANSWERED, CommandQueue
-from colibri.companion.conversation.parameters import ParameterReader
-from colibri.companion.stacks.ardupilot import ARDUPILOT
-from colibri.companion.stacks.colibri import COLIBRI
-from colibri.companion.stacks.px4 import PX4
-from colibri.companion.stacks.recognition import recognised
-from colibri.companion.stacks.thrust_curve import MiddleHovers, ThrustCurve
 from colibri.mavlink.client.clock import VehicleClock
 from colibri.mavlink.client.report import VehicleReport
 from colibri.mavlink.client.states import StateAssembler, TimedState
-from colibri.mavlink.wire.dialect import Bits, Codec, Message, mav
+from colibri.mavlink.wire.dialect import Codec, Message
 
 VEHICLE = Codec(1, 1)
 NO_COVARIANCE = (0.0,) * 21
@@ -132,61 +125,3 @@ def test_an_old_mode_after_a_new_one_is_none() -> None:
     for frame in (second, first):
         report.receive(reads.decode(frame)[0], 0)
     assert report.mode == 9
-
-
-def test_a_command_is_repeated_until_it_is_acknowledged() -> None:
-    queue = CommandQueue()
-    queue.ask("mode", 176, 1.0)
-    queue.ask("mode", 176, 1.0)
-    queue.ask("arm", 400, 1.0)
-    assert queue.poll(0) == [(176, 0, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))]
-    assert queue.poll(AGAIN_US - 1) == []
-    assert queue.poll(AGAIN_US)[0][:2] == (176, 1)
-    queue.receive(400, 0)
-    queue.receive(176, mav.MAV_RESULT_IN_PROGRESS)
-    assert not queue.results
-    queue.receive(176, mav.MAV_RESULT_DENIED)
-    assert queue.results == {"mode": mav.MAV_RESULT_DENIED}
-    for tries in range(TRIES + 1):
-        queue.poll((tries + 2) * AGAIN_US)
-    assert queue.results["arm"] == UNANSWERED
-    assert queue.idle
-
-
-def test_parameters_are_read_in_either_encoding_and_missing_ones_given_up() -> None:
-    for by_bits, wire in ((True, Bits(8)), (False, 8.0)):
-        reader = ParameterReader(["GUID_OPTIONS", "HOVER", "NOWHERE"], integers_by_bits=by_bits)
-        assert set(reader.poll(0)) == {"GUID_OPTIONS", "HOVER", "NOWHERE"}
-        reader.receive(said("PARAM_VALUE", "GUID_OPTIONS", wire, mav.MAV_PARAM_TYPE_INT32, 3, 0))
-        reader.receive(said("PARAM_VALUE", "HOVER", 0.25, mav.MAV_PARAM_TYPE_REAL32, 3, 1))
-        assert reader.values == {"GUID_OPTIONS": 8.0, "HOVER": 0.25}
-        assert not reader.done
-        for tries in range(6):
-            reader.poll((tries + 1) * 500_000)
-        assert reader.done
-
-
-def test_a_stack_is_recognised() -> None:
-    assert recognised(mav.MAV_AUTOPILOT_PX4, b"Colibri\0\0") is COLIBRI
-    assert recognised(mav.MAV_AUTOPILOT_GENERIC, b"Colibri\0\0") is COLIBRI
-    assert recognised(mav.MAV_AUTOPILOT_PX4, bytes(18)) is PX4
-    assert recognised(mav.MAV_AUTOPILOT_ARDUPILOTMEGA, bytes(18)) is ARDUPILOT
-    assert recognised(mav.MAV_AUTOPILOT_GENERIC, bytes(18)) is None
-
-
-@given(
-    hover=st.floats(0.2, 0.6),
-    expo=st.floats(0.0, 0.9),
-    spin_min=st.floats(0.0, 0.2),
-    quadratic=st.booleans(),
-    load=st.floats(0.3, 1.4),
-)
-def test_a_thrust_curve_is_its_own_inverse(
-    hover: float, expo: float, spin_min: float, quadratic: bool, load: float
-) -> None:
-    curve = ThrustCurve(hover=hover, expo=expo, spin_min=spin_min, quadratic=quadratic)
-    assert curve.command(1.0) == pytest.approx(hover)
-    command = curve.command(load)
-    if 0.0 < command < 1.0:
-        assert curve.load(command) == pytest.approx(load)
-    assert MiddleHovers(max_load=2.5).load(MiddleHovers(max_load=2.5).command(load)) == pytest.approx(load)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
-from colibri.companion.conversation.vehicle_peer import VehiclePeer
+from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.wire.dialect import mav
 
 _AGAIN_US = 500_000
@@ -47,5 +47,5 @@ class HomeSeeker:
             self._again_us = now_us + _AGAIN_US
             for name in ("HOME_POSITION", "GPS_GLOBAL_ORIGIN"):
                 number = float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
-                self._peer.orders.ask(name, mav.MAV_CMD_REQUEST_MESSAGE, number)
+                self._peer.ask(name, mav.MAV_CMD_REQUEST_MESSAGE, number)
         return self._peer.poll(now_us)

@@ -1,1 +1,0 @@
-"""What companion and vehicle say to each other, each a state machine: clock, states, reports, commands, parameters."""
