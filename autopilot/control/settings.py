@@ -4,6 +4,7 @@ from typing import Annotated, TypeAlias
 
 import msgspec
 
+from colibri.autopilot.control.qp import QpSolver
 from colibri.common.config import Positive, SettingsError, Table
 
 ControlInterval: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001, le=1.0)]
@@ -16,6 +17,14 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     tolerance: Positive
     max_iterations: Annotated[int, msgspec.Meta(ge=1, le=100_000)] = 100_000
     """More count as a time-out."""
+
+    def build(self) -> QpSolver:
+        """Return the solver.
+
+        Raises:
+            SolverError: It cannot be used.
+        """
+        return QpSolver(self.solver, self.tolerance, self.max_iterations)
 
 
 def interval_us(interval_s: float) -> int:

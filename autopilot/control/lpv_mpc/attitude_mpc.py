@@ -11,6 +11,7 @@ from colibri.autopilot.control.lpv_mpc import condensing, prediction
 from colibri.autopilot.control.lpv_mpc.condensing import Problem, Target
 from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, STATES, Body, InitialState
 from colibri.autopilot.control.parts.riccati import lqr
+from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
@@ -25,7 +26,6 @@ PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
 
 _BINDING = 1e-6
 """A limit counts as active where this part of it or less is left."""
-_MAX_SLACK = 100.0
 _KEPT = 1e-3
 """A limit of the tilt that is exceeded by this part of it or less counts as kept."""
 
@@ -67,6 +67,7 @@ class AttitudeMpc:
 
     Attributes:
         problem: What all its QPs share.
+        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds in parts of the largest, (4, 4).
         gain: K of the LQR that the terminal weight belongs to, (3, 12).
     """
 
@@ -88,6 +89,7 @@ class AttitudeMpc:
         output_weight, increment_weight = np.array(settings.output_weight), np.array(settings.increment_weight)
         terminal_weight, self.gain = _riccati(self._body, interval_s, output_weight, increment_weight)
         angle = radians(settings.max_angle_deg)
+        self.from_wrench = exact_inverse(vehicle.allocation()) / square(vehicle.rotors.max_speed)
         self.problem = Problem(
             np.cumsum((0, *settings.moves[:-1])),
             np.arange(settings.check_every, self.horizon + 1, settings.check_every),
@@ -96,7 +98,8 @@ class AttitudeMpc:
             terminal_weight,
             np.array(settings.max_increment_n_m),
             np.array([angle, angle, *settings.max_rate_rad_s]),
-            *squared_speeds_from(vehicle),
+            self.from_wrench[:, 0].copy(),
+            self.from_wrench[:, 1:].copy(),
             square(lag.min_speed),
         )
         self._packed = packed(self.problem)
@@ -104,18 +107,10 @@ class AttitudeMpc:
         self._schedule = np.empty((self.horizon, len(prediction.SCHEDULE)))
         self._responses = np.zeros((self.horizon + 1, STATES, 1 + moved))
         self._rotor_rows = 2 * condensing.ROTORS * len(settings.moves)
-        self._qp = self._empty_qp(moved, settings.slack_weight)
-
-    def _empty_qp(self, moved: int, slack_weight: float) -> Qp:
-        """Return the QP in `moved` increments and the slacks, with all that stays the same in it."""
-        n, rows = moved + condensing.SLACKS, self._rotor_rows + condensing.MOTION_ROWS * len(self.problem.checked)
-        H, f = np.zeros((n, n)), np.zeros(n)
-        H[moved:, moved:] = slack_weight * np.eye(condensing.SLACKS)
-        f[moved:] = slack_weight
-        max_increment = np.tile(self.problem.max_increment, moved // INPUTS)
-        lower = np.concatenate([-max_increment, np.zeros(condensing.SLACKS)])
-        upper = np.concatenate([max_increment, np.full(condensing.SLACKS, _MAX_SLACK)])
-        return Qp(H, f, np.zeros((rows, n)), np.zeros(rows), lower, upper)
+        rows = self._rotor_rows + condensing.MOTION_ROWS * len(self.problem.checked)
+        self._qp = empty_qp(moved, condensing.SLACKS, rows, settings.slack_weight)
+        self._qp.upper[:moved] = np.tile(self.problem.max_increment, len(settings.moves))
+        self._qp.lower[:moved] = -self._qp.upper[:moved]
 
     def plan(self, now: InitialState, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
@@ -222,9 +217,3 @@ def body_of(vehicle: Vehicle) -> Body:
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
     return Body(*vehicle.body.inertia_kg_m2, lag_1_s)
-
-
-def squared_speeds_from(vehicle: Vehicle) -> tuple[Array, Array]:
-    """Return what maps U1 (4,) and U2, U3, U4 (4, 3) to squared rotor speeds, in parts of the largest."""
-    inverse = exact_inverse(vehicle.allocation()) / square(vehicle.rotors.max_speed)
-    return inverse[:, 0].copy(), inverse[:, 1:].copy()

@@ -24,16 +24,13 @@ from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
 from colibri.autopilot.control.lpv_mpc.position_loop import Motion
 from colibri.autopilot.control.lpv_mpc.prediction import InitialState
-from colibri.autopilot.control.parts import recovery
-from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, TrackingLaw, VehicleTracker
-from colibri.autopilot.control.qp import QpSolver
-from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
-from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
-from colibri.autopilot.control.vehicle_model.mass import MassSettings
-from colibri.common.config import Count, Positive, Table, read_settings
+from colibri.autopilot.control.parts.recovery import RecoverySettings, mix_with_priority
+from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
+from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked
+from colibri.common.config import Count, read_settings
 from colibri.common.elementary import square
 from colibri.common.kernels import cos
-from colibri.common.matrices import dot, matvec, norm
+from colibri.common.matrices import dot, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -42,27 +39,19 @@ _RECOVER_BEYOND = cos(radians(75.0))
 _NO_YAW = np.empty(0)
 
 
-class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What flies when no plan can be had."""
+class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What flies when no plan can be had: then, so many samples of an LQR, then a descent."""
 
-    shifted_samples: Count
     lqr_samples: Count
     descent_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
-    turn_1_s: Positive
-    rate_1_s: Positive
-    max_rate_rad_s: Positive
 
 
-class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The control law."""
 
-    control_interval_s: ControlInterval
     guidance: GuidanceSettings
-    observer: ObserverSettings
-    mass: MassSettings
     attitude: AttitudeSettings
     fallback: FallbackSettings
-    qp: QpSettings
 
 
 class Memory(NamedTuple):
@@ -113,17 +102,12 @@ class LpvMpc(TrackingLaw[Memory]):
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(table, LpvMpcSettings)
-        interval_s = settings.control_interval_s
-        self.control_interval_us = interval_us(interval_s)
-        self.tracker = VehicleTracker(vehicle, settings.observer, settings.mass, interval_s)
-        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
-        self._attitude = AttitudeMpc(settings.attitude, vehicle, self.tracker.lag, solver, interval_s, clock)
+        super().__init__(settings, settings.fallback, vehicle)
+        self._lqr_samples, self._descent_thrust = settings.fallback.lqr_samples, settings.fallback.descent_thrust
+        interval_s, lag = self._interval_s, self.tracker.lag
+        self._attitude = AttitudeMpc(settings.attitude, vehicle, lag, settings.qp.build(), interval_s, clock)
         self.preview = Preview(self.control_interval_us, self._attitude.horizon + 2)
-        self._outer_loop = OuterLoop(settings.guidance, vehicle, self.tracker.lag, interval_s, self._attitude.horizon)
-        self._fallback = settings.fallback
-        self._turn = recovery.TurnGains(
-            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
-        )
+        self._outer_loop = OuterLoop(settings.guidance, vehicle, lag, interval_s, self._attitude.horizon)
 
     def initial(self, rotor_speed: float) -> Memory:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
@@ -175,7 +159,10 @@ class LpvMpc(TrackingLaw[Memory]):
         target, now, rotation = setpoint.target, inputs.now, inputs.observed.rotation
         steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
         if steep or setpoint.aligned < _RECOVER_BEYOND:
-            return self._recover(now, setpoint.force, rotation)
+            from_wrench, least = self._attitude.from_wrench, self._attitude.problem.min_squared
+            squared = self.recovered(setpoint.force, inputs.observed, from_wrench, least, square(now.max_speed))
+            moments = matvec(self.tracker.allocation[1:], squared)
+            return Choice(squared, moments, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
@@ -186,19 +173,11 @@ class LpvMpc(TrackingLaw[Memory]):
             moments = memory.plan.moments[memory.age]
             how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, memory.plan, age, how)
-        if memory.age <= self._fallback.shifted_samples + self._fallback.lqr_samples:
+        if memory.age <= self._fallback.shifted_samples + self._lqr_samples:
             moments = self._attitude.lqr(now, target)
             how = diagnostics._replace(fallback=Fallback.LQR)
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(inputs, age, diagnostics)
-
-    def _recover(self, now: InitialState, force: Array, rotation: Array) -> Choice:
-        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
-        direction = matvec(rotation.T, force / norm(force))
-        moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self.tracker.inertia, self._turn)
-        squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
-        moments = matvec(self.tracker.allocation[1:], squared)
-        return Choice(squared, moments, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
     def _descend(self, inputs: LawInputs, age: int, diagnostics: Diagnostics) -> Choice:
         now = inputs.now
@@ -209,11 +188,11 @@ class LpvMpc(TrackingLaw[Memory]):
         moments = self._attitude.lqr(now, level)
         weight_n = inputs.observed.mass_kg * self.tracker.vehicle.gravity_m_s2
         how = diagnostics._replace(fallback=Fallback.DESCENT)
-        squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
+        squared = self._mixed(weight_n * self._descent_thrust, moments, now)
         return Choice(squared, moments, None, age, how)
 
     def _mixed(self, thrust_n: float, moments: Array, now: InitialState) -> Array:
         problem, maximum = self._attitude.problem, square(now.max_speed)
-        return recovery.mix_with_priority(
+        return mix_with_priority(
             thrust_n, moments, problem.from_thrust, problem.from_moments, problem.min_squared, maximum
         )

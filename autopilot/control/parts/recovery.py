@@ -10,11 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.config import Count, Positive, Table
 from colibri.common.jit import compiled
 from colibri.common.kernels import atan2
 from colibri.common.types import Array
 
 _ANTIPARALLEL = 1e-6
+
+
+class RecoverySettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What flies when no plan can be had: the previous plan, so many samples of it, then the recovery."""
+
+    shifted_samples: Count
+    turn_1_s: Positive
+    rate_1_s: Positive
+    max_rate_rad_s: Positive
 
 
 class TurnGains(NamedTuple):

@@ -1,10 +1,10 @@
 """How control laws follow their vehicle from sample to sample: rotors, disturbances, mass and battery."""
 
-from typing import NamedTuple, Protocol, Self, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, terminal
 from colibri.autopilot.control.vehicle_model.disturbance_observer import (
@@ -23,8 +23,6 @@ from colibri.common.matrices import dot, matvec, put
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_LEVEL, _UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
-_ZERO = (0.0, 0.0, 0.0)
 _NOTHING = np.empty(0)
 
 
@@ -177,48 +175,3 @@ def look(
         mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], mass)
     voltage_v, current_a = terminal(open_v, speeds, battery)
     return mass_kg, voltage_v / battery[0].full_voltage_v, current_a
-
-
-class TrackingMemory(Protocol):
-    """What a law with a tracker carries from one control sample to the next, a named tuple."""
-
-    @property
-    def tracked(self) -> Tracked:
-        """What is remembered of the vehicle."""
-
-    def _replace(self, *, tracked: Tracked) -> Self: ...
-
-
-Memory = TypeVar("Memory", bound=TrackingMemory)
-
-
-class TrackingLaw(AttitudeController[Memory]):
-    """What control laws that follow their vehicle by `tracker` have in common."""
-
-    tracker: VehicleTracker
-
-    def warm_up(self) -> None:
-        """Load what is compiled: three steps from hover, the last of them upside down, and one for an attitude."""
-        n = self.preview.samples
-        still, level = np.zeros((n, 3)), np.zeros(n)
-        references = Horizon(still, still, still, still, still, level, level, level)
-        memory, hover = self.initial(self.tracker.vehicle.hover_speed), VehicleState(_ZERO, _ZERO, _LEVEL, _ZERO, _ZERO)
-        for attitude in (_LEVEL, _LEVEL, _UPSIDE_DOWN):
-            memory, _ = self.step(memory, 0, hover._replace(attitude=attitude), references)
-        self.step_attitude(memory, 0, hover, AttitudeDemand(still, still, level))
-
-    def charge_ah(self, memory: Memory) -> float:
-        """Return the charge taken from the battery, Ah."""
-        return memory.tracked.charge_ah
-
-    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
-        """Return the memory with another charge taken from the battery, Ah."""
-        return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
-
-    def mass_kg(self, memory: Memory) -> float:
-        """Return the mass that the vehicle moves like."""
-        return memory.tracked.mass_kg
-
-    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
-        """Return the memory with another mass."""
-        return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Decision, Horizon, Preview, VehicleState
-from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.thesis.attitude_mpc import AttitudeMpc, AttitudeSettings
 from colibri.autopilot.control.thesis.position_loop import AttitudeAndThrust, PositionController, PositionSettings
@@ -55,8 +54,9 @@ class Cascade:
         self.control_interval_us = interval_us(settings.control_interval_s)
         self.preview = Preview(self.control_interval_us * self._samples, 2)
         self._position = PositionController(settings.position, vehicle)
-        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
-        self._attitude = AttitudeMpc(settings.attitude, vehicle, solver, settings.control_interval_s, clock)
+        self._attitude = AttitudeMpc(
+            settings.attitude, vehicle, settings.qp.build(), settings.control_interval_s, clock
+        )
         self._mixer = Mixer(vehicle)
 
     def initial(self, rotor_speed: float) -> CascadeMemory:

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Decision, Horizon, Preview, VehicleState
-from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.thesis.condensed_mpc import Weights, augment, condense, solve
 from colibri.autopilot.control.thesis.lpv_model import (
@@ -75,7 +74,7 @@ class GlobalMpc:
         self.preview = Preview(self.control_interval_us, self._settings.horizon + 1)
         self._vehicle = vehicle
         self._clock = clock
-        self._solver = QpSolver(self._settings.qp.solver, self._settings.qp.tolerance)
+        self._solver = self._settings.qp.build()
         self._mixer = Mixer(vehicle)
         self._max_increment = _UNBOUNDED * vehicle.max_wrench()
         self._weights = Weights(

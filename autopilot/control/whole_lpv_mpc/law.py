@@ -18,14 +18,11 @@ from colibri.autopilot.control.interface import (
     Preview,
     VehicleState,
 )
-from colibri.autopilot.control.parts import recovery
 from colibri.autopilot.control.parts.error_dynamics import gains
+from colibri.autopilot.control.parts.recovery import RecoverySettings
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
-from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, TrackingLaw, VehicleTracker
-from colibri.autopilot.control.qp import QpSolver
-from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
-from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
-from colibri.autopilot.control.vehicle_model.mass import MassSettings
+from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
+from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked
 from colibri.autopilot.control.whole_lpv_mpc import planning
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
@@ -33,10 +30,10 @@ from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, Weig
 from colibri.autopilot.control.whole_lpv_mpc.path import PathSettings
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
 from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder, Wanted
-from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
+from colibri.common.config import Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import opened, packed
-from colibri.common.matrices import dot, matvec, norm
+from colibri.common.matrices import dot
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -66,28 +63,20 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Part of the weight."""
 
 
-class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What flies when no plan can be had."""
 
-    shifted_samples: Count
     poles: tuple[Negative, Negative]
-    turn_1_s: Positive
-    rate_1_s: Positive
-    max_rate_rad_s: Positive
 
 
-class WholeLpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class WholeLpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The control law."""
 
-    control_interval_s: ControlInterval
     guidance: GuidanceSettings
-    observer: ObserverSettings
-    mass: MassSettings
     plan: PlanSettings
     path: PathSettings
     weights: WeightSettings
     fallback: FallbackSettings
-    qp: QpSettings
 
 
 class Memory(NamedTuple):
@@ -130,15 +119,12 @@ class WholeLpvMpc(TrackingLaw[Memory]):
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(table, WholeLpvMpcSettings)
-        self._interval_s = h = settings.control_interval_s
-        self.control_interval_us = interval_us(h)
-        self.tracker = VehicleTracker(vehicle, settings.observer, settings.mass, h)
-        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
-        self._mpc = WholeMpc(settings.plan, settings.weights, vehicle, solver, h, clock)
+        super().__init__(settings, settings.fallback, vehicle)
+        h = self._interval_s
+        self._mpc = WholeMpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock)
         self.min_path_speed = settings.path.min_speed
         samples = self._mpc.horizon + 2
         self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
-        self._fallback = settings.fallback
         self._span_n = float(self.tracker.allocation[0].sum())
         self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
         k1_s2, k2_s = gains(settings.guidance.poles)
@@ -164,9 +150,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
         self._model_kg = self._mpc.model["airframe"]["mass_kg"]
-        self._turn = recovery.TurnGains(
-            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
-        )
 
     def warm_up(self) -> None:
         """Load what is compiled."""
@@ -279,15 +262,8 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def _recover(
         self, inputs: Inputs, force: Array, diagnostics: Diagnostics
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
-        direction = matvec(inputs.observed.rotation.T, force / norm(force))
-        rates = inputs.observed.rigid[10:]
-        moments = recovery.turning_moment(direction, rates, self.tracker.inertia, self._turn)
-        thrust_n = max(dot(force, inputs.observed.rotation[:, 2].copy()), 0.0)
-        from_wrench, (least, most) = self._mpc.from_wrench, self._arrays.limits[0].tolist()
-        squared = recovery.mix_with_priority(
-            thrust_n, moments, from_wrench[:, 0].copy(), from_wrench[:, 1:].copy(), least, most
-        )
+        least, most = self._arrays.limits[0].tolist()
+        squared = self.recovered(force, inputs.observed, self._mpc.from_wrench, least, most)
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
 
 

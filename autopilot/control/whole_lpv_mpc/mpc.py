@@ -8,6 +8,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
 from colibri.autopilot.control.parts.riccati import lqr
+from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
@@ -21,8 +22,6 @@ from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
-
-_MAX_SLACK = 100.0
 
 
 class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -157,8 +156,8 @@ class WholeMpc:
                         np.array(settings.max_rate_rad_s),
                     ),
                     shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),
-                    _empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
-                    _empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
+                    empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
+                    empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
                 )
             )
             for each, inputs in ((on_track, ROTORS), (on_track, ROTORS + 1), (on_hold, ROTORS))
@@ -289,13 +288,3 @@ def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
 def _opened(kind: Kind) -> _Qps:
     record = packed(kind)
     return _Qps(record, opened(record["qp"], Qp), opened(record["limited"], Qp))
-
-
-def _empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:
-    """Return a QP in `moved` variables and the slacks, with all that stays the same in it."""
-    n = moved + slacks
-    H, f = np.zeros((n, n)), np.zeros(n)
-    H[moved:, moved:] = slack_weight * np.eye(slacks)
-    f[moved:] = slack_weight
-    lower, upper = np.zeros(n), np.full(n, _MAX_SLACK)
-    return Qp(H, f, np.zeros((rows, n)), np.zeros(rows), lower, upper)

@@ -5,15 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import squared_speeds_from
 from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priority, turning_moment
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.strategies import quaternions, reals, vectors
 
 VEHICLE = load_vehicle("hummingbird")
-FROM_THRUST, FROM_MOMENTS = squared_speeds_from(VEHICLE)
+FROM_WRENCH = exact_inverse(VEHICLE.allocation()) / VEHICLE.rotors.max_speed**2
+FROM_THRUST, FROM_MOMENTS = FROM_WRENCH[:, 0].copy(), FROM_WRENCH[:, 1:].copy()
 ALLOCATION = VEHICLE.allocation() * VEHICLE.rotors.max_speed**2
 MIN_SQUARED, MAX_SQUARED = 0.01, 1.0
 INERTIA = np.array(VEHICLE.body.inertia_kg_m2)

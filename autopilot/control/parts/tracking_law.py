@@ -1,0 +1,89 @@
+"""What the control laws that plan with a model of the vehicle have in common: settings, memory, warm-up, recovery."""
+
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.parts.recovery import RecoverySettings, TurnGains, mix_with_priority, turning_moment
+from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, VehicleTracker
+from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
+from colibri.autopilot.control.vehicle_model.mass import MassSettings
+from colibri.common.config import Table
+from colibri.common.matrices import dot, matvec, norm
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_LEVEL, _UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class TrackingSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The control law."""
+
+    control_interval_s: ControlInterval
+    observer: ObserverSettings
+    mass: MassSettings
+    qp: QpSettings
+
+
+class TrackingMemory(Protocol):
+    """What a law with a tracker carries from one control sample to the next, a named tuple."""
+
+    @property
+    def tracked(self) -> Tracked:
+        """What is remembered of the vehicle."""
+
+    def _replace(self, *, tracked: Tracked) -> Self: ...
+
+
+Memory = TypeVar("Memory", bound=TrackingMemory)
+
+
+class TrackingLaw(AttitudeController[Memory]):
+    """What control laws that follow their vehicle by `tracker` have in common."""
+
+    def __init__(self, settings: TrackingSettings, fallback: RecoverySettings, vehicle: Vehicle) -> None:
+        self._interval_s = settings.control_interval_s
+        self.control_interval_us = interval_us(self._interval_s)
+        self.tracker = VehicleTracker(vehicle, settings.observer, settings.mass, self._interval_s)
+        self._fallback = fallback
+        self._turn = TurnGains(fallback.turn_1_s, fallback.rate_1_s, fallback.max_rate_rad_s)
+
+    def recovered(self, force: Array, observed: Observed, from_wrench: Array, least: float, most: float) -> Array:
+        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there.
+
+        Return squared rotor speeds between `least` and `most`, (4,); `from_wrench` maps U1..U4 to them, (4, 4).
+        """
+        direction = matvec(observed.rotation.T, force / norm(force))
+        moments = turning_moment(direction, observed.rigid[10:], self.tracker.inertia, self._turn)
+        thrust_n = max(dot(force, observed.rotation[:, 2].copy()), 0.0)
+        from_thrust, from_moments = from_wrench[:, 0].copy(), from_wrench[:, 1:].copy()
+        return mix_with_priority(thrust_n, moments, from_thrust, from_moments, least, most)
+
+    def warm_up(self) -> None:
+        """Load what is compiled: three steps from hover, the last of them upside down, and one for an attitude."""
+        n = self.preview.samples
+        still, level = np.zeros((n, 3)), np.zeros(n)
+        references = Horizon(still, still, still, still, still, level, level, level)
+        memory, hover = self.initial(self.tracker.vehicle.hover_speed), VehicleState(_ZERO, _ZERO, _LEVEL, _ZERO, _ZERO)
+        for attitude in (_LEVEL, _LEVEL, _UPSIDE_DOWN):
+            memory, _ = self.step(memory, 0, hover._replace(attitude=attitude), references)
+        self.step_attitude(memory, 0, hover, AttitudeDemand(still, still, level))
+
+    def charge_ah(self, memory: Memory) -> float:
+        """Return the charge taken from the battery, Ah."""
+        return memory.tracked.charge_ah
+
+    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
+        """Return the memory with another charge taken from the battery, Ah."""
+        return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
+
+    def mass_kg(self, memory: Memory) -> float:
+        """Return the mass that the vehicle moves like."""
+        return memory.tracked.mass_kg
+
+    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
+        """Return the memory with another mass."""
+        return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))
