@@ -80,10 +80,7 @@ class PilotRecord(NamedTuple):
 
 
 class Pilot:
-    """Flies tasks, one mode after another.
-
-    It has more methods than most classes: each is an event of the one state machine of mode, task and failsafe, and
-    parts of them would need the whole state.
+    """Flies tasks, one mode after another: each method is an event of the state machine of mode, task and failsafe.
 
     Attributes:
         lag_us: By how much path time lags behind the clock.
@@ -149,9 +146,8 @@ class Pilot:
     ) -> None:
         """Restore the state at the first frame after a restart; a vehicle that has come down meanwhile stays there.
 
-        Args:
-            again: Returns the task with which a mode goes on.
-            seamless: Whether the restart took no time: the reference goes on as recorded, else from the vehicle.
+        `again` returns the task with which a mode goes on. A `seamless` restart took no time: the reference goes on as
+        recorded, else from the vehicle.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
@@ -174,21 +170,11 @@ class Pilot:
         if not behaviour.land_on_three:
             self.readiness.trust_rotors()
 
-    def sense(
-        self,
-        now_us: int,
-        vehicle: VehicleState,
-        steered: Steered = NOT_STEERED,
-        *,
-        position_known: bool = True,
-        delay_us: int = 0,
-        waited_us: int = 0,
-        path_speed: float = 1.0,
-    ) -> None:
-        """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        self.lag_us += waited_us
-        self.generator.wait(waited_us * 1e-6, path_speed)
-        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, waited_us, path_speed)
+    def sense(self, sensed: Sensed) -> None:
+        """Take in the inputs of a control sample."""
+        self.lag_us += sensed.waited_us
+        self.generator.wait(sensed.waited_us * 1e-6, sensed.path_speed)
+        self.sensed = sensed
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""

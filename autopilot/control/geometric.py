@@ -122,11 +122,7 @@ class GeometricController:
 def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
     """Return the attitude whose z axis lies along `force` and whose heading is `yaw_rad`, and how fast it turns.
 
-    Args:
-        force: Specific force, m/s², ENU, (3,).
-        force_rate: Its derivative, m/s³, (3,).
-        yaw_rad: Heading wanted, from east.
-        yaw_rate_rad_s: Its derivative.
+    `force` is a specific force, m/s², ENU, (3,), and `force_rate` its derivative, m/s³.
     """
     heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])

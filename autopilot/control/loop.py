@@ -1,5 +1,7 @@
 """The control loop: the state from frames, one control law, and the rotor command between its samples."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,13 +69,7 @@ class ControlLoop:
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
-        """Load the control law, or make it by `law`; `clock` measures only.
-
-        Raises:
-            ControllerError: The profile's control law cannot be used.
-            ProfileError: Its table is wrong.
-            SolverError: Its solver cannot be used.
-        """
+        """Build the control law as `build_controller` does, with its errors; `clock` measures only."""
         self._name = profile.controller
         self._controller = build_controller(profile, vehicle, clock, law)
         if isinstance(self._controller, CompiledController):
@@ -184,14 +180,10 @@ class ControlLoop:
         Raises:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
-        try:
+        with self._guarded(time_us):
             if self._waiting is not None and pace is not Pace.CLOCK:
                 return self._decide_on_path(self._waiting, time_us, state, references, pace)
             return self._take(time_us, self._controller.step(self._memory, time_us, state, references))
-        except DecisionError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._raised(time_us, error) from error
 
     def _decide_on_path(
         self, law: PathController[Any], time_us: int, state: VehicleState, references: Horizon, pace: Pace
@@ -210,12 +202,8 @@ class ControlLoop:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
         assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
-        try:
+        with self._guarded(time_us):
             return self._take(time_us, self._controller.step_attitude(self._memory, time_us, state, demand))
-        except DecisionError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
@@ -240,8 +228,15 @@ class ControlLoop:
         self._command(decision.rotor_speeds, time_us)
         return decision
 
-    def _raised(self, time_us: int, error: BaseException) -> LawError:
-        return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
+    @contextmanager
+    def _guarded(self, time_us: int) -> Iterator[None]:
+        try:
+            yield
+        except DecisionError:
+            raise
+        except (Exception, SystemExit) as error:
+            text = f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}"
+            raise LawError(text) from error
 
     def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
         maximum = self.vehicle.rotors.max_speed
@@ -262,9 +257,7 @@ def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Fact
     """Return the control law of a profile for a vehicle; `law` makes it, or what is registered under its name.
 
     Raises:
-        ControllerError: It cannot be used.
-        ProfileError: Its table is wrong.
-        SolverError: Its solver cannot be used.
+        ControllerError, ProfileError, SolverError: The law, its table, or its solver cannot be used.
     """
     factory = law or load_controller(profile.controller)
     try:

@@ -85,11 +85,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return changed
 
     def with_choices(self, controller: str | None, solver: str | None, delay_s: float | None = None) -> "Profile":
-        """Return the profile with another control law, another QP solver in the table of that, and another delay.
-
-        Raises:
-            ProfileError: The control law has no QP to solve.
-        """
+        """Return the profile with another control law, delay, and QP solver; ProfileError if the law solves no QP."""
         told_s = self.delay_s if delay_s is None else delay_s
         chosen = msgspec.structs.replace(self, controller=controller or self.controller, delay_s=told_s)
         if solver is None:
@@ -121,11 +117,7 @@ def load_profile(given: str | Profile) -> Profile:
 
 
 def profile_text(name: str) -> str:
-    """Return the file of a profile that comes with Colibri.
-
-    Raises:
-        ProfileError: There is none of that name.
-    """
+    """Return the file of a profile that comes with Colibri; ProfileError if there is none of that name."""
     return named_text("profile", _FOLDER, name, ProfileError)
 
 
@@ -135,11 +127,7 @@ def profile_names() -> list[str]:
 
 
 def _check_frames(profile: Profile) -> None:
-    """Check that frames divide the control interval of the profile's own law; any other is given what divides its own.
-
-    Raises:
-        ProfileError: They do not.
-    """
+    """Raise a ProfileError unless frames divide the control interval of the profile's own law."""
     frame_s = profile.simulation.frame_interval_s
     control_s = profile.table(profile.controller).get("control_interval_s")
     if frame_s is None or not isinstance(control_s, float):

@@ -81,11 +81,7 @@ class QpSolver:
     """One QP solver, held to a tolerance."""
 
     def __init__(self, name: str, tolerance: float, max_iterations: int = MAX_ITERATIONS) -> None:
-        """Use solver `name`; those that work to a tolerance stop at `tolerance`, all at `max_iterations`.
-
-        Raises:
-            SolverError: There is no such solver, or it is not installed.
-        """
+        """Use solver `name`, see `check_solver`; it stops at `tolerance`, if it has one, or at `max_iterations`."""
         check_solver(name)
         from colibri.autopilot.control.qp_residual import residual  # compiled: who only reads a result does without
 
@@ -241,11 +237,7 @@ def installed_solvers() -> list[str]:
 
 
 def check_solver(name: str) -> None:
-    """Check that a solver can be used.
-
-    Raises:
-        SolverError: There is no such solver, or it is not installed.
-    """
+    """Raise a SolverError if there is no such solver, or it is not installed."""
     if name in (_DAQP, _CLARABEL):  # as numpy is, always
         return
     import qpsolvers

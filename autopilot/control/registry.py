@@ -53,11 +53,7 @@ def registered() -> EntryPoints:
 
 
 def load_controller(name: str) -> Factory:
-    """Return the factory registered as `name`.
-
-    Raises:
-        ControllerError: There is none, or its package cannot be loaded.
-    """
+    """Return the factory registered as `name`; ControllerError if there is none, or it cannot be loaded."""
     for entry in registered().select(name=name):
         try:
             factory: Factory = entry.load()
@@ -83,11 +79,7 @@ class Origin(NamedTuple):
 
 @cache
 def origin_of(name: str) -> Origin:
-    """Return where the control law registered as `name` comes from.
-
-    Raises:
-        ControllerError: There is none.
-    """
+    """Return where the control law registered as `name` comes from; ControllerError if there is none."""
     for entry in registered().select(name=name):
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
@@ -107,11 +99,7 @@ def _sha256(file: str | None) -> str:
 
 
 def check_controller(name: str, controller: object) -> None:
-    """Check what a control law promises before anything flies.
-
-    Raises:
-        ControllerError: It is not a control law.
-    """
+    """Raise a ControllerError if this is no control law."""
     if not isinstance(controller, Controller):
         raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
     interval_us = controller.control_interval_us
@@ -128,11 +116,7 @@ def in_words(error: BaseException) -> str:
 
 
 def check_answer(name: str, answer: object, time_us: int) -> None:
-    """Check that what a control law returned at the simulated time `time_us` is what it remembers, and a decision.
-
-    Raises:
-        DecisionError: It is something else.
-    """
+    """Raise a DecisionError unless a control law returned what it remembers, and a decision."""
     if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Decision):
         return
     raise DecisionError(
@@ -142,11 +126,7 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
 
 
 def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
-    """Return the rotor speeds of a decision, of the simulated time `time_us` if it is of a flight.
-
-    Raises:
-        DecisionError: Rotors cannot follow it.
-    """
+    """Return the rotor speeds of a decision, at `time_us` if in flight; DecisionError if rotors cannot follow them."""
     speeds = np.asarray(rotor_speeds).tolist()
     if isinstance(speeds, list) and len(speeds) == 4:
         a, b, c, d = speeds

@@ -19,20 +19,12 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """More count as a time-out."""
 
     def build(self) -> QpSolver:
-        """Return the solver.
-
-        Raises:
-            SolverError: It cannot be used.
-        """
+        """Return the solver; SolverError if it cannot be used."""
         return QpSolver(self.solver, self.tolerance, self.max_iterations)
 
 
 def interval_us(interval_s: float) -> int:
-    """Return an interval in whole microseconds.
-
-    Raises:
-        SettingsError: It is not whole milliseconds, as MAVLink counts them.
-    """
+    """Return an interval in µs; SettingsError unless it is whole milliseconds, as MAVLink counts them."""
     if not (interval_s * 1000.0).is_integer():
         raise SettingsError(f"control_interval_s: must be whole milliseconds, not {interval_s}")
     return round(interval_s * 1e6)

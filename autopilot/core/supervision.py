@@ -1,5 +1,6 @@
 """Supervision at each control sample: lost rotors, setpoints of clients, failsafes."""
 
+from colibri.autopilot.commander.pilot import Sensed
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.control.interface import VehicleState
@@ -33,15 +34,8 @@ class Supervision:
         guard(table.ROTOR_WATCH, lambda: self._watch_rotors(state), lambda: None)
         steered, position_known = guard(table.SETPOINTS, lambda: self._sensed(now_us), lambda: (NOT_STEERED, True))
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
-        parts.pilot.sense(
-            now_us,
-            state,
-            steered,
-            position_known=position_known,
-            delay_us=delay_us,
-            waited_us=parts.loop.take_waited_us(),
-            path_speed=parts.loop.path_speed,
-        )
+        waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
+        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed))
         guard(table.FAILSAFES, lambda: self._execute(now_us, state), lambda: None)
         self._missed_us = None
 

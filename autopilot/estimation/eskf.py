@@ -77,18 +77,13 @@ class FilterRecord(NamedTuple):
 class Filter:
     """State and covariance, at a time some way behind the vehicle's.
 
-    It has more attributes than most classes: the numbers of every sensor, and buffers that each fix uses again.
-
     Attributes:
         x: Nominal state, (23,).
         P: Covariance of its error, (22, 22).
-        position, velocity, height: What GPS measures.
-        magnetometer, barometer: What every vehicle has beside.
-        instruments: All that is fused as it comes, with these two.
+        instruments: All that is fused as it comes: magnetometer, barometer, and what else is fitted.
         kinds: Of all measurements, in the order of `table.KINDS`.
         field_gauss: Strength of the earth's field.
-        accel_bias_us: When the accelerometer's bias was last reset; None if never.
-        gyro_bias_us: When the gyroscope's was.
+        accel_bias_us, gyro_bias_us: When each bias was last reset; None if never.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
@@ -234,8 +229,7 @@ class Filter:
         update.inflate_covariance(P, POSITION, 3, moved_m * moved_m)
         update.inflate_covariance(P, VELOCITY, 3, self._fix_variances[0])
         update.inflate_covariance(P, ACCEL_BIAS, 3, _UNSURE_TIMES * found.variance)
-        self.velocity.resets += 1
-        self.velocity.accept(time_us)
+        self.velocity.reset(time_us)
         self.accel_bias_us = time_us
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
@@ -249,8 +243,7 @@ class Filter:
         speed_m_s = hypot(*self.velocity.test.innovation)
         update.inflate_covariance(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
         update.inflate_covariance(P, VELOCITY, 3, speed_m_s * speed_m_s)
-        self.velocity.resets += 1
-        self.velocity.accept(time_us)
+        self.velocity.reset(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
 

@@ -80,9 +80,6 @@ class EstimatorRecord(NamedTuple):
 class Estimator:
     """Estimates the state of one vehicle.
 
-    It has more attributes and methods than most classes: each part of the way from frame to estimate is one of them,
-    all made new by a restart.
-
     Attributes:
         filter: The filter, as far behind as GPS is.
         filter_us: Its time, µs.

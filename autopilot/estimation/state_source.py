@@ -18,11 +18,7 @@ NewEstimator: TypeAlias = Callable[[int], "Estimator"]
 
 
 def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> NewEstimator | None:
-    """Return the estimator of `vehicle`, whose ENU frame begins at `origin`; None where the simulator sends the state.
-
-    Raises:
-        VehicleError: The vehicle has no sensors.
-    """
+    """Return the estimator of `vehicle`, or a VehicleError without sensors; None if the simulator sends the state."""
     if feedback is Feedback.STATE:
         return None
     sensors = vehicle.sensors

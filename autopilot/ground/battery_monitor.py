@@ -7,7 +7,7 @@ from math import nan
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel, estimated
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, estimated
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.plant_status import PlantBattery
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState
@@ -54,7 +54,7 @@ class BatteryMonitor:
     def run(self, controls: FourRotors, duration_s: float) -> None:
         """Integrate `duration_s` with the rotors at `controls`, parts of the largest speed."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
-        self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
+        self.charge_ah = charged(self.charge_ah, current_a, duration_s)
         self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
 
     @property

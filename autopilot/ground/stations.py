@@ -96,9 +96,7 @@ class Guarding(Protocol):
 
 
 class Stations:
-    """Serves any number of ground stations.
-
-    It puts services together and decides nothing: its attributes are services and the parts that they serve.
+    """Serves any number of ground stations: services put together, and the parts that they serve.
 
     Attributes:
         hub: Where the links meet.

@@ -49,12 +49,9 @@ class Numbers:
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
-        """Return profile and vehicle with the values of the parameters in.
+        """Return profile and vehicle with the values of the parameters in; ImpossibleError if no such vehicle can be.
 
-        The vehicle is checked as its file would be; the control law's table is checked when the law is built from it.
-
-        Raises:
-            ImpossibleError: There is no such vehicle.
+        The control law's table is checked when the law is built from it.
         """
         profile, vehicle = self._profile, self._vehicle
         table = changed(self._table, self._law, values, self.defaults)

@@ -65,11 +65,7 @@ class Number(NamedTuple):
 
 
 def read(tree: Mapping[str, Any], path: Path) -> Any:
-    """Return what lies at `path`.
-
-    Raises:
-        KeyError: Nothing does.
-    """
+    """Return what lies at `path`; KeyError if nothing does."""
     here: Any = tree
     for key in path:
         try:

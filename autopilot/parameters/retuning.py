@@ -103,11 +103,7 @@ class Tuning:
         return Prepared(tuned)
 
     def tuned(self, values: Mapping[str, Value]) -> Tuned:
-        """Return law and vehicle for these values, all that is built from them tried.
-
-        Raises:
-            Exception: What anything of it raises.
-        """
+        """Return law and vehicle for these values, all that is built from them tried; raise what any of it raises."""
         profile, vehicle = self._numbers.applied(values)
         controller = self._build(profile, vehicle)
         _try(profile.controller, controller, vehicle)
@@ -117,11 +113,7 @@ class Tuning:
         return Tuned(profile, vehicle, controller)
 
     def try_all(self, values: Mapping[str, Value]) -> None:
-        """Try all that is built from these values, as the first that are flown.
-
-        Raises:
-            ImpossibleError: It cannot be built, or flown.
-        """
+        """Try all that is built from these values, as the first that are flown; ImpossibleError if it cannot be."""
         try:
             self._try_values(values)
             self.tuned(values)
@@ -134,11 +126,7 @@ class Tuning:
 
 
 def builder(controller: str, clock: Clock) -> Build:
-    """Return what builds a control law again and again: to find it among what is installed takes longer than that.
-
-    Raises:
-        ControllerError: There is none of that name.
-    """
+    """Return what builds a control law again and again, found once among what is installed, or a ControllerError."""
     factory = load_controller(controller)
 
     def build(profile: Profile, vehicle: Vehicle) -> Controller[Any]:

@@ -10,7 +10,7 @@ from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_tasks import ModeTasks
-from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.pilot import Pilot, Sensed
 from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -115,7 +115,7 @@ class Cockpit:
         """Fly on; return the last guidance."""
         for _ in range(samples):
             self.now_us += PREVIEW.interval_us
-            self.pilot.sense(self.now_us, self.state, self.steered, position_known=position_known)
+            self.pilot.sense(Sensed(self.now_us, self.state, self.steered, position_known))
             self.guidance = self.pilot.step()
             if self.guidance is not RESTS and self.pilot.generator.reference is not None:
                 motion, heading = self.pilot.generator.reference

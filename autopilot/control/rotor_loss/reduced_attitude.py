@@ -97,14 +97,9 @@ class ReducedAttitude:
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
     ) -> None:
-        """Find the gains for a vehicle without rotor `lost`, 0..3: takes some ms.
+        """Find the gains for a vehicle without rotor `lost`, 0..3, in some ms; ThreeRotorsError if there are none.
 
-        Args:
-            follows: Part of the way to its command that a force goes in one sample.
-            spin_rad_s: The final spin, positive.
-
-        Raises:
-            ThreeRotorsError: There is no such law.
+        `follows` is the part of the way to its command that a force goes in a sample; `spin_rad_s` > 0 the final spin.
         """
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
@@ -123,10 +118,7 @@ class ReducedAttitude:
     def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:
         """Return the commands of d and f_o, N, before any limit.
 
-        Args:
-            direction: Where the mean thrust is to point, in the body's frame, (3,), of length 1.
-            rate: p, q, r, rad/s, (3,).
-            forces: d and f_o now, N, (2,).
+        The mean thrust is to point along `direction`, FLU, of length 1; `forces` are d and f_o now, N, (2,).
         """
         spin = float(rate[2]) * self.trio.sign
         solution = self.solution(spin)
@@ -200,11 +192,7 @@ class ReducedAttitude:
 
 
 def trio_without(vehicle: Vehicle, lost: int) -> Trio:
-    """Return what is left without rotor `lost`: the one of its hand is opposite to it.
-
-    Raises:
-        ThreeRotorsError: The rotors do not turn in two pairs.
-    """
+    """Return the rotors left without `lost`; ThreeRotorsError if they do not turn in two pairs."""
     torque = vehicle.allocation()[3]
     same = [i for i in range(4) if torque[i] * torque[lost] > 0.0]
     others = [i for i in range(4) if i not in same]

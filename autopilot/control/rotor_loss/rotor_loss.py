@@ -23,11 +23,7 @@ Laws: TypeAlias = tuple[ReducedAttitude, ...]
 
 @lru_cache(maxsize=4)
 def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
-    """Return the laws of a vehicle; what a trial has built is what is flown.
-
-    Raises:
-        ThreeRotorsError: There are none.
-    """
+    """Return the laws of a vehicle, each built once; ThreeRotorsError if there are none."""
     return tuple(law_without(vehicle, lost, interval_s) for lost in range(4))
 
 

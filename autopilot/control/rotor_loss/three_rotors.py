@@ -46,8 +46,6 @@ _STAYS_M_S, _STAYS_S = 0.2, 1.5
 class ThreeRotors:
     """Flies one vehicle that has lost a rotor, until the ground holds it.
 
-    It has more attributes than most classes: the vehicle's numbers, and the state of observer, descent and contact.
-
     Attributes:
         controls: Rotor commands, parts of the largest speed.
         landed: Whether the ground holds it.
@@ -62,12 +60,7 @@ class ThreeRotors:
         state: VehicleState,
         ground_m: float,
     ) -> None:
-        """Take over in flight, and land where the vehicle can stop.
-
-        Args:
-            speeds: Of the rotors now, parts of the largest, (4,).
-            ground_m: Height of the ground, z of ENU, as far as it is known.
-        """
+        """`speeds` are the rotors' now, parts of the largest, (4,); `ground_m` the height of the ground, z of ENU."""
         self._vehicle, self._interval_s = vehicle, interval_s
         self._lag = rotor_lag(vehicle, interval_s)
         self.law = law
@@ -172,11 +165,7 @@ class ThreeRotors:
 
 
 def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
-    """Return the law of the attitude of a vehicle that has lost rotor `lost`, 0..3: some ms.
-
-    Raises:
-        ThreeRotorsError: There is none.
-    """
+    """Return the law for a vehicle without rotor `lost`, 0..3, in some ms; ThreeRotorsError if there is none."""
     measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
     follows = rotor_lag(vehicle, interval_s).planned
     return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Weights())

@@ -52,14 +52,8 @@ class AttitudeMpc:
     ) -> Solution:
         """Decide the increments of U2, U3, U4 (N m) to apply until the next step.
 
-        The increments are bounded by what the rotors could do at all: from full moment to full moment.
-
-        Args:
-            euler: phi, theta, psi, rad.
-            rate: Body rates p, q, r in FLU, rad/s.
-            moment_n_m: The last U2, U3, U4, N m, (3,).
-            rotor_momentum_n_m_s: h of the rotor speeds last commanded.
-            reference: phi, theta, psi wanted, rad; constant along the horizon.
+        The increments are bounded by what the rotors could do at all: from full moment to full moment. Angles are phi,
+        theta, psi, the reference's constant along the horizon; the momentum is h of the rotor speeds last commanded.
         """
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)

@@ -51,11 +51,7 @@ def global_model(
 
     State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2..U4 in N m.
     Thrust enters the position through B alone, at the present tilt; gravity is divided by the last thrust to fit in.
-
-    Args:
-        attitude: A and B of `attitude_model`.
-        euler: phi, theta, psi, rad.
-        thrust_n: The last U1, above zero, N.
+    `attitude` are A and B of `attitude_model`, `thrust_n` is the last U1, above zero.
     """
     phi, theta, psi = euler
     A, B = np.zeros((12, 12)), np.zeros((12, 4))

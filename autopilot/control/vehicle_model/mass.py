@@ -68,13 +68,8 @@ def mass_model(settings: MassSettings, vehicle: Vehicle, interval_s: float) -> M
 def follow_mass(mass_kg: float, disturbance_m_s2: Array, up: Array, thrust_n: float, packed: Packed) -> float:
     """Return the mass, kg, a sample later; to be asked only of a vehicle on which nothing but air and rotors acts.
 
-    Args:
-        mass_kg: Now.
-        disturbance_m_s2: Acceleration that the model with this mass does not explain, ENU, (3,); what it would not with
-            the mass returned is written back.
-        up: Body z axis, ENU, (3,).
-        thrust_n: Of the rotors, N.
-        packed: The `MassModel`.
+    `disturbance_m_s2` is the acceleration that the model with this mass does not explain, ENU, (3,); what it would not
+    with the mass returned is written back. `up` is the body z axis, ENU, (3,), `packed` the `MassModel`.
     """
     model = packed[0]
     before, specific = model.nominal_kg / mass_kg, 1.0

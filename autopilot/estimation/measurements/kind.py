@@ -72,9 +72,13 @@ class Kind:
         first, count, sigma = self._inflated
         update.inflate_covariance(P, first, count, sigma * sigma)
         kernel(x, P, *arguments, inf, self._y)
+        self.reset(time_us)
+        return True
+
+    def reset(self, time_us: int) -> None:
+        """Note that what it measures was reset to it."""
         self.resets += 1
         self.accept(time_us)
-        return True
 
     def accept(self, time_us: int) -> None:
         """Note that a measurement was accepted."""

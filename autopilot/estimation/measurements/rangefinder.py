@@ -75,8 +75,7 @@ class RangefinderBelow(Instrument):
             return None
         if self.kind.reject(time_us):
             self.ground_m -= float(self._y[0])
-            self.kind.resets += 1
-            self.kind.accept(time_us)
+            self.kind.reset(time_us)
         return Reason.INNOVATION
 
     def typical(self) -> Value:

@@ -43,11 +43,7 @@ class CsvTable:
         return np.stack([self.values[column] for column in columns], axis=1)
 
     def times(self, min_step_s: float) -> Array:
-        """Return column t, s, from 0 on, each at least `min_step_s` after the one before, but for rounding.
-
-        Raises:
-            TrackFileError: It is not that.
-        """
+        """Return column t, s, from 0 on, each at least `min_step_s` after the one before, or raise a TrackFileError."""
         times_s = self.values["t"]
         if times_s[0] != 0.0:
             raise self.error(0, "t", f"the first time must be 0, not {times_s[0]:g}")
@@ -57,11 +53,7 @@ class CsvTable:
         return times_s
 
     def check_duration(self, column: str, times_s: Array) -> None:
-        """Check that no row is reached too late.
-
-        Raises:
-            TrackFileError: One is; it is said of `column`.
-        """
+        """Raise a TrackFileError, said of `column`, if a row is reached too late."""
         for row in np.flatnonzero(times_s > MAX_DURATION_S)[:1]:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 

@@ -80,11 +80,7 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
 
 
 def check_heights(waypoints: Waypoints, floor_m: float) -> None:
-    """Check that no waypoint is below the floor.
-
-    Raises:
-        TrackFileError: One is.
-    """
+    """Raise a TrackFileError if a waypoint is below the floor."""
     for row in np.flatnonzero(waypoints.points_enu_m[:, 2] < floor_m - ROUNDING_M)[:1]:
         height_m = waypoints.points_enu_m[row, 2]
         raise waypoints.error(f"waypoint {row + 1} is at {height_m:g} m, below the floor of {floor_m:g} m")
@@ -129,11 +125,7 @@ def _widened(excess: Array, neighbours: int) -> Array:
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track held above the floor, and where it would have been below.
-
-    Raises:
-        TrackFileError: None is found.
-    """
+    """Return the track held above the floor, and where it would have been below; TrackFileError if none is found."""
     track = through(waypoints)
     dips = found = _dips(track, waypoints, floor_m)
     heights = np.empty((0, 2))

@@ -56,11 +56,7 @@ def load_track(
 def track_through(
     waypoints: Waypoints, vehicle: Vehicle, profile: Profile, floor_m: float | None = None
 ) -> LoadedTrack:
-    """Return the track through waypoints as `vehicle` will fly it under `profile`; as `load_track` does.
-
-    Raises:
-        TrackError: They cannot be flown.
-    """
+    """Return the track through waypoints as `load_track` does; TrackError if they cannot be flown."""
     reach = Reach(vehicle, profile, exact_drag=waypoints.fastest)
     try:
         fitted, changed = (fastest if waypoints.fastest else fit)(waypoints, reach, _floor(vehicle, floor_m))
@@ -74,11 +70,7 @@ def _floor(vehicle: Vehicle, floor_m: float | None) -> float:
 
 
 def file_text(name: str) -> str | None:
-    """Return what is in the file that the track of a name goes through; None if it goes through none.
-
-    Raises:
-        TrackError: The file cannot be read.
-    """
+    """Return the file that the track of a name goes through, None if none; TrackError if it cannot be read."""
     path = _file(name)
     if path is None:
         return None

@@ -69,9 +69,7 @@ def minimal_knots(elements: Array, points: Array) -> Array:
 def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
     """Return the polynomials of least degree that have these derivatives at these times: Hermite's interpolation.
 
-    Args:
-        times_s: s, strictly increasing, (n,), n >= 2.
-        knots: Derivatives there, that of order 0 first, (n, order, axes).
+    `times_s` strictly increase, (n,), n >= 2; `knots` are the derivatives, order 0 first, (n, order, axes).
     """
     _, order, axes = knots.shape
     durations = np.diff(times_s)

@@ -76,11 +76,7 @@ def _load_installed(name: str) -> Any:
 
 
 def _tried(name: str, options: TrackOptions) -> Track:
-    """Return the track of another package, if it gives three coordinates at the start.
-
-    Raises:
-        TrackError: It does not.
-    """
+    """Return the track of another package; TrackError unless it gives three coordinates at the start."""
     try:
         given = options.track()
         found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))

@@ -117,11 +117,7 @@ class TrackOptions(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     lone: ClassVar[str | None] = None
 
     def track(self) -> Track:
-        """Return the track with these options.
-
-        Raises:
-            TrackFileError: Its file cannot be flown.
-        """
+        """Return the track with these options; TrackFileError if its file cannot be flown."""
         raise NotImplementedError
 
 
@@ -241,10 +237,8 @@ OPTIONS: dict[str, type[TrackOptions]] = {
 def through(waypoints: Waypoints, heights: Array | None = None, between: Array | None = None) -> Track:
     """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw.
 
-    Args:
-        waypoints: What it passes, and when.
-        heights: Times, s, and heights, m, that its height passes besides, (n, 2), n >= 1; None for no others.
-        between: Times, s, and points, m, ENU, that it passes besides, (n, 4); None for no others.
+    Besides, its height passes `heights`, (n, 2), n >= 1, times, s, and heights, m; and the track passes `between`,
+    (n, 4), times, s, and points, m, ENU.
     """
     from colibri.autopilot.guidance.trajectories.minimum_snap import (
         ACCELERATION,

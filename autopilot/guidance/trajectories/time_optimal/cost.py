@@ -41,12 +41,9 @@ class FlightCost:
     """
 
     def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
-        """Set the problem.
+        """`given` are the waypoints, (legs + 1, 3), m, ENU, each leg cut into `pieces` of equal durations.
 
-        Args:
-            given: The waypoints, (legs + 1, 3), m, ENU.
-            pieces: Into which each leg is cut, of equal durations.
-            margin: Part of each range that is left to the control law.
+        The part `margin` of each range is left to the control law.
         """
         self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
         self._reach, self._given, self._pieces = reach, given, pieces
