@@ -8,12 +8,7 @@ from colibri.autopilot.commander.motion_commands import MotionCommands, Needs, d
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
-from colibri.mavlink.services.command import (
-    FAILED,
-    UNSUPPORTED,
-    Command,
-    Handler,
-)
+from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Command, Handler
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 

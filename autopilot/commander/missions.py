@@ -213,15 +213,15 @@ class MissionTask:
         return self._done
 
 
-def task_of(order: Order, context: TaskContext) -> FlightTask:
-    """Return how an order is flown."""
+def task_of(order: Order, context: TaskContext, takeoff_speed_m_s: float | None = None) -> FlightTask:
+    """Return how an order is flown; a take-off at `takeoff_speed_m_s`, or None: at the speed of climbs."""
     match order:
         case GoTo():
             return GoToTask(order, context)
         case Circle():
             return OrbitTask(order, context)
         case TakeOff():
-            return TakeoffTask(order.height_enu_m, order.yaw_rad, context)
+            return TakeoffTask(order.height_enu_m, order.yaw_rad, context, takeoff_speed_m_s)
         case Land():
             return landing(order)
         case Return():

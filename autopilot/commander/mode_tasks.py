@@ -1,9 +1,9 @@
 """How each mode begins to be flown, and how it goes on after the autopilot was killed in it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.commander.missions import Missions, MissionTask
+from colibri.autopilot.commander.missions import Missions, MissionTask, task_of
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.profile import References
@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask,
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, OrderRecord, TakeOff, order_of, record_of
+from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, Order, OrderRecord, TakeOff, order_of, record_of
 from colibri.autopilot.guidance.tasks.position import (
     GoToTask,
     HoldTask,
@@ -54,6 +54,12 @@ class TaskRecord(NamedTuple):
 
 _ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask)
 """Tasks that begin again with an order."""
+_AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
+    Mode.HOLD: (GoTo, TakeOff),  # a take-off that has arrived settles in hold
+    Mode.TAKEOFF: (TakeOff,),
+    Mode.ORBIT: (Circle,),
+}
+"""Orders that a mode may have flown."""
 
 
 def task_record(task: FlightTask) -> TaskRecord:
@@ -137,7 +143,6 @@ class ModeTasks:
         return task.skip(record.legs) if isinstance(task, TaskSequence) else task
 
     def _down(self, context: TaskContext) -> FlightTask:
-        """Return how to land: level without a position, or where it is if the law takes no attitude."""
         if context.blind and self._attitude is not None:
             return DescentTask(self._attitude, self._gravity_m_s2)
         return landing(Land())
@@ -162,15 +167,10 @@ def climb(context: TaskContext) -> FlightTask:
 
 
 def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask | None:
-    """Return the task of an order that was flown in a mode; None where the mode alone determines the task."""
     order = None if record.order is None else order_of(record.order)
-    if mode is Mode.HOLD and isinstance(order, GoTo):
-        return GoToTask(order, context)
-    if mode in (Mode.TAKEOFF, Mode.HOLD) and isinstance(order, TakeOff):  # one that has arrived settles in hold
-        return TakeoffTask(order.height_enu_m, order.yaw_rad, context, context.behaviour.takeoff_speed_m_s)
-    if mode is Mode.ORBIT and isinstance(order, Circle):
-        return OrbitTask(order, context)
-    return None
+    if order is None or not isinstance(order, _AGAIN.get(mode, ())):
+        return None
+    return task_of(order, context, context.behaviour.takeoff_speed_m_s)
 
 
 def _at_start(planner: Planner, now_us: int) -> Reference:

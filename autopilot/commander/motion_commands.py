@@ -15,11 +15,7 @@ from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import (
-    TEMPORARILY_REJECTED,
-    Command,
-    Handler,
-)
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, Command, Handler
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 

@@ -311,7 +311,6 @@ class Pilot:
         return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
 
     def _rest(self) -> Guidance:
-        """Lie, or fall, with the rotors standing still or idle."""
         now_us, vehicle, *_ = self.sensed
         assert vehicle is not None, "the vehicle has been seen"
         self.generator.rest(vehicle)
@@ -326,7 +325,6 @@ class Pilot:
         return RESTS
 
     def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
-        """Stop the rotors, and forget what was requested for this flight alone."""
         refusal = self._follow(event, text)
         if refusal is None:
             self.speed_m_s = None

@@ -10,6 +10,8 @@ from enum import Enum, StrEnum
 from math import nan
 from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
+import numpy as np
+
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.types import Array, Quaternion, Vector
 
@@ -82,6 +84,17 @@ class VehicleState(NamedTuple):
     euler: Vector
     rate_flu_rad_s: Vector
     airborne: bool = True
+
+
+_ZERO = (0.0, 0.0, 0.0)
+AT_REST = VehicleState(_ZERO, _ZERO, (1.0, 0.0, 0.0, 0.0), _ZERO, _ZERO)
+"""A vehicle that hovers at the origin, level, heading east."""
+
+
+def still_horizon(samples: int) -> Horizon:
+    """Return references that stay where `AT_REST` is."""
+    vectors, scalars = np.zeros((samples, 3)), np.zeros(samples)
+    return Horizon(vectors, vectors, vectors, vectors, vectors, scalars, scalars, scalars)
 
 
 class Fallback(StrEnum):

@@ -201,7 +201,6 @@ class _Qpsolvers:
 
 
 def _iterations(extras: Mapping[str, Any]) -> float:
-    """Return the iterations out of what a solver says beside its solution; nan if it does not say."""
     if "iterations" in extras:  # quadprog's: of constraints added, and of constraints dropped
         return float(sum(extras["iterations"]))
     return float(getattr(extras.get("info"), "iter", extras.get("iter", nan)))
@@ -266,7 +265,6 @@ def _filled(role: str, matrix: Array) -> "csc_matrix":
 
 @lru_cache(maxsize=_PATTERNS)
 def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> "csc_matrix":
-    """Return a matrix of ones where the bytes of its transpose are."""
     from scipy.sparse import csc_matrix
 
     del role  # two matrices of one pattern are two matrices

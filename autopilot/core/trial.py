@@ -5,7 +5,7 @@ from math import isfinite
 import numpy as np
 
 from colibri.autopilot.commander.rules.failsafe_parameters import settings
-from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.control.interface import AT_REST
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.actuation import controls_of
@@ -18,8 +18,6 @@ from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.parameters.definitions import behaviour
 from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import Vehicle
-
-_HOVER = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class TrialError(AutopilotError):
@@ -41,7 +39,7 @@ class Trial:
         """
         loop, interval_s = self._loop, self._loop.control_interval_us * 1e-6
         self._rotor_loss.try_out(vehicle)
-        controls_of(PlainLaw(vehicle, interval_s).by_velocity(_HOVER, np.zeros(3)), vehicle.rotors.max_speed)
+        controls_of(PlainLaw(vehicle, interval_s).by_velocity(AT_REST, np.zeros(3)), vehicle.rotors.max_speed)
         Forecaster(vehicle, interval_s, loop.plan_columns)
         if loop.takes_attitude:
             attitude = AttitudeReference(vehicle, loop.preview)
@@ -58,7 +56,7 @@ class Trial:
         flies_by = behaviour(parameters)
         preview = self._planned_at.preview
         ahead = still_target((1.0, 1.0, 1.0), 1.0, preview.samples)
-        horizon, reference = lead(at_rest(_HOVER), ahead, flies_by.limits, preview.interval_us * 1e-6)
+        horizon, reference = lead(at_rest(AT_REST), ahead, flies_by.limits, preview.interval_us * 1e-6)
         if not all(np.isfinite(column).all() for column in (*horizon, *reference)):
             raise TrialError("no reference can be led within these limits")
         if self._loop.takes_attitude:

@@ -167,9 +167,8 @@ class Filter:
             P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
 
     def _rest(self, aligned: Aligned) -> None:
-        x, P, sensors = self.x, self.P, self._sensors
-        force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _MIN_NOISE)) / aligned.duration_s
-        rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _MIN_NOISE)) / aligned.duration_s
+        x, P, noise = self.x, self.P, self._noise
+        force, rate = noise.force / aligned.duration_s, noise.rate / aligned.duration_s
         field, y = self.magnetometer.variance / aligned.fields, np.zeros(6)
         mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
         update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)

@@ -259,7 +259,6 @@ class Estimator:
         return True
 
     def _field_and_height(self, values: list[Value | None] | None) -> tuple[Vector | None, float | None]:
-        """Return magnetic field and height of the barometer, by which a vehicle is aligned."""
         if values is None:
             return None, None
         field, pressure, *_ = values

@@ -57,7 +57,6 @@ def _faded(vector: Vector, interval_s: float) -> Vector:
 
 
 def _beyond(vector: Vector, length: float) -> Vector:
-    """Return the part of a vector that is beyond a length."""
     x, y, z = vector
     norm = sqrt(x * x + y * y + z * z)
     if norm <= length:

@@ -32,10 +32,7 @@ from colibri.mavlink.parameters.metadata import Metadata, metadata_json
 from colibri.mavlink.parameters.pack import packed
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import (
-    CommandService,
-    Handler,
-)
+from colibri.mavlink.services.command import CommandService, Handler
 from colibri.mavlink.services.identity import IDENTITIES
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.shell import Shell

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
+from colibri.autopilot.control.interface import AT_REST, AttitudeDemand, Preview, VehicleState
 from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, AttitudeCommand, Slew, limit_tilt, slew_on
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
@@ -22,7 +22,6 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
 from colibri.plant.vehicle.description import Vehicle
 
 STICK_MIDDLE = 0.5
-_NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 class AttitudeLimits(NamedTuple):
@@ -85,8 +84,7 @@ class AttitudeReference:
         self._interval_s = preview.interval_us * 1e-6
         self._samples = preview.samples
         self.limits = limits
-        level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
-        self.step(self.initial(level), level, tilt_command(0.0, 0.0, 0.0, self.weight_n))
+        self.step(self.initial(AT_REST), AT_REST, tilt_command(0.0, 0.0, 0.0, self.weight_n))
 
     def obey(self, behaviour: Behaviour) -> None:
         """Adopt other limits."""

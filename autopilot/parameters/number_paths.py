@@ -149,7 +149,6 @@ def described(path: Path) -> str:
 
 
 def _without_unit(path: Path) -> tuple[Path, str]:
-    """Return a path whose last key does not end in its unit, and the unit."""
     place = max(place for place, key in enumerate(path) if isinstance(key, str))
     key = str(path[place])
     for ending, unit in _UNITS.items():

@@ -7,32 +7,26 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from colibri.autopilot.control.interface import (
+    AT_REST,
     AttitudeController,
     AttitudeDemand,
     Clock,
     Controller,
-    Horizon,
     Preview,
-    VehicleState,
+    still_horizon,
 )
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.control.registry import (
-    check_controller,
-    check_rotor_speeds,
-    in_words,
-    load_controller,
-)
+from colibri.autopilot.control.registry import check_controller, check_rotor_speeds, in_words, load_controller
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
 from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
-_NOTHING, _LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 _TRIED = (
-    VehicleState(_NOTHING, _NOTHING, _LEVEL, _NOTHING, _NOTHING),
-    VehicleState((1.0, 1.0, 1.0), _NOTHING, _LEVEL, _NOTHING, _NOTHING),
-    VehicleState(_NOTHING, (12.0, 0.0, -3.0), _LEVEL, _NOTHING, (1.0, -1.0, 1.0)),
-    VehicleState(_NOTHING, _NOTHING, (0.0, 1.0, 0.0, 0.0), (pi, 0.0, 0.0), _NOTHING),
+    AT_REST,
+    AT_REST._replace(position_enu_m=(1.0, 1.0, 1.0)),
+    AT_REST._replace(velocity_enu_m_s=(12.0, 0.0, -3.0), rate_flu_rad_s=(1.0, -1.0, 1.0)),
+    AT_REST._replace(attitude=(0.0, 1.0, 0.0, 0.0), euler=(pi, 0.0, 0.0)),
 )
 """Hover, a metre away, fast, upside down."""
 
@@ -143,8 +137,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
     """Fly two control samples of hover, the second one a metre away from the reference, and two far from hover."""
-    still, straight = np.zeros((controller.preview.samples, 3)), np.zeros(controller.preview.samples)
-    references = Horizon(still, still, still, still, still, straight, straight, straight)
+    references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):
         memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
@@ -152,5 +145,6 @@ def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
     if isinstance(controller, AttitudeController):
         thrust_n = np.full(controller.preview.samples, vehicle.body.mass_kg * vehicle.gravity_m_s2)
         time_us = len(_TRIED) * controller.control_interval_us
-        _, decision = controller.step_attitude(memory, time_us, _TRIED[0], AttitudeDemand(still, still, thrust_n))
+        level = AttitudeDemand(references.position_enu_m, references.velocity_enu_m_s, thrust_n)
+        _, decision = controller.step_attitude(memory, time_us, AT_REST, level)
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)

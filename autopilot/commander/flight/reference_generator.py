@@ -106,7 +106,6 @@ class ReferenceGenerator:
         return self._instants.for_law(horizon)
 
     def _lead_to(self, reference: Reference, wanted: Motion, *, waited: bool) -> Led:
-        """Return how a reference is led to a target: as in the sample before, once it stays there."""
         before, (target, limits, _) = self._led, wanted
         if before is not None and not waited and before.is_again(reference, target, limits):
             return before

@@ -129,7 +129,6 @@ def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, lis
 
 
 def _fitting(action: Action, flight: Flight) -> Action:
-    """Return what an action is for a vehicle on the ground: its rotors stop, or it is no more than a warning."""
     if action is Action.WARN or not flight.armed:
         return Action.WARN
     return Action.TERMINATE if flight.standing else action

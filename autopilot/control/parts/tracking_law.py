@@ -2,9 +2,7 @@
 
 from typing import Protocol, Self, TypeVar
 
-import numpy as np
-
-from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.interface import AT_REST, AttitudeController, AttitudeDemand, still_horizon
 from colibri.autopilot.control.parts.recovery import RecoverySettings, TurnGains, mix_with_priority, turning_moment
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, VehicleTracker
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
@@ -15,8 +13,7 @@ from colibri.common.matrices import dot, matvec, norm
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_LEVEL, _UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
-_ZERO = (0.0, 0.0, 0.0)
+_UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
 
 
 class TrackingSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -64,13 +61,11 @@ class TrackingLaw(AttitudeController[Memory]):
 
     def warm_up(self) -> None:
         """Load what is compiled: three steps from hover, the last of them upside down, and one for an attitude."""
-        n = self.preview.samples
-        still, level = np.zeros((n, 3)), np.zeros(n)
-        references = Horizon(still, still, still, still, still, level, level, level)
-        memory, hover = self.initial(self.tracker.vehicle.hover_speed), VehicleState(_ZERO, _ZERO, _LEVEL, _ZERO, _ZERO)
-        for attitude in (_LEVEL, _LEVEL, _UPSIDE_DOWN):
-            memory, _ = self.step(memory, 0, hover._replace(attitude=attitude), references)
-        self.step_attitude(memory, 0, hover, AttitudeDemand(still, still, level))
+        memory, references = self.initial(self.tracker.vehicle.hover_speed), still_horizon(self.preview.samples)
+        for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
+            memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)
+        level, _, _, _, _, no_thrust, _, _ = references
+        self.step_attitude(memory, 0, AT_REST, AttitudeDemand(level, level, no_thrust))
 
     def charge_ah(self, memory: Memory) -> float:
         """Return the charge taken from the battery, Ah."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.control.interface import AT_REST, VehicleState
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, terminal
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, rotor_lag
 from colibri.common.compiled_rotations import rotation_matrix
@@ -37,8 +37,6 @@ _NOISE_PART = 1.0 / 64.0
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 """Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
 it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
-
-_STILL = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Signature(NamedTuple):
@@ -123,7 +121,7 @@ class RotorWatch:
         self._kept = opened(self._memory, Memory)
         self.adopt(vehicle)
         controls = (0.0, 0.0, 0.0, 0.0)
-        self._take_in(_STILL, controls, 0.0, counts=True)
+        self._take_in(AT_REST, controls, 0.0, counts=True)
         self.begin(controls)
 
     @property

@@ -4,7 +4,7 @@ from functools import lru_cache
 from math import isfinite
 from typing import Protocol, TypeAlias
 
-from colibri.autopilot.control.interface import Decision, VehicleState
+from colibri.autopilot.control.interface import AT_REST, Decision, VehicleState
 from colibri.autopilot.control.rotor_loss.detector import RotorWatch
 from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, ThreeRotorsError
 from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors, law_without
@@ -13,7 +13,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 MAX_INTERVAL_S = 0.02
 """A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
-_HOVER = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _CLEAR_M = 0.3
 """Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
 
@@ -83,12 +82,12 @@ class RotorLoss:
         hover = vehicle.hover_speed / vehicle.rotors.max_speed
         controls = (hover, hover, hover, hover)
         for _ in range(2):
-            trial.look(_HOVER, controls, 0.0, airborne=True, ground_m=-1.0)
+            trial.look(AT_REST, controls, 0.0, airborne=True, ground_m=-1.0)
         if not isfinite(trial.watch.max_evidence):
             raise ThreeRotorsError("no rotor can be watched")
         for lost in () if trial.impossible else range(4):
-            trial.resume(lost, trial.watch.speeds, _HOVER, -1.0, flying=True)
-            if not all(0.0 <= control <= 1.0 for control in trial.decide(_HOVER, 0.0)[0]):
+            trial.resume(lost, trial.watch.speeds, AT_REST, -1.0, flying=True)
+            if not all(0.0 <= control <= 1.0 for control in trial.decide(AT_REST, 0.0)[0]):
                 raise ThreeRotorsError(f"no law flies it without rotor {lost + 1}")
 
     def obey(self, permission: Permission) -> None:

@@ -200,7 +200,6 @@ def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
 
 
 def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:
-    """Shorten the horizontal part of an acceleration, (3,), in place."""
     flat = hypot(acceleration[0], acceleration[1])
     if flat > max_acceleration_m_s2:
         acceleration[:2] *= max_acceleration_m_s2 / flat

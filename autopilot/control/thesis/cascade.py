@@ -86,7 +86,6 @@ class Cascade:
         return CascadeMemory(speeds, demand), Decision(speeds, reference, attitude.diagnostics)
 
     def _demand(self, state: VehicleState, references: Horizon) -> AttitudeAndThrust:
-        """Steer to the reference of the next outer sample."""
         x, y, z = references.position_enu_m[1].tolist()
         vx, vy, vz = references.velocity_enu_m_s[1].tolist()
         return self._position.step(

@@ -82,7 +82,6 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
 
 
 def _along(horizon: int, weights: Weights) -> Array:
-    """Return the diagonal of Q̄: Q at every step, S at the last."""
     return np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])
 
 

@@ -79,11 +79,6 @@ def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
     return 1.0 - pole * pole, square(1.0 - pole) / interval_s
 
 
-def first_estimate(measured: Array) -> Array:
-    """Return the estimate (12,) of an observer before its first step: no disturbance."""
-    return np.concatenate([measured[:6], np.zeros(6)])
-
-
 @compiled
 def observe(
     estimate: Array,

@@ -234,7 +234,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         return Memory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
-        """Return the lag a sample later, on a plan that is so old then."""
         if plan is None or plan.speeds is None:
             return lag_us
         passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])

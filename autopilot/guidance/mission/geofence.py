@@ -5,7 +5,7 @@ be inside all inclusion zones of a group, of at least one group (their parameter
 Zones reach from the ground to the sky. A circle of radius 0 is none: clients that must send some circle send that one.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import hypot, inf, isfinite, isnan
 from typing import NamedTuple, Protocol
 
@@ -49,16 +49,12 @@ def check_fence_item(item: MissionItem) -> int:
 
 def check_fence(items: Sequence[MissionItem]) -> int:
     """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, of one kind and group."""
-    at = 0
-    while at < len(items):
-        first = items[at]
-        length = int(first.p1) if first.command in POLYGONS else 1
-        vertices = items[at : at + length]
-        if len(vertices) < length or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
+    for vertices in _zones(items):
+        first = vertices[0]
+        if len(vertices) < _length(first) or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
             return int(mav.MAV_MISSION_INVALID_PARAM1)
         if first.command == POLYGONS[0] and any(_group(v) != _group(first) for v in vertices):
             return int(mav.MAV_MISSION_INVALID_PARAM2)
-        at += length
     return ACCEPTED
 
 
@@ -123,12 +119,8 @@ class Geofence:
         self.return_point_enu_m: tuple[float, float] | None = None
         self._groups: dict[float, list[Zone]] = {}
         self._exclusions: list[Zone] = []
-        at = 0
-        while at < len(items):
-            first = items[at]
-            length = int(first.p1) if first.command in POLYGONS else 1
-            self._add(first, [_place(item, origin) for item in items[at : at + length]])
-            at += length
+        for zone in _zones(items):
+            self._add(zone[0], [_place(item, origin) for item in zone])
 
     def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
         if item.command == RETURN_POINT:
@@ -189,6 +181,18 @@ class AroundHome(NamedTuple):
             if too_high
             else f"more than {self.max_distance_m:g} m from home"
         )
+
+
+def _zones(items: Sequence[MissionItem]) -> Iterator[Sequence[MissionItem]]:
+    at = 0
+    while at < len(items):
+        length = _length(items[at])
+        yield items[at : at + length]
+        at += length
+
+
+def _length(first: MissionItem) -> int:
+    return int(first.p1) if first.command in POLYGONS else 1
 
 
 def _group(item: MissionItem) -> float:

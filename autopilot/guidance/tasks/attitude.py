@@ -2,11 +2,7 @@
 
 import numpy as np
 
-from colibri.autopilot.guidance.attitude_reference import (
-    AttitudeReference,
-    ReferenceMemory,
-    tilt_command,
-)
+from colibri.autopilot.guidance.attitude_reference import AttitudeReference, ReferenceMemory, tilt_command
 from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import Kind, Reference, Target, lead, moving_with, still_target
@@ -14,7 +10,7 @@ from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
 from colibri.autopilot.guidance.tasks.sticks import stick_climb, without_play
 from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, Motion, TaskContext, lifts
 from colibri.common.kernels import cos
-from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
+from colibri.mavlink.setpoints.setpoints import Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
 """Thrust in parts of the weight from which on a vehicle takes off, and below which it must sink."""
@@ -35,10 +31,6 @@ class TiltLoop:
     def forget(self) -> None:
         """Reset at the next demand."""
         self._memory = None
-
-    def by_setpoint(self, setpoint: AttitudeSetpoint, context: TaskContext) -> AttitudeMotion:
-        """Return the motion by a companion's setpoint."""
-        return self.by_command(self._generator.from_setpoint(setpoint), context)
 
     def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
         """Return the motion by a command."""

@@ -64,12 +64,10 @@ class OrbitTask(EndlessTask):
         return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
 
     def _towards(self, wanted: float, context: TaskContext) -> float:
-        """Return the rate of now, rad/s: the wanted one, as soon as the vehicle can gain that speed."""
         maximum = _SHARE * context.behaviour.limits.acceleration_m_s2 * context.interval_s / self._radius_m
         return min(max(wanted, self._rate - maximum), self._rate + maximum)
 
     def _joins(self, context: TaskContext) -> bool:
-        """Whether the reference is on the circle, and not about to leave it but along it."""
         east, north, above = (p - c for p, c in zip(context.place, self.order.center_enu_m, strict=True))
         away = hypot(east, north)
         if abs(away - self._radius_m) > _ON_IT_M or abs(above) > _ON_IT_M:

@@ -12,14 +12,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from colibri.autopilot.guidance.trajectories.csv_table import MAX_DURATION_S
-from colibri.autopilot.guidance.trajectories.reach import (
-    INTERVAL_S,
-    Demand,
-    Reach,
-    exact_motion,
-    mean_motion,
-    times,
-)
+from colibri.autopilot.guidance.trajectories.reach import INTERVAL_S, Demand, Reach, exact_motion, mean_motion, times
 from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array

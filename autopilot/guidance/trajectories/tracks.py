@@ -266,7 +266,6 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
 
 
 def _in_time(rows: Array, others: Array | None) -> Array:
-    """Return both, in the order of their first column."""
     both = rows if others is None else np.concatenate([rows, others])
     return both[np.argsort(both[:, 0], kind="stable")]
 

@@ -108,5 +108,4 @@ def _track(waypoints: Waypoints, legs_s: Array, points: Array) -> Track:
 
 
 def _knots(legs_s: Array, pieces: int) -> Array:
-    """Return when the pieces of the legs begin and end, s, (legs pieces + 1,)."""
     return np.concatenate([[0.0], np.cumsum(np.repeat(legs_s / pieces, pieces))])

@@ -62,7 +62,6 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
 
 
 def _first(point: _Point) -> float:
-    """Return the length of the first step along the gradient, of which nothing is known: one in all."""
     return 1.0 / max(norm(point.gradient), 1.0)
 
 
