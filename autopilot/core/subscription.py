@@ -48,13 +48,14 @@ class Subscribers:
         """
         self._parameters, self._behaviour, self._law, self._vehicle = parameters, behaviour, law, vehicle
         self._flown = flown
+        self._revision = 0
 
     def adopt(self, parameters: Parameters) -> None:
         """Call back with the changes since the last call, if there are any."""
-        changes = parameters.take_changes()
-        if changes is None:
+        if parameters.revision == self._revision:
             return
-        tuned = changes.made if isinstance(changes.made, Tuned) else None
+        self._revision, made = parameters.revision, parameters.take_made()
+        tuned = made if isinstance(made, Tuned) else None
         for call in self._calls(parameters, tuned):
             call()
         if self._flown is not None:
@@ -65,7 +66,8 @@ class Subscribers:
         if self._flown is None:
             return
         parameters.load(self._flown.values)
-        parameters.take_changes()
+        parameters.take_made()
+        self._revision = parameters.revision
         calls = list[Callable[[], None]]()
         with suppress(Exception):  # what has raised may raise again, and has adopted nothing
             calls += self._calls(parameters, self._flown.tuned)

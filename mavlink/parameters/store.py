@@ -47,13 +47,6 @@ Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
 """(the parameter that is to change, all values with that one in) -> that it may, or why not. It changes nothing."""
 
 
-class Changes(NamedTuple):
-    """Parameters that have changed, and the newest that was made for one of them; None for nothing."""
-
-    names: tuple[str, ...]
-    made: object | None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
     """What a parameter is. Numbers are rounded to what 32 bits hold.
@@ -107,7 +100,11 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters in the order of their names, and their values; `prepare` is called before one changes."""
+    """The parameters in the order of their names, and their values; `prepare` is called before one changes.
+
+    Attributes:
+        revision: How often a value has changed: whoever adopts changes compares it with the one adopted last.
+    """
 
     def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
         """Begin with every parameter at its default.
@@ -120,7 +117,6 @@ class Parameters:
         if len(self._index) < len(self._definitions):
             raise ValueError("two parameters have one name")
         self._values = {parameter.name: parameter.default for parameter in self._definitions}
-        self._changed: dict[str, None] = {}
         self._made: object | None = None
         self.prepare = prepare
         self.revision = 0
@@ -208,17 +204,13 @@ class Parameters:
         for definition in self._definitions:
             self.set(definition.name, definition.default)
 
-    def take_changes(self) -> Changes | None:
-        """Return what has changed since this was last asked; None if nothing has."""
-        if not self._changed:
-            return None
-        changes, self._made = Changes(tuple(self._changed), self._made), None
-        self._changed.clear()
-        return changes
+    def take_made(self) -> object | None:
+        """Return the newest object that was made for a change since the last call; None for nothing."""
+        made, self._made = self._made, None
+        return made
 
     def _change(self, name: str, value: Value) -> None:
         self._values[name] = value
-        self._changed[name] = None
         self.revision += 1
 
 

@@ -48,8 +48,7 @@ class Flight:
 
 def made(parameters: Parameters) -> Tuned | None:
     """Return the control law that was made for the newest change, if one was."""
-    changes = parameters.take_changes()
-    tuned = None if changes is None else changes.made
+    tuned = parameters.take_made()
     assert tuned is None or isinstance(tuned, Tuned)
     return tuned
 
@@ -109,7 +108,8 @@ def test_what_is_only_asked_about_is_not_kept(flight: Flight) -> None:
     assert isinstance(prepared, Prepared)
     assert isinstance(prepared.made, Tuned)
     assert prepared.made.vehicle.body.mass_kg == 0.75
-    assert flight.parameters.take_changes() is None
+    assert flight.parameters.take_made() is None
+    assert flight.parameters.revision == 0
 
 
 def test_subscribers_receive_each_change_once(flight: Flight) -> None:
