@@ -53,7 +53,11 @@ def registered() -> EntryPoints:
 
 
 def load_controller(name: str) -> Factory:
-    """Return the factory registered as `name`; ControllerError if there is none, or it cannot be loaded."""
+    """Return the factory registered as `name`.
+
+    Raises:
+        ControllerError: There is none, or its package cannot be loaded.
+    """
     for entry in registered().select(name=name):
         try:
             factory: Factory = entry.load()

@@ -1,6 +1,6 @@
 """Readiness of the vehicle: the arming checks, and a failed rotor that rules out everything but landing."""
 
-from colibri.autopilot.commander.rules.arming import ArmingInputs, may_arm, refusals
+from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.mavlink.services.statustext import EMERGENCY
 
@@ -26,12 +26,12 @@ class Readiness:
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._inputs) + [failed for failed in (self.rotor_failed, self.error) if failed]
+        return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error))]
 
     @property
     def may_arm(self) -> bool:
         """Whether the rotors may be armed: nothing refuses it."""
-        return not (self.rotor_failed or self.error) and may_arm(self._inputs)
+        return not (self.rotor_failed or self.error) and next(refusals(self._inputs), None) is None
 
     @property
     def only_lands(self) -> str:

@@ -46,17 +46,8 @@ def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
     return "" if healthy else f"battery not healthy: {voltage_v:.1f} V"
 
 
-def refusals(inputs: ArmingInputs) -> list[str]:
-    """Return every reason why the rotors may not be armed; empty if they may."""
-    return list(_refusals(inputs))
-
-
-def may_arm(inputs: ArmingInputs) -> bool:
-    """Whether the rotors may be armed; the first reason why not is enough."""
-    return next(_refusals(inputs), None) is None
-
-
-def _refusals(inputs: ArmingInputs) -> Iterator[str]:
+def refusals(inputs: ArmingInputs) -> Iterator[str]:
+    """Yield every reason why the rotors may not be armed."""
     state, stick = inputs.state, inputs.thrust_stick
     if state is None:
         yield "no telemetry from the plant"

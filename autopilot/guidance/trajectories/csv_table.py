@@ -42,6 +42,12 @@ class CsvTable:
         """Return columns side by side, (n, columns)."""
         return np.stack([self.values[column] for column in columns], axis=1)
 
+    @property
+    def yaw_rad(self) -> Array | None:
+        """Column yaw, unwrapped the shorter way round, rad, (n,); None without one."""
+        yaw = self.values.get("yaw")
+        return None if yaw is None else np.unwrap(np.radians(yaw))
+
     def times(self, min_step_s: float) -> Array:
         """Return column t, s, from 0 on, each at least `min_step_s` after the one before, or raise a TrackFileError."""
         times_s = self.values["t"]

@@ -42,8 +42,7 @@ def read_samples(path: Path, text: str | None = None) -> Samples:
     times_s = table.times(_MIN_STEP_S)
     motion = np.stack([table.matrix(columns) for columns in (_PLACE, _VELOCITY, _ACCELERATION)], axis=1)
     _check(table, np.diff(times_s)[:, None], motion)
-    yaw = table.values.get("yaw")
-    return Samples(times_s, motion, None if yaw is None else np.unwrap(np.radians(yaw)))
+    return Samples(times_s, motion, table.yaw_rad)
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:

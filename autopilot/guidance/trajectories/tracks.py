@@ -240,11 +240,7 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
     Besides, its height passes `heights`, (n, 2), n >= 1, times, s, and heights, m; and the track passes `between`,
     (n, 4), times, s, and points, m, ENU.
     """
-    from colibri.autopilot.guidance.trajectories.minimum_snap import (
-        ACCELERATION,
-        SNAP,
-        minimise,  # slow to load: most tracks do without
-    )
+    from colibri.autopilot.guidance.trajectories.minimum_snap import SNAP, minimise  # slow to load: most do without
 
     times_s = waypoints.times_s
     given = np.concatenate([times_s[:, None], waypoints.points_enu_m], axis=1)
@@ -259,32 +255,37 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
         x, y, z = places(t)
         return x, y, z if height is None else height(t)[0]
 
-    if waypoints.yaw_rad is None:
-        return Track(position, None, float(times_s[-1]), waypoints)
-    looks = minimise(ACCELERATION, times_s, waypoints.yaw_rad[:, None])
-    return Track(position, lambda t: looks(t)[0], float(times_s[-1]), waypoints)
-
-
-def _in_time(rows: Array, others: Array | None) -> Array:
-    both = rows if others is None else np.concatenate([rows, others])
-    return both[np.argsort(both[:, 0], kind="stable")]
+    return _looking(position, times_s, waypoints.yaw_rad, waypoints)
 
 
 def sampled(samples: Samples) -> Track:
     """Return the track through samples, of the fifth degree in between: its acceleration is continuous."""
-    from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, interpolate, minimise
+    from colibri.autopilot.guidance.trajectories.minimum_snap import interpolate
 
-    times_s = samples.times_s
-    places = interpolate(times_s, samples.motion_enu)
+    places = interpolate(samples.times_s, samples.motion_enu)
 
     def position(t: TaylorSeries) -> Place:
         x, y, z = places(t)
         return x, y, z
 
-    if samples.yaw_rad is None:
-        return Track(position, None, float(times_s[-1]))
-    looks = minimise(ACCELERATION, times_s, samples.yaw_rad[:, None])
-    return Track(position, lambda t: looks(t)[0], float(times_s[-1]))
+    return _looking(position, samples.times_s, samples.yaw_rad)
+
+
+def _looking(
+    position: Callable[[TaylorSeries], Place], times_s: Array, yaw_rad: Array | None, waypoints: Waypoints | None = None
+) -> Track:
+    from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, minimise
+
+    duration_s = float(times_s[-1])
+    if yaw_rad is None:
+        return Track(position, None, duration_s, waypoints)
+    looks = minimise(ACCELERATION, times_s, yaw_rad[:, None])
+    return Track(position, lambda t: looks(t)[0], duration_s, waypoints)
+
+
+def _in_time(rows: Array, others: Array | None) -> Array:
+    both = rows if others is None else np.concatenate([rows, others])
+    return both[np.argsort(both[:, 0], kind="stable")]
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:

@@ -78,9 +78,7 @@ def read_waypoints(
     fastest = speed_m_s == "max"
     average_m_s = speed_m_s if isinstance(speed_m_s, float) else DEFAULT_SPEED_M_S
     times_s = table.times(MIN_LEG_S) if timed else _times(table, points, average_m_s)
-    yaw = table.values.get("yaw")
-    looks = None if yaw is None else np.unwrap(np.radians(yaw))
-    return Waypoints(path, times_s, points, looks, timed, fastest, MARGIN if margin is None else margin)
+    return Waypoints(path, times_s, points, table.yaw_rad, timed, fastest, MARGIN if margin is None else margin)
 
 
 def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:
