@@ -18,7 +18,6 @@ from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.mavlink.wire.refusal import Refusal
 
-STEP_US = 4_000
 VEHICLE = (1, 1)
 FIRST = Peer(0, 255, 190)
 SECOND = Peer(1, 255, 190)

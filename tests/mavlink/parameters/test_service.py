@@ -1,6 +1,5 @@
 """The parameter microservice, over the bytes of its messages."""
 
-from random import Random
 from struct import pack, unpack
 from typing import Any
 
@@ -232,29 +231,6 @@ def test_a_list_goes_on_when_simulated_time_begins_anew() -> None:
     talk.ask("PARAM_REQUEST_LIST")
     talk.now_us = 0
     assert len(listed(talk, ME.channel, 0.1)) == 24
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_list_with_loss_is_completed_by_index(seed: int) -> None:
-    """As clients do: what did not come is asked for by its index until it does."""
-    chance = Random(seed)
-    parameters = parameters_of(100)
-    talk = Talk(parameters)
-    talk.ask("PARAM_REQUEST_LIST")
-    got: dict[int, str] = {}
-
-    def hear(messages: list[Message]) -> None:
-        for message in messages:
-            if chance.random() > 0.3:
-                got[message.fields.param_index] = message.fields.param_id
-
-    for _ in range(100):
-        hear(heard(talk.poll()))
-    assert len(got) < len(parameters)
-    for _ in range(20):
-        for index in set(range(len(parameters))) - set(got):
-            hear(talk.read(index=index))
-    assert [got[index] for index in range(len(parameters))] == [parameter.name for parameter in parameters]
 
 
 @given(
