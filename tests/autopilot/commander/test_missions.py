@@ -2,14 +2,12 @@
 
 import pytest
 
-from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.rules.modes import FIRST, Mode, State
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
 from colibri.mavlink.wire.refusal import Refusal
-from tests.support.cockpit import FLYING, Cockpit, at, item
+from tests.support.cockpit import FLYING, Cockpit, item
 
 PLAN = (
     item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)),
@@ -148,12 +146,3 @@ def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     cockpit.load(MISSION, *PLAN)
     assert cockpit.missions.set_current(1, False) is None
     assert cockpit.missions.progress().seq == 1
-
-
-def test_home_that_is_chosen_is_not_moved_by_a_proposal() -> None:
-    home = Home(DEFAULT_ORIGIN)
-    home.propose((1.0, 0.0, 0.0), 0.1)
-    assert (home.position_enu_m, home.chosen) == ((1.0, 0.0, 0.0), False)
-    home.move((2.0, 0.0, 0.0), 0.2)
-    home.propose(at((3.0, 0.0, 0.0)).position_enu_m, 0.3)
-    assert (home.position_enu_m, home.yaw_rad, home.chosen) == ((2.0, 0.0, 0.0), 0.2, True)

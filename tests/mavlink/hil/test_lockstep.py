@@ -189,18 +189,6 @@ def test_the_call_asks_for_sensors() -> None:
     assert autopilot.refused is None
 
 
-def test_frames_of_sensors_are_answered_as_any_other() -> None:
-    plant, autopilot = both_ends_on_sensors()
-    for time_us in range(0, 4 * INTERVAL_US, INTERVAL_US):
-        plant.offer(sensors_at(time_us), 0.0)
-        (outgoing,) = plant.take_outbox()
-        assert autopilot.receive(outgoing.datagram, 0.0) == ReceivedFrame(sensors_at(time_us))
-        assert autopilot.receive(outgoing.datagram, 0.0) is None
-        autopilot.answer(command_at(time_us))
-        (answer,) = autopilot.take_outbox()
-        assert plant.receive(answer, ADDRESS, 0.0) == command_at(time_us)
-
-
 def test_a_plant_without_sensors_refuses_them(plant: PlantEnd) -> None:
     autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=Feedback.SENSORS)
     call(autopilot, plant)

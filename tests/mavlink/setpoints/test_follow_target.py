@@ -9,7 +9,7 @@ from hypothesis import given
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.setpoints.follow_target import GOES_ON_US, Follow
 from colibri.mavlink.setpoints.setpoints import TargetState
-from tests.mavlink.setpoints.streamed import FIRST, SECOND, message, messages
+from tests.mavlink.setpoints.streamed import FIRST, message, messages
 
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
 UNKNOWN = [nan, nan, nan]
@@ -100,14 +100,6 @@ def test_what_is_no_target_is_dropped(follow: Follow, changes: dict[str, Any], r
     tell(follow, **changes)
     assert follow.latest(0, 10**9) is None
     assert follow.dropped == {reason: 1}
-
-
-def test_one_tracker_at_a_time(follow: Follow) -> None:
-    tell(follow)
-    tell(follow, SECOND, 2_000_000, alt=500.0)
-    assert latest(follow, 2_000_000).received_us == 0
-    tell(follow, SECOND, 3_100_000, alt=500.0)
-    assert latest(follow, 3_100_000).received_us == 3_100_000
 
 
 @given(messages("FOLLOW_TARGET"))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.setpoints.manual_control import UNCHANGED, UNUSED, Manual
 from colibri.mavlink.setpoints.setpoints import Sticks
-from tests.mavlink.setpoints.streamed import FIRST, SECOND, message, messages
+from tests.mavlink.setpoints.streamed import FIRST, message, messages
 
 SYSTEM = 7
 
@@ -100,18 +100,6 @@ def test_what_was_held_before_a_silence_is_forgotten(manual: Manual) -> None:
 def test_a_channel_out_of_range_drops_all(manual: Manual, value: int) -> None:
     assert channels(manual, 1500, 1500, 1500, value) is None
     assert manual.dropped == {"out of range": 1}
-
-
-def test_one_pilot_at_a_time(manual: Manual) -> None:
-    sticks(manual, 1000, 0, 500, 0)
-    manual.receive(message("MANUAL_CONTROL", target=SYSTEM, x=-1000), SECOND, 2_000)
-    first = manual.latest(2_000, 500_000)
-    assert first is not None
-    assert first.pitch == 1.0
-    manual.engage(SECOND, 3_000)
-    second = manual.latest(3_000, 500_000)
-    assert second is not None
-    assert second.pitch == -1.0
 
 
 @given(st.lists(messages("MANUAL_CONTROL") | messages("RC_CHANNELS_OVERRIDE"), max_size=10))

@@ -283,10 +283,6 @@ def test_between_two_samples_the_last_stands() -> None:
     assert after.pressure_pa == before.pressure_pa
 
 
-def test_same_seed_same_frames() -> None:
-    assert watch(standing(), suite(seed=5), 2.0) == watch(standing(), suite(seed=5), 2.0)
-
-
 def test_another_seed_errs_otherwise_in_everything() -> None:
     one, other = watch(standing(), suite(seed=5), 0.2), watch(standing(), suite(seed=6), 0.2)
     names = ("specific_force_flu_m_s2", "rate_flu_rad_s", "magnetic_field_flu_gauss", "pressure_pa")
