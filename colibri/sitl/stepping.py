@@ -1,12 +1,12 @@
 """What tests can do with any flight in simulated time: step it, wait for a condition, send sticks and setpoints."""
 
 from collections.abc import Callable
-from math import pi
 from typing import Any, Protocol
 
 from colibri.common.types import Vector
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
-from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.mavlink.client.conversation import Encoded
+from colibri.mavlink.client.setpoints import manual_control, position_target
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 from colibri.sitl.errors import SitlError
 
 
@@ -88,8 +88,7 @@ class Steered(Protocol):
 
     def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
         """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
-        axes = (pitch, roll, thrust, yaw)
-        self.send("MANUAL_CONTROL", self.system, *(round(1000.0 * axis) for axis in axes), 0)
+        self._send(manual_control(self.system, pitch, roll, thrust, yaw))
 
     def setpoint(
         self,
@@ -100,10 +99,9 @@ class Steered(Protocol):
         yaw_rate: float | None = None,
     ) -> None:
         """Send an offboard setpoint once, ENU, SI; what is None is masked."""
-        groups = (position, velocity, acceleration)
-        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
-        mask |= (yaw is None) << 10 | (yaw_rate is None) << 11
-        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
-        heading = 0.0 if yaw is None else 0.5 * pi - yaw
-        target = (self.system, AUTOPILOT_COMPONENT, mav.MAV_FRAME_LOCAL_NED)
-        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, *target, mask, *ned, heading, -(yaw_rate or 0.0))
+        target = (self.system, AUTOPILOT_COMPONENT)
+        self._send(position_target(target, position, velocity, acceleration, yaw, yaw_rate))
+
+    def _send(self, encoded: Encoded) -> None:
+        name, fields = encoded
+        self.send(name, *fields)

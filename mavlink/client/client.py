@@ -28,7 +28,7 @@ Vehicles are found by their HEARTBEAT, and are lost after a silence. A client ta
 (`Signing`) it signs what it sends and drops what is not signed; without, it reads over signatures.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Hashable
 from typing import NamedTuple, TypeAlias, TypeVar
 
@@ -47,8 +47,9 @@ HEARTBEAT_EVERY_US = 1_000_000
 LOST_AFTER_US = 3_500_000
 """Three heartbeats are missing, and a half: as QGroundControl has it."""
 _MAVLINK_VERSION = 3
+_EVENTS = 1000
 
-Any_ = TypeVar("Any_", bound=Conversation)
+Talk = TypeVar("Talk", bound=Conversation)
 
 
 class Vehicle(NamedTuple):
@@ -116,6 +117,7 @@ class Client:
         kind: int = mav.MAV_TYPE_GCS,
         heartbeat_every_us: int | None = HEARTBEAT_EVERY_US,
         only: int = 0,
+        all_components: bool = False,
     ) -> None:
         """Speak as a component of MAV_TYPE `kind`.
 
@@ -125,18 +127,19 @@ class Client:
             kind: What its HEARTBEAT says.
             heartbeat_every_us: Interval of its HEARTBEAT; None for none.
             only: System id of the one vehicle to listen to; 0 for all.
+            all_components: Whether to return the messages of components that are no autopilots, too.
         """
         self.source = (system, component)
         self.vehicles: dict[int, Vehicle] = {}
         self._codec = Codec(system, component)
         self.dropped: Counter[str] = self._codec.dropped
         self._heartbeat_every_us = heartbeat_every_us
-        self._kind, self._only = kind, only
+        self._kind, self._only, self._all_components = kind, only, all_components
         self._heartbeat_at_us: int | None = None
         self._signing: Signing | None = None
         self._now_us = 0
         self._lanes: dict[Hashable, list[Conversation]] = {}
-        self._events: list[Event] = []
+        self._events: deque[Event] = deque(maxlen=_EVENTS)
 
     @property
     def vehicle(self) -> Vehicle | None:
@@ -148,7 +151,7 @@ class Client:
         self._signing = signing
         self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
 
-    def begin(self, conversation: Any_) -> Any_:
+    def begin(self, conversation: Talk) -> Talk:
         """Begin a conversation: its first request is sent at the next poll, or when its lane is free."""
         self._lanes.setdefault((conversation.target, conversation.lane), []).append(conversation)
         return conversation
@@ -172,14 +175,15 @@ class Client:
         messages = []
         for message in self._codec.decode(datagram):
             system, component = message.source
-            if component != AUTOPILOT_COMPONENT or self._only not in (0, system):
+            is_autopilot = component == AUTOPILOT_COMPONENT
+            if not (is_autopilot or self._all_components) or self._only not in (0, system):
                 continue
             if self._signing is not None:
                 refusal = self._signing.refusal(message.name, message.frame, now_us)
                 if refusal is not None:
                     self.dropped[refusal] += 1
                     continue
-            if message.name in ("HEARTBEAT", "AUTOPILOT_VERSION"):
+            if is_autopilot and message.name in ("HEARTBEAT", "AUTOPILOT_VERSION"):
                 self._identify(message, now_us)
             if self._lanes:
                 self._converse(message, now_us)
@@ -213,8 +217,9 @@ class Client:
         return datagrams
 
     def take_events(self) -> list[Event]:
-        """Return the events since the last call."""
-        events, self._events = self._events, []
+        """Return the events since the last call; of very many the newest."""
+        events = list(self._events)
+        self._events.clear()
         return events
 
     def _identify(self, message: Message, now_us: int) -> None:

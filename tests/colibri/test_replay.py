@@ -183,8 +183,7 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
         second = Process(logs, "autopilot", *options)
         with running(second):
             again_s = seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again").time_s
-            ack = seen.request("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
-            assert (ack.command, ack.result) == (mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_ACCEPTED)
+            assert seen.command(mav.MAV_CMD_NAV_LAND) == mav.MAV_RESULT_ACCEPTED
             seen.wait(lambda sight: not sight.armed, "the landing")
             date = seen.request("SYSTEM_TIME", "COMMAND_LONG", mav.MAV_CMD_REQUEST_MESSAGE, 0, 2, *[0.0] * 6)
             plant.process.send_signal(signal.SIGINT)

@@ -9,7 +9,11 @@ from typing import Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Vector
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
+from colibri.mavlink.client.client import Client, Found, Talk
+from colibri.mavlink.client.commands import Command, set_message_interval
+from colibri.mavlink.client.parameters import ReadParameter, SetParameter
+from colibri.mavlink.client.plans import Download
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from tools.harness.ports import OnPort
 
@@ -65,9 +69,8 @@ class Observer(OnPort):
     def __init__(self) -> None:
         """Listen on any free port."""
         super().__init__(self)
-        self._codec = Codec(_SYSTEM_ID, mav.MAV_COMP_ID_MISSIONPLANNER)
-        self._system_id = 0
-        self._requested = False
+        own = mav.MAV_COMP_ID_MISSIONPLANNER
+        self._client = Client(_SYSTEM_ID, own, heartbeat_every_us=None, all_components=True)
         self._latest: dict[str, Any] = {}
         self._sights: list[Sight] = []
         self._texts: list[str] = []
@@ -138,6 +141,11 @@ class Observer(OnPort):
             lambda sight: not sight.armed and any(it.armed for it in self._sights), "the end of the flight"
         )
 
+    @property
+    def _vehicle(self) -> tuple[int, int]:
+        assert self._client.vehicle is not None, "it was found"
+        return self._client.vehicle.target
+
     def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
         """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
 
@@ -145,35 +153,49 @@ class Observer(OnPort):
         """
         with self._news:
             before = self._counts[answer]
-            target = (self._system_id, AUTOPILOT_COMPONENT)
-            self.send(self._codec.encode(name, *target, *fields))
+            self.send(self._client.encode(name, *self._vehicle, *fields))
             assert self._news.wait_for(lambda: self._counts[answer] > before, within_s), f"no {answer}"
             return self._latest[answer]
 
+    def command(self, number: int, *params: float) -> int | None:
+        """Send a COMMAND_LONG; return its MAV_RESULT."""
+        return self._talk(Command(self._vehicle, number, *params)).result
+
     def plan_length(self, mission_type: int = mav.MAV_MISSION_TYPE_MISSION) -> int:
         """Return how many items of a plan the vehicle has."""
-        return int(self.request("MISSION_COUNT", "MISSION_REQUEST_LIST", mission_type).count)
+        download = self._talk(Download(self._vehicle, mission_type))
+        assert download.accepted
+        return len(download.items)
 
     def parameter(self, name: str) -> float:
-        """Return a REAL32 parameter of the vehicle."""
-        value = self.request("PARAM_VALUE", "PARAM_REQUEST_READ", name, -1)
-        assert value.param_id == name
-        return float(value.param_value)
+        """Return a parameter of the vehicle."""
+        held = self._talk(ReadParameter(self._vehicle, name)).held
+        assert held is not None, f"no {name}"
+        return held.value
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Set a REAL32 parameter of the vehicle."""
-        reply = self.request("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
-        assert (reply.param_id, reply.param_value) == (name, value)
+        """Set a parameter of the vehicle."""
+        assert self._talk(SetParameter(self._vehicle, name, value)).accepted
 
-    def receive(self, datagram: bytes, now_s: float) -> list[bytes]:  # noqa: ARG002
-        """Take in a datagram of the vehicle; return the requests for message rates after the first heartbeat."""
+    def _talk(self, conversation: Talk) -> Talk:
+        """Have a conversation with the vehicle until it has ended."""
         with self._news:
-            for message in self._codec.decode(datagram):
+            self._client.begin(conversation)
+            assert self._news.wait_for(lambda: conversation.result is not None, GIVE_UP_AFTER_S)
+        return conversation
+
+    def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
+        """Read a datagram of the vehicle; return what is due to be sent, at first the requests for message rates."""
+        now_us = round(now_s * 1e6)
+        with self._news:
+            for message in self._client.receive(datagram, now_us):
                 self._take(message)
+            for event in self._client.take_events():
+                if isinstance(event, Found):
+                    for name, interval_us in _INTERVALS_US.items():
+                        self._client.begin(set_message_interval(event.vehicle.target, name, interval_us))
             self._news.notify_all()
-            requests = [] if self._requested or not self._system_id else self._rate_requests()
-            self._requested |= bool(requests)
-        return requests
+            return self._client.poll(now_us)
 
     def _take(self, message: Message) -> None:
         name, fields = message.name, message.fields
@@ -182,7 +204,6 @@ class Observer(OnPort):
             self._texts.append(fields.text)
         if message.source[1] != AUTOPILOT_COMPONENT:
             return
-        self._system_id = message.source[0]
         self._latest[name] = fields
         if name == "HEARTBEAT":
             self._note_mode(fields)
@@ -193,14 +214,6 @@ class Observer(OnPort):
         mode = mode_of_custom(heartbeat.custom_mode)
         if heartbeat.base_mode & MODE_ARMED and mode and self._modes[-1:] != [mode]:
             self._modes.append(mode)
-
-    def _rate_requests(self) -> list[bytes]:
-        """Return the requests for the rates at which to see, sent once: loopback loses nothing."""
-        head = (self._system_id, AUTOPILOT_COMPONENT, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0)
-        return [
-            self._codec.encode("COMMAND_LONG", *head, getattr(mav, f"MAVLINK_MSG_ID_{name}"), interval_us, *(0,) * 5)
-            for name, interval_us in _INTERVALS_US.items()
-        ]
 
     def _sight(self) -> Sight:
         where, heartbeat = self._latest["LOCAL_POSITION_NED"], self._latest["HEARTBEAT"]

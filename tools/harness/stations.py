@@ -10,7 +10,11 @@ from itertools import chain, cycle
 from math import cos, dist, sin
 from typing import Any, NamedTuple
 
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, Message, mav
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.commands import padded
+from colibri.mavlink.client.setpoints import position_target
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Message, mav
+from colibri.mavlink.wire.ned import ned_from_enu
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 OFFBOARD = (mav.MAV_CMD_DO_SET_MODE, 1, 6, 0)
@@ -18,12 +22,10 @@ HOLD = (mav.MAV_CMD_DO_SET_MODE, 1, 4, 3)
 ARM = (mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
 VEHICLE = (1, AUTOPILOT_COMPONENT)
-_ALIVE_EVERY_S = 1.0
 _ASKED = ("AUTOPILOT_VERSION", "HOME_POSITION", "ODOMETRY", "ESTIMATOR_STATUS", "AVAILABLE_MODES", "GPS_GLOBAL_ORIGIN")
 _STREAMED_US = {"ATTITUDE_QUATERNION": 4_000, "LOCAL_POSITION_NED": 8_000, "HIGHRES_IMU": 8_000, "ATTITUDE": 20_000}
 
 _SETPOINT_EVERY_S = 0.05
-_POSITION_AND_VELOCITY = 0b1101_1100_0000
 _RADIUS_M, _RATE_RAD_S, _HEIGHT_M = 2.0, 0.5, 3.0
 
 
@@ -75,26 +77,22 @@ class Station:
         self.position_ned_m = (0.0, 0.0, 0.0)
         self._every = every
         self._wishes = chain(self._orders(orders), cycle(self._wish()))
-        self._codec = Codec(*self.identity)
+        self._client = Client(*self.identity, only=VEHICLE[0])
         self._datagrams = 0
         self._heartbeat_s: float | None = None
-        self._alive_s: float | None = None
         self._outbox: list[bytes] = []
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
         """Take in a datagram of the vehicle; return what to send to it."""
         self._datagrams += 1
-        for message in self._codec.decode(datagram):
-            if message.source == VEHICLE:
-                self._take(message, now_s)
+        now_us = round(now_s * 1e6)
+        for message in self._client.receive(datagram, now_us):
+            self._take(message, now_s)
         self._told()
         if self._datagrams % self._every == 0:
             next(self._wishes)()
-        if self._alive_s is None or now_s >= self._alive_s + _ALIVE_EVERY_S:
-            self._alive_s = now_s
-            self._send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
         outbox, self._outbox = self._outbox, []
-        return outbox
+        return outbox + self._client.poll(now_us)
 
     def _take(self, message: Message, now_s: float) -> None:
         self.counts[message.name] += 1
@@ -130,13 +128,13 @@ class Station:
 
     def _command(self, command: int, *parameters: float) -> None:
         self.sent[command] += 1
-        self._tell("COMMAND_LONG", command, 0, *parameters, *[0.0] * (7 - len(parameters)))
+        self._tell("COMMAND_LONG", command, 0, *padded(parameters, 7))
 
     def _tell(self, name: str, *fields: Any) -> None:
         self._send(name, *VEHICLE, *fields)
 
     def _send(self, name: str, *fields: Any) -> None:
-        self._outbox.append(self._codec.encode(name, *fields))
+        self._outbox.append(self._client.encode(name, *fields))
 
 
 class OffboardTask(Station):
@@ -159,15 +157,14 @@ class OffboardTask(Station):
             return
         self._setpoint_s = self.time_s
         angle = _RATE_RAD_S * self.time_s
-        x, y, z = place = (_RADIUS_M * cos(angle), _RADIUS_M * sin(angle), -_HEIGHT_M)
-        away_m = dist(self.position_ned_m, place)
+        east, north, _ = place = (_RADIUS_M * sin(angle), _RADIUS_M * cos(angle), _HEIGHT_M)
+        away_m = dist(ned_from_enu(self.position_ned_m), place)
         self._caught_up = self._caught_up or away_m < 0.15
         if self._caught_up:
             self.off_m = max(self.off_m, away_m)
-        motion = (x, y, z, -_RATE_RAD_S * y, _RATE_RAD_S * x, *[0.0] * 6)
-        when_ms = round(self.time_s * 1e3)
-        frame = mav.MAV_FRAME_LOCAL_NED
-        self._send("SET_POSITION_TARGET_LOCAL_NED", when_ms, *VEHICLE, frame, _POSITION_AND_VELOCITY, *motion)
+        velocity = (_RATE_RAD_S * north, -_RATE_RAD_S * east, 0.0)
+        name, fields = position_target(VEHICLE, place, velocity, time_us=round(self.time_s * 1e6))
+        self._send(name, *fields)
 
 
 def _number(name: str) -> int:

@@ -1,18 +1,22 @@
-"""A ground station that has a mission flown: says everything again until it is done, whoever answers."""
+"""A ground station that has a mission flown, and begins every request again until it is done, whoever answers."""
 
 import socket
 from collections.abc import Sequence
 from math import nan
-from typing import Any
+from time import monotonic
 
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.commands import Command
+from colibri.mavlink.client.conversation import Conversation
 from colibri.mavlink.client.inbox import Inbox
-from colibri.mavlink.mission.items import MISSION, MissionItem, item_fields
-from colibri.mavlink.node.service import Peer
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
+from colibri.mavlink.client.plans import Upload
+from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Message, mav
+from colibri.sitl.mission_items import Item
 
-_VEHICLE = Peer(0, 1, AUTOPILOT_COMPONENT)
+_VEHICLE = (1, AUTOPILOT_COMPONENT)
 _MAX_DATAGRAM_BYTES = 65536
 HOVER_S = 6.0
 HEIGHT_M = 6.0
@@ -53,8 +57,6 @@ class Station:
         self.socket.setblocking(False)
         self.url = f"udpout:127.0.0.1:{self.socket.getsockname()[1]}"
         self._items = items
-        self._words = Inbox()
-        self._codec = Codec(255, mav.MAV_COMP_ID_MISSIONPLANNER)
         self.begin_anew()
 
     def begin_anew(self) -> None:
@@ -62,25 +64,29 @@ class Station:
         self.mode: Mode | None = None
         self.armed: bool | None = None
         self.seq = 0
-        self._words.forget()
-        self.flown = self.has_armed = self._has_mission = False
-        self._vehicle: tuple[str, int] | None = None
+        self.flown = self.has_armed = False
+        self._inbox = Inbox()
+        self._client = Client(255, mav.MAV_COMP_ID_MISSIONPLANNER, only=_VEHICLE[0])
+        self._upload: Upload | None = None
+        self._under_way: Conversation | None = None
 
     @property
     def texts(self) -> list[str]:
         """What it said, line by line."""
-        return self._words.texts
+        return self._inbox.texts
 
     def receive(self) -> None:
         """Take in what has come, and answer it."""
+        now_us = round(monotonic() * 1e6)
         while True:
             try:
-                datagram, self._vehicle = self.socket.recvfrom(_MAX_DATAGRAM_BYTES)
+                datagram, vehicle = self.socket.recvfrom(_MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 return
-            for message in self._codec.decode(datagram):
-                if message.source == (_VEHICLE.system, _VEHICLE.component):
-                    self._take(message)
+            for message in self._client.receive(datagram, now_us):
+                self._take(message)
+            for answer in self._client.poll(now_us):
+                self.socket.sendto(answer, vehicle)
 
     def drain(self) -> None:
         """Forget what has come and was not read."""
@@ -100,41 +106,25 @@ class Station:
             case "HEARTBEAT":
                 self._see(mode_of_custom(fields.custom_mode), bool(fields.base_mode & MODE_ARMED))
             case "STATUSTEXT":
-                self._words.add(message)
+                self._inbox.add(message)
             case "MISSION_CURRENT":
                 self.seq = fields.seq
-            case "MISSION_REQUEST_INT" | "MISSION_REQUEST":
-                self._send(
-                    "MISSION_ITEM_INT", *item_fields(_VEHICLE, fields.seq, self._items[fields.seq], False, MISSION)
-                )
-            case "MISSION_ACK":
-                self._has_mission = self._has_mission or fields.type == mav.MAV_MISSION_ACCEPTED
 
     def _see(self, mode: Mode | None, armed: bool) -> None:
-        """Ask for what is still to be done, at every heartbeat."""
+        """Begin the next request that is still to be made, at every heartbeat until the rotors are armed."""
         self.mode, self.armed = mode, armed
-        self._send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
         self.flown = self.flown or (self.has_armed and not armed)
         self.has_armed = self.has_armed or armed
-        if self.has_armed:
+        if self.has_armed or (self._under_way is not None and self._under_way.result is None):
             return
-        if not self._has_mission:
-            self._send("MISSION_COUNT", *_VEHICLE[1:], len(self._items), MISSION, 0)
+        if self._upload is None or not self._upload.accepted:
+            self._under_way = self._upload = self._client.begin(Upload(_VEHICLE, self._items))
         elif mode is not Mode.MISSION:
-            self._command(mav.MAV_CMD_MISSION_START)
+            self._under_way = self._client.begin(Command(_VEHICLE, mav.MAV_CMD_MISSION_START))
         else:
-            self._command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-
-    def _command(self, number: int, p1: float = 0.0) -> None:
-        self._send("COMMAND_LONG", *_VEHICLE[1:], number, 0, p1, *[0.0] * 6)
-
-    def _send(self, name: str, *fields: Any) -> None:
-        assert self._vehicle is not None, "who is answered has sent"
-        self.socket.sendto(self._codec.encode(name, *fields), self._vehicle)
+            self._under_way = self._client.begin(Command(_VEHICLE, mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
 
 
 def _item(command: int, east: float, north: float, p1: float = 0.0) -> MissionItem:
-    place = geodetic_of((east, north, 0.0), DEFAULT_ORIGIN)
-    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
     up = 0.0 if command == mav.MAV_CMD_NAV_LAND else HEIGHT_M
-    return MissionItem(mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, command, 1, p1, 0.0, 0.0, nan, x, y, up)
+    return Item(command, (p1, 0.0, 0.0, nan), (east, north, up)).on_wire(DEFAULT_ORIGIN)

@@ -11,7 +11,7 @@ from pyulog import ULog
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
-from tests.flights.processes.log_client import LogClient
+from tests.flights.processes.log_client import downloaded
 from tools.harness.observer import Observer
 from tools.harness.processes import rows
 from tools.harness.sitl_process import Vehicle, vehicle
@@ -29,9 +29,7 @@ class Flown:
     """
 
     def __init__(self, flown: Vehicle, out: Path) -> None:
-        with LogClient(flown.port, seed=1) as client:
-            (size,) = client.sizes()
-            self.content, self.lost = client.download(0, size), client.lost
+        self.content, self.lost = downloaded(flown.port, seed=1)
         self.texts = flown.seen.texts
         self.logs = flown.state / "0" / "logs"
         self.log, self.out = ULog(BytesIO(self.content)), out / "0"
@@ -45,11 +43,11 @@ def fly(seen: Observer) -> None:
     """Take off, stay, land."""
     for number, params in (
         (mav.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, nan, nan, nan, HEIGHT_M)),
-        (mav.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, *[0.0] * 6)),
+        (mav.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,)),
     ):
-        assert seen.request("COMMAND_ACK", "COMMAND_LONG", number, 0, *params).result == ACCEPTED
+        assert seen.command(number, *params) == ACCEPTED
     seen.wait(lambda sight: sight.armed and sight.mode is Mode.HOLD, "the height")
-    assert seen.request("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7).result == ACCEPTED
+    assert seen.command(mav.MAV_CMD_NAV_LAND) == ACCEPTED
     seen.wait_until_disarmed()
 
 
