@@ -4,20 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from tools.pages import faults, parameters
 from tools.pages.__main__ import main
 from tools.pages.tables import with_tables
 
 DOCS = Path(__file__).parents[2] / "docs"
-
-
-def test_the_page_of_parameters_is_current() -> None:
-    assert (DOCS / "parameters.md").read_text() == parameters.page()
-
-
-def test_the_page_of_faults_is_current() -> None:
-    page = (DOCS / "faults.md").read_text()
-    assert page == with_tables(page, faults.tables())
 
 
 def test_a_table_replaces_the_one_with_its_headings() -> None:

@@ -1,7 +1,6 @@
 """The table of flight modes and that of transitions: every row, every mode, and the page that is drawn from them."""
 
 from itertools import product
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -23,10 +22,7 @@ from colibri.autopilot.commander.rules.modes import (
     next_state,
 )
 from colibri.mavlink.wire.refusal import Refusal
-from tools.pages.modes import PLACES, tables
-from tools.pages.tables import with_tables
-
-PAGE = Path(__file__).parents[4] / "docs" / "modes.md"
+from tools.pages.modes import PLACES
 
 
 def test_every_mode_has_one_row_and_one_number() -> None:
@@ -107,11 +103,6 @@ def test_on_the_ground_needs_hold_back_arming_and_not_the_choice(mode: Mode) -> 
     assert isinstance(chosen, State) is ROWS[mode].selectable
     armed = next_state(State(mode, armed=False), Event.ARM, None, needs)
     assert isinstance(armed, State) is (ROWS[mode].to_arm and not needs)
-
-
-def test_the_page_is_current() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert page == with_tables(page, tables())
 
 
 def test_every_mode_has_its_place_in_the_picture() -> None:
