@@ -130,9 +130,7 @@ def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
     }
 
 
-def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By options of `colibri fly` that change neither the table nor its columns; again only what has changed."""
     copy, out = written(tmp_path / "p", "t2.toml"), tmp_path / "out"
     options = ["--track", "hover", "--duration", "0.5", "--wind", "2@270", "--without", "drag", "--start", "z=3"]
@@ -212,7 +210,7 @@ def test_a_flight_that_kills_its_process_is_lost(
     assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
 
 
-def test_a_law_that_cannot_be_built_is_found_before_anything_flies(
+def test_a_law_that_cannot_be_built_is_found_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "whole-lpv-mpc": load_controller("whole-lpv-mpc")}

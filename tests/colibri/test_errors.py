@@ -144,7 +144,7 @@ def test_what_cannot_begin_is_one_line_and_exit_code_2(
     assert said.count("\n") == 1
 
 
-def test_a_process_that_cannot_begin_says_one_line_and_exits_with_2() -> None:
+def test_a_process_that_cannot_begin_exits_with_2() -> None:
     command = [sys.executable, "-m", "colibri", "autopilot", "--profile", "fast"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -159,7 +159,7 @@ def test_a_process_that_cannot_begin_says_one_line_and_exits_with_2() -> None:
         (LinkError("no way"), 2, "colibri: error: no way\n"),
     ],
 )
-def test_a_flight_that_ends_says_where_its_logs_are_and_one_that_never_began_does_not(
+def test_only_a_flight_that_began_names_its_logs(
     error: Error,
     code: int,
     line: str,

@@ -55,7 +55,7 @@ def test_one_that_comes_down_is_lost_when_it_does(plan: FlightPlan) -> None:
     assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(15.0, abs=0.02)
 
 
-def test_one_that_touches_the_ground_for_a_moment_and_flies_on_is_not_lost(plan: FlightPlan) -> None:
+def test_a_short_touch_of_the_ground_is_no_loss(plan: FlightPlan) -> None:
     flight = flown(z=lambda t: np.where(abs(t - 5.0) < 0.3, 0.0, 2.0))
     assert lost(plan, flight) is None
     assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(0.59, abs=0.02)
@@ -72,7 +72,7 @@ def test_one_that_never_takes_off_is_lost_from_the_start(plan: FlightPlan) -> No
     assert ground_contact_s(plan.plant_vehicle, flown(z=0.0)) == 0.0
 
 
-def test_one_that_ends_upside_down_is_lost_unless_it_never_was_upright(plan: FlightPlan) -> None:
+def test_ending_upside_down_is_a_loss_if_ever_upright(plan: FlightPlan) -> None:
     found = lost(plan, flown(phi=lambda t: np.where(t < 7.0, 0.0, pi)))
     assert found is not None
     assert found.at_s == pytest.approx(7.0)
@@ -88,14 +88,12 @@ def test_one_that_drifts_away_is_lost_since_it_is_too_far(plan: FlightPlan) -> N
 
 
 @pytest.mark.parametrize(("speed_m_s", "is_lost"), [(-1.0, False), (0.2, False), (1.0, True)])
-def test_one_too_short_to_settle_is_lost_where_it_gets_further_away(
-    plan: FlightPlan, speed_m_s: float, is_lost: bool
-) -> None:
+def test_a_short_flight_is_lost_if_its_error_grows(plan: FlightPlan, speed_m_s: float, is_lost: bool) -> None:
     flight = flown(10.0, x=lambda t: 30.0 + speed_m_s * t)
     assert (lost(plan, flight) is not None) is is_lost
 
 
-def test_one_that_ground_stations_command_does_not_follow_its_track(plan: FlightPlan) -> None:
+def test_a_station_vehicle_is_not_judged_by_its_track(plan: FlightPlan) -> None:
     served = replace(plan, spec=replace(plan.spec, gcs=("udpout:127.0.0.1:1",)))
     assert lost(served, flown(z=0.0)) is None
 

@@ -96,7 +96,7 @@ def test_what_is_there_is_not_flown_again(
     assert re.fullmatch(line, capsys.readouterr().err)
 
 
-def test_a_vehicle_that_is_lost_is_counted_and_ends_in_exit_code_1(tmp_path: Path) -> None:
+def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
     """The thesis's profile tips over on what is flown so briskly."""
     options = (
         "--seeds",
@@ -128,9 +128,7 @@ def test_bad_seeds_are_one_line(seeds: str, capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.parametrize("estimated", [True, False])
-def test_the_figure_has_room_for_its_rows_and_a_dot_for_each_flight(
-    estimated: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     monkeypatch.setattr(seed_figures, "write_figure", lambda figure, _path: drawn.append(figure))
     values = tuple(0.1 + number if estimated or number < 2 else None for number in range(len(METRICS)))

@@ -141,7 +141,7 @@ def test_the_time_from_which_a_bound_holds(short: Flown) -> None:
     assert short.stays_below(ramp, 11.0) == 0.0
 
 
-def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown) -> None:
+def test_a_table_has_rows_of_names_and_columns_of_groups(short: Flown) -> None:
     measures = (Measure("one", lambda _flown: "1"), Measure("two", lambda flown: flown.failure or ""))
     cases = tuple(Case((row,), group, {"track": row + group}) for row in "ab" for group in ("g", "h"))
     flown = [replace(short, failure=case.flight["track"]) for case in cases]

@@ -110,14 +110,14 @@ def px4(folder: Path, options: str) -> dict[str, Any]:
     )
 
 
-def test_arducopter_flies_the_spiral_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
+def test_arducopter_flies_the_spiral_twice_as_well(tmp_path: Path) -> None:
     report = arducopter(tmp_path, "spiral --arm --duration 60")
     assert report["stack"] == "ardupilot"
     assert report["in_order"]
     assert report["control_rmse_m"] <= 0.045 / 2.0
 
 
-def test_arducopter_on_the_plant_is_flown_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
+def test_arducopter_on_the_plant_is_flown_twice_as_well(tmp_path: Path) -> None:
     report = arducopter_on_the_plant(tmp_path, "spiral --arm --duration 40")
     assert report["in_order"]
     assert report["control_rmse_m"] <= 0.045 / 2.0
@@ -137,7 +137,7 @@ def test_px4_is_flown_and_left_in_hold(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", PX4_ALONE_M)
-def test_px4_is_flown_twice_as_well_as_by_its_own_position_control(name: str, tmp_path: Path) -> None:
+def test_px4_is_flown_twice_as_well_as_by_itself(name: str, tmp_path: Path) -> None:
     command = [*ALONE, sys.executable, "-m", "tests.peers.tracks", str(program_of("px4")), str(tmp_path), name]
     subprocess.run(command, check=True, timeout=500.0)
     flown = json.loads((tmp_path / "track.json").read_text(encoding="utf-8"))

@@ -45,9 +45,7 @@ def test_points_do_not_depend_on_the_parts(kind: Any, count: int, part: int, qua
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(count=st.integers(1, 300), part=st.integers(1, 100), quarter=st.integers(1, 10))
-def test_all_rows_as_long_as_there_is_room_and_then_no_more_points_than_that(
-    kind: Any, count: int, part: int, quarter: int
-) -> None:
+def test_points_are_thinned_only_beyond_the_limit(kind: Any, count: int, part: int, quarter: int) -> None:
     rows, most = rows_of(count), 4 * quarter
     points = reduced(kind, rows, most, part)
     if count <= most:

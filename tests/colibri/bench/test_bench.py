@@ -74,7 +74,7 @@ def test_flights_are_measured_at_every_rate(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.long
-def test_whole_commands_run_in_turn_with_those_of_another_checkout(tmp_path: Path) -> None:
+def test_whole_commands_alternate_with_another_checkout(tmp_path: Path) -> None:
     """The other is this one: the same program, so a ratio of two runs of it."""
     other = tmp_path / "other" / ".venv" / "bin" / "colibri"
     other.parent.mkdir(parents=True)
@@ -89,7 +89,7 @@ def test_whole_commands_run_in_turn_with_those_of_another_checkout(tmp_path: Pat
 
 
 @pytest.mark.long
-def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_step(tmp_path: Path) -> None:
+def test_the_cost_of_serving_stations_is_measured(tmp_path: Path) -> None:
     ground = figures_of(tmp_path / "ground.json", "--only", "ground")["ground"]
     assert {int(channels) for channels in ground["serve"]} == set(serving.CHANNELS)
     rates = [figure["messages_hz"] for figure in ground["serve"].values()]
@@ -102,7 +102,7 @@ def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_ste
 
 
 @pytest.mark.long
-def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state(tmp_path: Path) -> None:
+def test_the_estimator_and_sensor_flights_are_timed(tmp_path: Path) -> None:
     sensors = figures_of(tmp_path / "sensors.json", "--only", "sensors")["sensors"]
     assert set(sensors["estimator_us"]) == {sensing.ALWAYS, sensing.IN_FLIGHT}
     assert all(0.0 < figure["p50"] <= figure["p99"] for figure in sensors["estimator_us"].values())

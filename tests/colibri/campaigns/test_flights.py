@@ -135,7 +135,7 @@ def test_what_can_never_be_flown_is_refused_beforehand(tables: dict[str, Any], s
     assert said in str(refused.value)
 
 
-def test_a_metric_that_is_not_finite_is_none_as_it_would_be_after_going_on() -> None:
+def test_a_metric_that_is_not_finite_is_none() -> None:
     (row,) = flown(metrics={"nan": lambda _: nan, "inf": lambda _: inf})
     assert row.metrics == (None, None)
 

@@ -38,7 +38,7 @@ def directions(rng: np.random.Generator, kinematics: Kinematics, numbers: Attitu
     return side, np.einsum("ij,vij->v", side, box_of(arrays(numbers), kinematics).kinematic)
 
 
-def test_the_hull_of_the_kinematic_matrix_holds_that_of_every_attitude_in_the_box() -> None:
+def test_the_kinematic_hull_covers_the_attitude_box() -> None:
     phi_end, theta_end = 2.0 * np.arctan(UNEQUAL.angles)
     rng = np.random.default_rng(1)
     for _ in range(500):
@@ -48,7 +48,7 @@ def test_the_hull_of_the_kinematic_matrix_holds_that_of_every_attitude_in_the_bo
         assert np.sum(side * T) <= vertices.max() + 1e-12
 
 
-def test_the_hull_of_the_errors_matrix_holds_that_of_every_error_in_the_box() -> None:
+def test_the_error_hull_covers_the_error_box() -> None:
     rng = np.random.default_rng(1)
     for _ in range(500):
         error = rng.uniform(-1.0, 1.0, 3) * WHOLE_UNEQUAL.angles[:3]
@@ -112,7 +112,7 @@ def test_fractions_and_floats_make_the_same_loop(law: AttitudeLaw, numbers: Atti
 
 
 @pytest.mark.parametrize(("law", "numbers"), [(LAW, UNEQUAL), (WHOLE, WHOLE_UNEQUAL)], ids=["LQR", "whole"])
-def test_mirrors_leave_a_quarter_of_the_vertices_and_three_blocks(law: AttitudeLaw, numbers: AttitudeNumbers) -> None:
+def test_symmetry_leaves_a_quarter_of_the_vertices(law: AttitudeLaw, numbers: AttitudeNumbers) -> None:
     loop = law.loop(numbers, float)
     assert len(loop.vertices) == 4 * len(loop.distinct().vertices) == 128
     assert loop.blocks() == [[0, 1, 6, 9], [2, 3, 7, 10], [4, 5, 8, 11]]
@@ -148,7 +148,7 @@ def test_the_gain_is_that_of_the_laws_own_steps() -> None:
     assert plan.commands.shape == (28, 4)
 
 
-def test_of_the_last_plan_what_it_had_for_later_samples_counts_for_next_to_nothing() -> None:
+def test_later_samples_of_the_last_plan_hardly_count() -> None:
     """It moves the nominal motion, about which deviations are linear, but by another integrator."""
     hover_n, level = sum(WHOLE.thrusts_n(0.0)) / 2.0, (0.0, 0.0, 0.0)
     z = 1e-4 * np.random.default_rng(6).normal(size=12)
@@ -159,7 +159,7 @@ def test_of_the_last_plan_what_it_had_for_later_samples_counts_for_next_to_nothi
     assert np.abs(one - two).max() < 2e-3 * np.abs(one).max()
 
 
-def test_the_gain_is_nearly_the_same_at_all_attitudes_that_may_be_held() -> None:
+def test_the_gain_hardly_depends_on_the_attitude() -> None:
     unsure = np.array(WHOLE.numbers_at(0.43).unsure)
     largest = np.abs(WHOLE.commanded).max(axis=2)
     assert (unsure.max(axis=2)[:, :2] < 0.02 * largest[:, :2]).all()

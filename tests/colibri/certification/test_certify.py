@@ -83,7 +83,7 @@ def test_a_certificate_of_a_weaker_gain_is_not_confirmed(certified: Certificate)
     assert certificates.margins_of(FLIGHT, "invariant", weaker, proof)["decrease"] == 0.0
 
 
-def test_a_certificate_of_a_gain_that_is_less_sure_is_not_confirmed(certified: Certificate) -> None:
+def test_a_certificate_with_a_lower_bound_is_not_confirmed(certified: Certificate) -> None:
     _, numbers, proof, _ = certified.invariant
     unsure = numbers._replace(unsure=(4.0 * np.array(numbers.unsure)).tolist())
     assert certificates.margins_of(FLIGHT, "invariant", unsure, proof)["decrease"] == 0.0
@@ -147,7 +147,7 @@ def test_the_sets_hold_attitudes_within_the_profile() -> None:
         assert CERTIFICATES[name].largest.scale > least
 
 
-def test_beyond_the_largest_ranges_the_lqr_is_soon_unstable_indeed() -> None:
+def test_the_lqr_is_unstable_beyond_the_largest_ranges() -> None:
     """So whatever kind of Lyapunov function were tried, it could not reach much further."""
     assert spectral_radius(LQR.loop(LQR.numbers_at(0.66), float)) < 1.0
     assert spectral_radius(LQR.loop(LQR.numbers_at(0.69), float)) > 1.0

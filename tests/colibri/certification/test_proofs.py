@@ -55,9 +55,7 @@ def test_what_cannot_be_is_none() -> None:
 @pytest.mark.parametrize(
     ("poles", "gain", "stable"), [((0.9,), 0.05, True), ((0.9,), 0.2, False), ((-0.5, 1.1), 0, False)]
 )
-def test_a_loop_contracts_where_no_pole_can_leave_the_unit_circle(
-    poles: tuple[float, ...], gain: float, stable: bool
-) -> None:
+def test_a_loop_contracts_if_poles_stay_in_the_unit_circle(poles: tuple[float, ...], gain: float, stable: bool) -> None:
     assert (lyapunov.contraction(scalar(*poles, gain=gain), 1.0) is not None) == stable
 
 
@@ -67,7 +65,7 @@ def test_the_fastest_decay_is_that_of_the_slowest_pole() -> None:
     assert proof.ratio == pytest.approx(0.81, abs=0.01)
 
 
-def test_the_attractor_is_little_larger_than_a_constant_disturbance_makes_it() -> None:
+def test_the_attractor_bound_is_tight() -> None:
     proof = lyapunov.attractor(scalar(0.9))
     assert proof
     least = 0.1 / (1.0 - 0.9)

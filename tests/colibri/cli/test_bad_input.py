@@ -243,7 +243,7 @@ def test_what_a_stream_cannot_encode_is_escaped(tmp_path: Path) -> None:
     [(("fly", "hover"), "."), (("compare", "--track", "hover"), "."), (("sitl", "--plant-port", "0"), "0")],
     ids=["fly", "compare", "sitl"],
 )
-def test_two_flights_into_one_folder_are_refused_the_second_in_one_line(
+def test_a_second_flight_into_one_folder_is_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...], folder: str
 ) -> None:
     with FolderLock(tmp_path / folder, "--out"), pytest.raises(SystemExit) as ended:

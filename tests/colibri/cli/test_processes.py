@@ -94,7 +94,7 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
 
 
-def test_processes_are_forked_where_no_thread_can_be_lost_and_are_the_same() -> None:
+def test_forked_processes_fly_the_same() -> None:
     command = [sys.executable, "-P", "-u", "-c", FORKING]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)
     assert done.stdout.splitlines() == [
@@ -107,7 +107,7 @@ def test_processes_are_forked_where_no_thread_can_be_lost_and_are_the_same() -> 
     assert done.stderr.splitlines() == [error, error]
 
 
-def test_a_flight_loads_neither_what_compiles_nor_other_solvers_nor_what_draws(tmp_path: Path) -> None:
+def test_a_flight_loads_no_compiler_solver_or_plotter(tmp_path: Path) -> None:
     words = ["fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--no-figures", "--out", str(tmp_path)]
     heavy = {"numba.np.arraymath", "scipy.linalg", "scipy.sparse", "qpsolvers", "matplotlib", "rich"}
     program = f"import sys\nfrom colibri.cli.main import main\nmain({words})\nprint({heavy} & set(sys.modules))"

@@ -35,9 +35,7 @@ def test_a_view_beside_needs_a_link_to_call(capsys: pytest.CaptureFixture[str]) 
     assert "--view needs --link udp" in capsys.readouterr().err
 
 
-def test_a_folder_that_only_looks_like_a_flight_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_is_no_flight_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("provenance.json", "plant.csv", "autopilot.csv"):
         (tmp_path / name).touch()
     with pytest.raises(SystemExit) as ended:

@@ -171,7 +171,7 @@ def test_it_flies_by_other_setpoints_too(flights: Flights, kind: SetpointKind) -
 
 
 @pytest.mark.long
-def test_an_identification_finds_the_response_that_the_vehicle_has(flights: Flights) -> None:
+def test_an_identification_finds_the_vehicles_response(flights: Flights) -> None:
     ride = in_air(flights, CompanionSettings(identifies=True))
     ride.to_the_end(60.0)
     assert ride.companion.ended

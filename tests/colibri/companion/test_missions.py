@@ -57,7 +57,7 @@ def test_waypoints_are_placed_by_the_home_that_the_vehicle_has(tmp_path: Path) -
     assert moved == pytest.approx(np.array(PLACES) + np.array([0.0, 10.0, -1.5]), abs=1e-3)
 
 
-def test_a_track_passes_the_waypoints_in_order_and_at_rest_at_both_ends(tmp_path: Path) -> None:
+def test_a_track_passes_waypoints_and_rests_at_both_ends(tmp_path: Path) -> None:
     given = read_plan(plan(tmp_path, waypoints())).waypoints(HERE)
     flown = track_through(given, load_vehicle("hummingbird"), load_profile("flight")).track
     passed = position(flown, given.times_s)
@@ -118,7 +118,7 @@ def test_a_file_that_is_no_mission_is_refused(text: str, tmp_path: Path) -> None
 
 
 @pytest.mark.long
-def test_a_vehicle_says_where_its_home_is_and_a_mission_is_flown_from_there(tmp_path: Path) -> None:
+def test_a_mission_is_flown_from_the_vehicles_home(tmp_path: Path) -> None:
     with Flights(Setting(), None) as flights:
         sitl = flights.begin(airborne=2.5)
         port, seeker = Port(sitl), HomeSeeker(VehiclePeer())

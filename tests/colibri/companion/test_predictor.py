@@ -22,7 +22,7 @@ def hovering(at_us: int, x: float, vx: float, rate: tuple[float, float, float] =
     return TimedState(at_us, (x, 0.0, 2.0), (vx, 0.0, 0.0), LEVEL, rate)
 
 
-def test_a_position_that_moves_faster_than_the_velocity_says_is_predicted_and_its_velocity_is_the_position_s() -> None:
+def test_position_and_velocity_are_predicted_consistently() -> None:
     predictor, drift_m_s = Predictor(HUMMINGBIRD, FIRST), 0.3
     for n in range(250):
         predictor.observe(8000 * n, hovering(8000 * n, 0.1 + 0.008 * n * (0.5 + drift_m_s), 0.5))
@@ -39,7 +39,7 @@ def test_an_estimate_without_drift_is_predicted_as_it_is() -> None:
     assert predictor.drift_m_s == pytest.approx(np.zeros(3), abs=1e-9)
 
 
-def test_rates_of_second_order_are_those_of_the_differential_equation() -> None:
+def test_second_order_rates_solve_the_differential_equation() -> None:
     y, commands = np.zeros(model.STATES), np.array([[1.0, -0.5, 0.3, 9.81]])
     y[6], y[model.LIFT] = 1.0, 9.81
     numbers = packed(model.response_model(HUMMINGBIRD, SECOND))
@@ -53,7 +53,7 @@ def test_rates_of_second_order_are_those_of_the_differential_equation() -> None:
         assert after[14 + axis] == pytest.approx(exact[1], rel=0.01, abs=0.03)
 
 
-def test_trembling_measurements_of_a_rate_of_second_order_are_smoothed() -> None:
+def test_noisy_second_order_rates_are_smoothed() -> None:
     predictor, random = Predictor(HUMMINGBIRD, SECOND), np.random.default_rng(1)
     predicted = []
     for n in range(500):
@@ -63,7 +63,7 @@ def test_trembling_measurements_of_a_rate_of_second_order_are_smoothed() -> None
     assert np.std(predicted[100:]) < 0.04
 
 
-def test_the_command_that_gives_an_acceleration_gives_it_once_the_lag_is_over() -> None:
+def test_a_command_gives_its_acceleration_after_the_lag() -> None:
     wanted_rad_s2, interval_s, y = 4.0, 0.008, np.zeros(model.STATES)
     y[6], y[model.LIFT] = 1.0, 9.81
     numbers = packed(model.response_model(HUMMINGBIRD, SECOND))

@@ -88,7 +88,7 @@ def test_a_pilot_s_mode_is_obeyed_within_a_tenth_of_a_second(made: Callable[[], 
     assert len(vehicle.modes) == orders
 
 
-def test_px4_is_streamed_setpoints_before_it_is_asked_for_offboard() -> None:
+def test_px4_gets_setpoints_before_offboard_is_requested() -> None:
     vehicle = Px4()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=1.0))
     ride.to_the_end(40.0)
@@ -105,7 +105,7 @@ def test_ardupilot_takes_off_in_guided_and_is_left_in_loiter() -> None:
     assert [mode for _, mode in vehicle.modes] == [GUIDED, LOITER]
 
 
-def test_an_ardupilot_that_would_take_thrust_for_a_climb_rate_is_not_flown() -> None:
+def test_an_ardupilot_taking_climb_rates_is_refused() -> None:
     vehicle = ArduPilot()
     vehicle.params["GUID_OPTIONS"] = 0
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, gives_up_s=6.0))

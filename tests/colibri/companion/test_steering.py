@@ -45,7 +45,7 @@ def test_the_commanded_rate_reaches_the_next_one_exactly() -> None:
     assert after[model.RATE] == pytest.approx(wanted)
 
 
-def test_what_is_commanded_stays_within_what_the_stack_lets_through() -> None:
+def test_commands_stay_within_the_limits_of_the_stack() -> None:
     assert model.rate_command((0.0, 0.0, 0.0), (5.0, -5.0, 1.0), 0.008, RESPONSE) == (9.0, -9.0, 9.0)
 
 
@@ -79,7 +79,7 @@ def test_a_fit_finds_the_lag_that_there_is() -> None:
     assert found.order == 1
 
 
-def test_a_fit_finds_a_lag_of_second_order_behind_a_delay_and_says_so() -> None:
+def test_a_fit_finds_a_second_order_lag_and_delay() -> None:
     t, late, rows = np.arange(0.0, duration_s(), 0.008), 60, []
     commands, rate, turning = np.array([step_at(float(time_s)) for time_s in t]), np.zeros(3), np.zeros(3)
     times, lags, behind = np.arange(0.0, duration_s(), 0.001), np.array([0.07, 0.06, 0.3]), np.array([0.04, 0.03, 0.08])
@@ -138,7 +138,7 @@ def test_a_track_begins_at_rest_and_goes_on_as_it_is(name: str) -> None:
     assert position(started, np.array([0.0])) == pytest.approx(position(as_it_is, np.array([0.0])))
 
 
-def test_a_vehicle_that_its_stack_turns_more_slowly_has_moments_of_a_body() -> None:
+def test_a_slower_attitude_loop_becomes_inertia() -> None:
     slow = PX4.response._replace(max_acceleration_rad_s2=(10.0, 12.0, 6.0))
     ix, iy, iz = turning_no_faster(load_vehicle("iris"), slow).body.inertia_kg_m2
     before = load_vehicle("iris").body.inertia_kg_m2

@@ -103,7 +103,7 @@ def test_a_gap_in_the_setpoints_is_an_overload_too() -> None:
     assert "210 ms ago" in limit.words(FlightFacts(gap_s=0.21), FlightLimits())
 
 
-def test_the_pace_is_the_part_of_the_setpoints_of_the_last_second() -> None:
+def test_the_pace_counts_setpoints_of_the_last_second() -> None:
     pace = Pace()
     pace.begin(5_000_000)
     assert pace.kept(5_900_000, 8_000) == 1.0

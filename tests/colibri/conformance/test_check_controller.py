@@ -103,7 +103,7 @@ def test_a_decision_of_other_types_is_a_failure_and_no_traceback(law: type[laws.
     assert {row.found[: len(said)] for row in found.failed if row.area == "limits"} == {said}
 
 
-def test_a_law_that_decides_by_chance_is_caught_and_one_that_is_built_otherwise() -> None:
+def test_a_law_that_decides_by_chance_is_caught() -> None:
     assert "the same step twice" in {row.tried for row in tried(laws.Random, "memory").failed}
     caught = {row.tried for row in tried(laws.BuiltOtherwise, "memory").failed}
     assert "the flight again by a law built anew" in caught
@@ -175,7 +175,7 @@ def test_flown_steps_are_taken_again_bit_for_bit() -> None:
         assert step.again(law, step.memory)[1].rotor_speeds.tobytes() == step.rotor_speeds.tobytes()
 
 
-def test_the_command_prints_the_table_what_failed_and_how_to_see_it(
+def test_the_command_prints_the_table_and_the_failures(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert exit_code(["check-controller", "geometric-se3", "--only", "memory"]) == 0

@@ -82,9 +82,7 @@ def test_without_an_extra_its_command_is_said(monkeypatch: pytest.MonkeyPatch) -
     assert tune.advice == "if you need it: pip install 'colibri-sitl[tune]'"
 
 
-def test_the_port_of_the_plant_must_be_free_and_others_may_be_waited_at(
-    monkeypatch: pytest.MonkeyPatch, taken: int
-) -> None:
+def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, taken: int) -> None:
     monkeypatch.setattr(network, "PLANT_PORT", taken)
     monkeypatch.setattr(network, "GROUND_PORT", taken)
     ground, _, plant = network.ports()

@@ -155,7 +155,7 @@ def test_bad_options_are_refused_in_one_line(options: dict[str, Any], said: str)
     assert "\n" not in str(refused.value)
 
 
-def test_a_figure_is_matplotlibs_and_a_notebook_shows_table_and_figure(hover: colibri.Flight) -> None:
+def test_a_notebook_shows_table_and_figure(hover: colibri.Flight) -> None:
     (axes, *_) = hover.plot("position").axes
     shown = [np.asarray(line.get_xdata()) for line in axes.lines]
     assert any(np.array_equal(t, hover.samples["t"]) for t in shown)

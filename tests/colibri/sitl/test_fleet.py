@@ -20,7 +20,7 @@ def test_all_fly_as_long_whoever_is_flown() -> None:
         assert fleet[1].position[2] > 0.1
 
 
-def test_one_that_is_behind_catches_up_and_none_is_more_than_a_frame_ahead() -> None:
+def test_a_vehicle_behind_catches_up_within_a_frame() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         ahead = flights.begin()
         ahead.run(0.1)

@@ -70,7 +70,7 @@ def test_the_same_flight_of_processes_from_scratch() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
-def test_where_workers_take_up_all_cores_each_keeps_to_one_with_what_it_starts() -> None:
+def test_each_worker_keeps_to_one_core() -> None:
     def cores_of(worker: int, workers: int) -> list[set[int]]:
         with one_core(worker, workers):
             started = subprocess.run([sys.executable, "-c", CORES], capture_output=True, text=True, check=True)
@@ -87,7 +87,7 @@ def test_where_workers_take_up_all_cores_each_keeps_to_one_with_what_it_starts()
 
 
 @pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_a_bad_link_between_plant_and_autopilot_changes_no_flight(forked: Launcher, processes: bool) -> None:
+def test_a_bad_plant_link_changes_no_flight(forked: Launcher, processes: bool) -> None:
     def fly(sitl: Sitl) -> None:
         sitl.goto(0.3, 0.0, 3.0, wait=False)
         sitl.run(0.5)

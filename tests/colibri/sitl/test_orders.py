@@ -15,7 +15,7 @@ def test_a_takeoff_is_done_when_it_is_there() -> None:
         assert sitl.is_at((0.0, 0.0, 5.0))
 
 
-def test_a_takeoff_without_a_height_is_as_high_as_the_parameter_says() -> None:
+def test_a_takeoff_without_a_height_uses_the_parameter() -> None:
     with Flights(Setting(params={"MIS_TAKEOFF_ALT": 1.5}), None) as flights:
         sitl = flights.begin(start={"x": 2.0})
         sitl.takeoff()

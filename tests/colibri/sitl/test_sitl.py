@@ -114,7 +114,7 @@ def test_a_flight_is_gone_when_its_test_is_over(pytester: pytest.Pytester) -> No
     run(pytester, text).assert_outcomes(passed=2)
 
 
-def test_a_failed_test_keeps_its_flight_and_says_how_to_fly_it_again(pytester: pytest.Pytester) -> None:
+def test_a_failed_test_keeps_its_flight_for_replay(pytester: pytest.Pytester) -> None:
     result = run(
         pytester,
         """
@@ -174,7 +174,7 @@ def test_only_flights_of_tests_that_fail_now_are_kept(pytester: pytest.Pytester)
 
 
 @pytest.mark.parametrize("hashes", [(), ("--sitl-hashes", "sitl-failures/hashes")])
-def test_what_cannot_be_kept_is_said_and_the_failure_still_reported(
+def test_a_failure_is_reported_even_if_its_flight_is_not_kept(
     pytester: pytest.Pytester, hashes: tuple[str, ...]
 ) -> None:
     (pytester.path / "sitl-failures").touch()  # as good as a folder that cannot be written
@@ -239,7 +239,7 @@ def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester)
     result.stdout.no_fnmatch_line("During handling of the above exception*")
 
 
-def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester: pytest.Pytester) -> None:
+def test_a_ground_link_is_bad_by_option_or_mark(pytester: pytest.Pytester) -> None:
     source = """
         import pytest
 

@@ -32,7 +32,7 @@ def test_flights_are_pooled(pooling: Any, name: str, pooled: float) -> None:
     assert objective.pooled(values) == pytest.approx(pooled)
 
 
-def test_a_lost_flight_counts_ten_times_the_largest_of_the_profile_as_it_is() -> None:
+def test_a_lost_flight_costs_ten_times_the_worst() -> None:
     before = [flown(0.0, 0.5), flown(0.0, 2.0), flown(0.0, 900.0, verdict=Verdict.LOST)]
     worst = RMSE.worst(before, METRICS)
     assert worst == 20.0

@@ -72,7 +72,7 @@ def test_what_it_writes(results: TuningResults, folder: Path) -> None:
     assert "flight-tuned" in flights
 
 
-def test_the_profile_says_where_it_comes_from_and_flies_what_was_flown(results: TuningResults, folder: Path) -> None:
+def test_the_tuned_profile_names_its_origin_and_flies(results: TuningResults, folder: Path) -> None:
     text = (folder / "profile.toml").read_text(encoding="utf-8")
     assert text == results.profile_text
     first, second, third = text.splitlines()[:3]

@@ -31,7 +31,7 @@ def plain(trials: list[Ended]) -> list[tuple[object, ...]]:
     return [(trial.number, trial.values, trial.params) for trial in trials]
 
 
-def test_the_first_is_the_profile_as_it_is_and_others_have_four_digits(expected: list[Ended]) -> None:
+def test_the_first_trial_is_the_profile_as_it_is(expected: list[Ended]) -> None:
     assert expected[0].params == {POSITION: 100.0, RATE: 0.015}
     for trial in expected:
         assert all(value == float(f"{value:.4g}") for value in trial.params.values())
@@ -49,9 +49,7 @@ def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[Ended]) ->
 
 
 @pytest.mark.parametrize("cut", range(1, 30, 4))
-def test_after_the_end_of_a_process_another_goes_on_as_that_would_have(
-    cut: int, tmp_path: Path, expected: list[Ended]
-) -> None:
+def test_another_process_continues_the_tuning(cut: int, tmp_path: Path, expected: list[Ended]) -> None:
     with Trials(tmp_path, planned(trials=14)) as shared:
         for _ in range(11):
             begun = shared.ask()

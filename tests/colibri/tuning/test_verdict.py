@@ -62,7 +62,7 @@ def test_worse_in_one_objective_is_not_better() -> None:
     assert better(compared(0.5, **both))
 
 
-def test_lost_flights_count_where_it_was_tuned_for_and_are_left_out_elsewhere() -> None:
+def test_lost_flights_count_only_in_the_tuned_metric() -> None:
     tuned_for = compared(0.5, lost_after=2)[0]
     beside = next(each for each in compared(0.5, 2, **BESIDE) if each.what == "rmse_m, mean")
     assert tuned_for.after > 0.5 * tuned_for.before
@@ -79,7 +79,7 @@ def test_what_is_rare_and_its_interval_are_in_the_same_unit() -> None:
     assert overall.changes == ("-1.233", "-3.7 to +0")
 
 
-def test_a_metric_below_zero_rises_where_its_change_is_above_zero() -> None:
+def test_a_negative_metric_rises_by_a_positive_change() -> None:
     beside = next(each for each in compared(0.5, before=-1.0, **BESIDE) if each.what == "rmse_m, mean")
     assert beside.after > beside.before
     assert beside.change == pytest.approx(0.5)
@@ -91,7 +91,7 @@ def test_a_combination_of_which_nothing_is_known_has_no_row() -> None:
     assert [each.where for each in found if each.what == "share_lost"] == ["all", "hover", "spiral"]
 
 
-def test_the_check_has_other_seeds_other_draws_and_the_same_for_both() -> None:
+def test_the_check_uses_other_seeds_the_same_for_both() -> None:
     mass = "plant-vehicle.body.mass_kg"
     tuning = planned(check_seeds="11-14", draw={mass: {"uniform": [0.68, 0.74]}}, **TRACKS)
     profile = colibri.load_profile("flight")

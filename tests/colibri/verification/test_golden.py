@@ -82,7 +82,7 @@ def test_what_differs_is_named_with_both_hashes(
     assert verify("--only", "short", "--only", "hop", "--quiet") == 0
 
 
-def test_one_flight_is_renewed_alone_and_what_is_no_flight_is_dropped(
+def test_one_flight_is_renewed_and_non_flights_are_dropped(
     verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     verify("--renew", "--quiet")

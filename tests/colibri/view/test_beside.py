@@ -69,7 +69,7 @@ def test_a_flight_beside_its_page_is_the_same(unwatched: str, opened: list[str],
     assert report["trajectory_sha256"] == unwatched
 
 
-def test_a_vehicle_of_ground_stations_beside_its_page_flies_the_same(
+def test_a_station_vehicle_flies_the_same_beside_its_page(
     unwatched_hold: bytes, opened: list[str], tmp_path: Path
 ) -> None:
     assert held_in_wind(tmp_path, "--view") == unwatched_hold

@@ -131,7 +131,7 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     assert page.plotted == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
 
 
-def test_a_browser_that_lays_nothing_out_is_not_waited_for_longer(recorded: RecordedFlight) -> None:
+def test_a_browser_without_layout_is_not_waited_for(recorded: RecordedFlight) -> None:
     page = Recorder()
     show = Show(page, [recorded], 10.0)  # type: ignore[arg-type]
     show.turn(10.0)

@@ -101,7 +101,7 @@ def test_without_dask_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.long
-def test_a_job_that_kills_its_workers_is_given_up_and_the_others_are_done(cluster: Processes) -> None:
+def test_a_job_that_kills_its_workers_is_given_up(cluster: Processes) -> None:
     from colibri.campaigns.engines.engine import Killed
     from tests.colibri.campaigns.engines import jobs
 

@@ -21,7 +21,7 @@ def deadly(_job: int) -> int:
     return 0
 
 
-def test_results_are_in_the_order_of_the_jobs_and_kept_as_they_come() -> None:
+def test_results_are_ordered_and_kept_as_they_come() -> None:
     kept: list[int] = []
     assert in_order(late, range(5), "jobs", quiet=True, keep=kept.append) == [0, 1, 4, 9, 16]
     assert sorted(kept) == [0, 1, 4, 9, 16]
