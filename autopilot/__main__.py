@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.spec import Starter, add_process_options, described
+from colibri.common.process.spec import Starter, add_process_options, read_process
 from colibri.common.spec import add_options
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import BlockingReceiver
@@ -29,7 +29,7 @@ def command_line() -> ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the autopilot of a command line; return the exit code."""
-    return run_autopilot(*described(AutopilotSpec, command_line().parse_args(argv)))
+    return run_autopilot(*read_process(AutopilotSpec, command_line().parse_args(argv)))
 
 
 def run_autopilot(spec: AutopilotSpec, starter: Starter) -> int:

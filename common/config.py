@@ -156,14 +156,13 @@ def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
     """
     parent: Any = tree
     last: Any = ""
-    found, above = tree, ""
+    found = tree
     for name in key.split("."):
         places = found if isinstance(found, dict) else dict(enumerate(found)) if isinstance(found, list) else {}
         choices = {str(place): place for place in places}
         if name not in choices:
-            of = f"key of {above}" if above else "key"
-            raise error(f"{key}: {unknown(of, name, choices)}")
-        parent, found, above, last = found, places[choices[name]], f"{above}.{name}".lstrip("."), choices[name]
+            raise error(f"{key}: {unknown('key', name, choices)}")
+        parent, found, last = found, places[choices[name]], choices[name]
     return parent, last
 
 

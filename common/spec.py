@@ -11,7 +11,6 @@ from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import MISSING, fields
 from enum import StrEnum
-from functools import partial
 from math import inf, isfinite, isinf, nan
 from pathlib import Path, PurePath
 from types import NoneType, UnionType
@@ -84,6 +83,11 @@ class Field(NamedTuple):
             return get_args(self.kind)
         return tuple(self.kind) if isinstance(self.kind, type) and issubclass(self.kind, StrEnum) else ()
 
+    @property
+    def _kinds(self) -> tuple[Any, ...]:
+        """The types that the value may have."""
+        return get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
+
     def read(self, given: Any) -> Any:
         """Return the value for what is `given`: a value of Python, or a text; None is the default.
 
@@ -124,11 +128,12 @@ class Field(NamedTuple):
             return given
         if self.kind in (int, float):
             return self._number(given)
+        if isinstance(given, tuple(kind for kind in self._kinds if isinstance(kind, type))):
+            return given
         try:
             return msgspec.convert(given, self.kind, dec_hook=lambda kind, value: kind(value))
         except msgspec.ValidationError as error:
-            kinds = get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
-            words = " or ".join("a name" if kind is str else f"a {kind.__name__}" for kind in kinds)
+            words = " or ".join("a name" if kind is str else f"a {kind.__name__}" for kind in self._kinds)
             where = str(error).partition(" - at ")[2]
             reason = f"must be {words}, not {type(given).__name__}" if not where else str(error).replace("`", "")
             raise ArgumentTypeError(reason) from error
@@ -218,44 +223,34 @@ def add_options(
 
 def _add(parser: ArgumentParser, field: Field, shown: Mapping[str, str], *, given_only: bool) -> None:
     option, default = field.option, field.default
-    words = option.help
-    if field.name in shown:
-        words = f"{words} (default: {shown[field.name]})"
-    elif (
-        "(default" not in words and isinstance(default, int | float | str | PurePath) and not isinstance(default, bool)
-    ):
-        said = ENDLESS if default == inf else f"{default:g}" if isinstance(default, float) else default
-        words = f"{words} (default {said})"
-    words = words.replace("%", "%%")
+    words = described(field, shown.get(field.name)).replace("%", "%%")
     name = f"--{(option.flag or field.name).replace('_', '-')}"
-    initial = SUPPRESS if given_only else default
+    choices: dict[str, Any] = {"help": words}
     if field.kind is bool:
-        action: Any = "store_false" if default else "store_true"
         name = f"--no-{name[2:]}" if default else name
-        parser.add_argument(name, dest=field.name, action=action, default=initial, help=words)
-        return
-    metavar = option.metavar or ("|".join(field.choices) if field.choices else field.name.upper())
-    reader = partial(_told, field)
-    if default is MISSING:
-        parser.add_argument(field.name, type=reader, metavar=metavar, help=words)
-    elif field.repeated:
-        initial = SUPPRESS if given_only else list(default)
-        words = words if "may be repeated" in words else f"{words}; may be repeated"
-        parser.add_argument(
-            name, dest=field.name, type=reader, action="append", default=initial, metavar=metavar, help=words
-        )
+        choices |= {"action": "store_false" if default else "store_true"}
     else:
-        parser.add_argument(name, dest=field.name, type=reader, default=initial, metavar=metavar, help=words)
+        metavar = option.metavar or "|".join(field.choices) or field.name.upper()
+        choices |= {"type": field.read_text, "metavar": metavar}
+    if default is MISSING:
+        parser.add_argument(field.name, **choices)
+        return
+    if field.repeated:
+        choices |= {"action": "append", "help": f"{words}; may be repeated"}
+        default = list(default)
+    parser.add_argument(name, dest=field.name, default=SUPPRESS if given_only else default, **choices)
 
 
-def _is_shown(default: Any) -> bool:
-    """Return whether the help shows a default."""
-    plain = isinstance(default, int | float | str | PurePath) and not isinstance(default, bool)
-    return plain or hasattr(default, "_fields")
-
-
-def _told(field: Field, text: str) -> Any:
-    return field.read_text(text)
+def described(field: Field, default: str | None = None) -> str:
+    """Return the help of an option with its default, in words or as it is."""
+    words = field.option.help
+    if default is not None:
+        return f"{words} (default: {default})"
+    value = field.default
+    plain = isinstance(value, int | float | str | PurePath) and not isinstance(value, bool)
+    if "(default" in words or not (plain or hasattr(value, "_fields")):
+        return words
+    return f"{words} (default {ENDLESS if value == inf else f'{value:g}' if isinstance(value, float) else value})"
 
 
 def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:

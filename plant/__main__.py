@@ -6,7 +6,7 @@ from math import inf
 
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail
-from colibri.common.process.spec import Starter, add_process_options, described
+from colibri.common.process.spec import Starter, add_process_options, read_process
 from colibri.common.spec import add_options
 from colibri.mavlink.links.open import open_ground_link, open_link
 from colibri.mavlink.links.startup import begin, report_compiling
@@ -41,7 +41,7 @@ def command_line() -> ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the plant of a command line; return the exit code."""
-    return run_plant(*described(PlantSpec, command_line().parse_args(argv)))
+    return run_plant(*read_process(PlantSpec, command_line().parse_args(argv)))
 
 
 def run_plant(spec: PlantSpec, starter: Starter) -> int:

@@ -34,9 +34,10 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
         ground = _ground(spec, profile, vehicle, status, stop) if spec.served else None
         autopilot: Autopilot[Any] = ground.autopilot if ground else _alone(spec, profile, vehicle, status)
         end = _flier(spec, vehicle) if spec.simulator else _end(spec, autopilot.frame_interval_us)
+        setup = setup_of(spec, profile, vehicle, spec.flown and file_text(spec.flown)) if spec.out else None
     except Error as error:
         fail(keep_failure(error, spec.out))
-    log = AutopilotLog(spec.out, setup_of(spec, profile, vehicle), ulog=spec.ulog) if spec.out else None
+    log = AutopilotLog(spec.out, setup, ulog=spec.ulog) if spec.out and setup else None
     if ground and log:
         ground.record(log)
     if spec.stepped and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
@@ -57,12 +58,8 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
-def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle) -> Setup:
-    """Return the record of how an autopilot begins.
-
-    Raises:
-        TrackError: The file of its track cannot be read.
-    """
+def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file: str | None) -> Setup:
+    """Return the record of how an autopilot begins; `track_file` is the text of its track's file."""
     return Setup(
         profile=name_of(spec.profile),
         controller=profile.controller,
@@ -79,7 +76,7 @@ def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle) -> Setup:
         ground=spec.served,
         profile_tables=profile,
         vehicle_tables=vehicle,
-        track_file=spec.flown and file_text(spec.flown),
+        track_file=track_file,
     )
 
 

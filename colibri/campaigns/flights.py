@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing, suppress
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -174,6 +175,8 @@ def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
     vehicle = with_keys(factors, "vehicle", assumed)
     flown = _object(spec.plant_vehicle, common.vehicles) if spec.plant_vehicle else vehicle
     plant_vehicle = with_keys(factors, "plant-vehicle", flown).without(spec.without)
+    if spec.link == "udp":  # its processes know neither `common` nor the keys
+        spec = replace(spec, profile=profile, vehicle=vehicle, plant_vehicle=plant_vehicle)
     return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track)))
 
 

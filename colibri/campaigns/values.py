@@ -166,7 +166,7 @@ def shown(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, Mapping):
         return ",".join(f"{key}={shown(each)}" for key, each in value.items())
-    if isinstance(value, list | tuple) and not isinstance(value, Level):
+    if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
         return " ".join(map(shown, value))
     return str(getattr(value, "__name__", None) or getattr(value, "name", None) or value)
 

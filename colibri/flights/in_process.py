@@ -49,10 +49,9 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
     interval_us = plant.interval_us
-    plant_logs, log = (
-        PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.spec.ulog),
-        AutopilotLog(plan.out, setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle), ulog=plan.spec.ulog),
-    )
+    setup = setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle, plan.contents.track_file)
+    plant_logs = PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.spec.ulog)
+    log = AutopilotLog(plan.out, setup, ulog=plan.spec.ulog)
     exchange: Exchange = Direct(autopilot)
     if plan.spec.link == "memory":
         exchange = InMemory(autopilot, interval_us, plan.spec.feedback, plant_logs)

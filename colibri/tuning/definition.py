@@ -163,8 +163,6 @@ def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
         raise TuningError(f"{twice} is said twice: what is tuned is not in fly, grid or draw")
     if "profile" in varied:
         raise TuningError("profile: one is tuned: say which in fly")
-    if campaign.fly.get("link") == "udp":
-        raise TuningError("link: over udp two processes fly, which know files: leave link out")
 
 
 def _check_seeds(given: Any, seeds: tuple[int, ...]) -> tuple[int, ...]:

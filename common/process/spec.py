@@ -51,7 +51,7 @@ def add_process_options(parser: ArgumentParser) -> None:
     add("--spec", action="store_true", help=SUPPRESS)
 
 
-def described(spec: type[S], args: Namespace) -> tuple[S, Starter]:
+def read_process(spec: type[S], args: Namespace) -> tuple[S, Starter]:
     """Return what a command line describes, or with `--spec` the JSON on standard input; and who started the process.
 
     A specification that cannot be read ends the process with one line.

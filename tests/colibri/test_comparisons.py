@@ -231,7 +231,7 @@ def test_a_law_that_cannot_be_built_is_found_first(
             'unknown profile "fast" (choose flight, path, se3, thesis, thesis-euler, a .toml file)',
         ),
         (["--profile", "thesis:pid"], f'unknown controller "pid" (choose {INSTALLED})'),
-        (["--track", "loop"], f'unknown track "loop" (choose {", ".join([*THESIS_TRACKS, *OPTIONS])}'),
+        (["--track", "loop"], f'unknown track "loop" (choose {", ".join([*THESIS_TRACKS, *OPTIONS])})'),
     ],
 )
 def test_bad_contenders_are_one_line(

@@ -38,7 +38,7 @@ NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecu
     [
         (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
         (("--home", "0,181,0,0"), "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180"),
-        (("--identity", "ardupilot"), "argument --identity: invalid choice: 'ardupilot'"),
+        (("--identity", "ardupilot"), 'argument --identity: unknown value "ardupilot" (choose '),
         (("--profile", "fast"), 'unknown profile "fast" (choose flight'),
         (("--vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
         (("--plant-vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
@@ -55,8 +55,8 @@ NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecu
         (("--count", "2", "--gcs", "serial:/dev/ttyACM0:57600"), "--gcs: several vehicles cannot have one port"),
         (("--count", "0"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
         (("--instance", "100"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
-        (("--instance", "-1"), "argument --instance: must not be below zero, not -1"),
-        (("--speed", "0"), "argument --speed: must be above zero, not 0"),
+        (("--instance", "-1"), "argument --instance: must be a whole number of at least 0, not -1"),
+        (("--speed", "0"), "argument --speed: must be a number above 0, or max, not 0"),
     ],
 )
 def test_bad_input_gets_one_line_and_exit_code_2(

@@ -76,7 +76,9 @@ def file_text(name: str) -> str | None:
         return None
     try:
         return Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise TrackError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
         raise TrackError(f"{path}: {error}") from error
 
 

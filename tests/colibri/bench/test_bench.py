@@ -11,7 +11,6 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench import commands, run, sensing, serving, simulators, speed, stages
-from colibri.bench.variants import plan_of, with_blocks, with_intervals
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -148,13 +147,6 @@ def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert said.startswith("colibri: error: ")
     assert said.count("\n") == 1
-
-
-def test_a_profile_written_is_the_profile_read(tmp_path: Path) -> None:
-    profile = with_intervals(with_blocks(load_profile("flight"), (1, 2)), frame_s=0.002, control_s=0.008)
-    read = plan_of(profile, tmp_path, 1.0, "memory").profile
-    assert (read.name, read.file) == ("profile", str(tmp_path / "profile.toml"))
-    assert msgspec.structs.replace(read, name=profile.name, file=profile.file) == profile
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:

@@ -133,7 +133,7 @@ def test_logs_are_kept_and_a_killed_flight_is_a_row(tmp_path: Path) -> None:
             ["--track", "hover", "--set", "latency=1", "--set", "latency=2"],
             "latency is said twice: give all of its values",
         ),
-        (["--track", "hover", "--set", "mass=3"], "unknown factor mass: "),
+        (["--track", "hover", "--set", "mass=3"], 'unknown factor "mass" '),
         (["--track", "hover", "--draw", f"{MASS}=uniform:3"], f"{MASS}: uniform: expected [lowest, highest], not [3]"),
         (["--track", "hover", "--draw", f"{MASS}=gauss:3"], f"{MASS}: expected one of uniform, log-uniform, normal,"),
         (["--track", "hover", "--metrics", "rmse"], 'unknown metric "rmse" (did you mean "rmse_m"?)'),

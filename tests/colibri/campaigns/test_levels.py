@@ -87,7 +87,7 @@ def test_what_a_file_has_as_levels_can_be_replaced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ({"grid": {"track": ["hover"], "plant": {"heavy": {"mass": 1.0}}}}, "unknown factor mass: "),
+        ({"grid": {"track": ["hover"], "plant": {"heavy": {"mass": 1.0}}}}, 'unknown factor "mass" '),
         ({"grid": {"track": {"one": {"profile": "se3"}}}}, "track: a factor with levels needs a name of its own"),
         (
             {"grid": {"track": ["hover"], "verdict": {"one": {}}}},

@@ -151,7 +151,7 @@ def test_a_file_of_colibris_own_is_shown_to_be_copied(
     assert exit_code(["show", what, file.stem]) == 0
     assert capsys.readouterr().out == file.read_text(encoding="utf-8")
     assert exit_code(["show", what, "nobody"]) == 2
-    assert capsys.readouterr().err.startswith(f"colibri: error: unknown {what} nobody: choose ")
+    assert capsys.readouterr().err.startswith(f'colibri: error: unknown {what} "nobody" (choose ')
 
 
 @pytest.mark.parametrize("whom", ["px4", "ardupilot"])

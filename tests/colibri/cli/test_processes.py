@@ -103,7 +103,7 @@ def test_forked_processes_fly_the_same() -> None:
         "forked: listening, ended with exit code 130",
         "anew: 2",
     ]
-    error = "colibri: error: unrecognized arguments: --no-such-option (see colibri plant --help)"
+    error = "colibri: error: nothing: expected udpin:HOST:PORT or udpout:HOST:PORT"
     assert done.stderr.splitlines() == [error, error]
 
 

@@ -200,11 +200,11 @@ def test_the_command_prints_the_table_and_the_failures(
     ("words", "said"),
     [
         (["lpv-mcp"], 'unknown controller "lpv-mcp" (did you mean "lpv-mpc"?)'),
-        (["pid"], "unknown controller pid: installed are cascade"),
+        (["pid"], 'unknown controller "pid" (choose cascade'),
         (["lpv-mpc", "--profile", "thesis"], "profile thesis has no numbers for controller lpv-mpc"),
         (["lpv-mpc", "--profile", "fligt"], 'unknown profile "fligt"'),
         (["lpv-mpc", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly"'),
-        (["lpv-mpc", "--only", "memories"], "unknown area memories: choose interface, memory, limits"),
+        (["lpv-mpc", "--only", "memories"], 'unknown area "memories" (did you mean "memory"?)'),
         (["lpv-mpc", "--duration", "0"], "argument --duration: must be above zero"),
     ],
 )

@@ -92,5 +92,5 @@ def test_a_missing_file_is_named() -> None:
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(VehicleError, match=r'unknown vehicle "dragonfly" (choose .*hummingbird'):
+    with pytest.raises(VehicleError, match=r'unknown vehicle "dragonfly" \(choose .*hummingbird'):
         load_vehicle("dragonfly")

@@ -3,9 +3,12 @@
 import inspect
 import re
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
+
+from colibri.common.spec import Option, described, fields_of
 
 FACES = ("colibri", "colibri.sitl")
 _HEAD = """# Python
@@ -43,7 +46,18 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
         yield f"```\n{_signature(name, thing)}\n```\n"
     yield _text(inspect.getdoc(thing) or "")
     if inspect.isclass(thing):
+        yield from _options(thing)
         yield from _members(thing)
+
+
+def _options(kind: type) -> Iterator[str]:
+    """Yield the options of a specification that are keywords."""
+    if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
+        yield "| option | |\n|---|---|"
+        for name, field in fields_of(kind).items():
+            if field.option.keyword:
+                yield f"| `{name}` | {_cell(described(field))} |"
+        yield ""
 
 
 def _members(kind: type) -> Iterator[str]:

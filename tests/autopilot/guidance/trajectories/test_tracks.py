@@ -21,9 +21,9 @@ def test_the_five_of_the_thesis() -> None:
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("loop", f"unknown track \"loop\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
-        ("", f"unknown track \"\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
-        ("loop:size=3", f"unknown track \"loop\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
+        ("loop", f"unknown track \"loop\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])})"),
+        ("", f"unknown track \"\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])})"),
+        ("loop:size=3", f"unknown track \"loop\" (choose {', '.join([*THESIS_TRACKS, *OPTIONS])})"),
         ("spiral:radius=3", f"track spiral takes no options, but these do: {', '.join(OPTIONS)}"),
         ("spiral:", f"track spiral takes no options, but these do: {', '.join(OPTIONS)}"),
         ("circle:", "track circle: options are KEY=VALUE[,KEY=VALUE…], not '': choose radius, speed, height, yaw"),
