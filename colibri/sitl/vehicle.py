@@ -16,6 +16,7 @@ from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
+from colibri.sitl.backends.inside import Inside
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
@@ -347,6 +348,11 @@ class Sitl(View, Stepped, Steered):
     def kill_autopilot(self) -> None:
         """Kill the autopilot as `kill -9` does, and start it again at once, with the files that it has written."""
         self._lockstep.kill_autopilot()
+
+    @property
+    def inside(self) -> Inside:
+        """Plant and autopilot as objects, for what no message shows; only in memory."""
+        return Inside(self._lockstep)
 
     # Who else is there.
 

@@ -125,6 +125,7 @@ class LockstepSession:
     """A flight that is stepped.
 
     Attributes:
+        plant, autopilot: The two sides.
         truth: How the vehicle is now.
         flown: The last frame that was flown; before the first one, what there is to it.
         acks: Answers of the plant to commands: number and MAV_RESULT.
@@ -133,8 +134,8 @@ class LockstepSession:
 
     def __init__(self, plant: Plant, autopilot: Autopilot, system: int, seed: int = 0) -> None:
         """Bring the two together; the vehicle is system `system`, and `seed` that of what goes wrong between them."""
-        self._plant = plant
-        self._autopilot = autopilot
+        self.plant = plant
+        self.autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)
         self._autopilot_source = bytes(self._codec.source)
         self._truth_source = bytes((system, TRUTH_COMPONENT))
@@ -161,12 +162,12 @@ class LockstepSession:
         if self.trouble.any:
             answer, to_stations, received = self._struggle(frame, step_message, injected)
         else:
-            self._autopilot.receive_frame(frame, step_message)
+            self.autopilot.receive_frame(frame, step_message)
             # What comes last is waited for first: to be woken for each datagram would cost a turn of the core each.
-            to_stations = self._autopilot.to_stations()
-            answer = self._autopilot.answer()
-            self._plant.take(answer + injected)
-            received = self._plant.frame()
+            to_stations = self.autopilot.to_stations()
+            answer = self.autopilot.answer()
+            self.plant.take(answer + injected)
+            received = self.plant.frame()
         self._frame, self.truth = self._taken_in(received)
         if injected:
             self._read_acks(self._frame)
@@ -180,7 +181,7 @@ class LockstepSession:
 
         Returns the answer, what goes to ground stations, and what the plant sent up to its next frame.
         """
-        plant, autopilot, up, down = self._plant, self._autopilot, self._up, self._down
+        plant, autopilot, up, down = self.plant, self.autopilot, self._up, self._down
         began_s = plant.clock_s()
         autopilot.expect(step_message)
         up.put(frame, _us(began_s))
@@ -206,6 +207,10 @@ class LockstepSession:
             if plant.clock_s() > began_s + _GIVE_UP_S:
                 raise SessionError("nothing passes between plant and autopilot, however often it is repeated")
 
+    def measure_again(self) -> None:
+        """Replace the next frame by one of the plant as it is now."""
+        self._frame, self.truth = self._taken_in(self.plant.frame())
+
     def command_to_plant(self, number: int, *params: float) -> bytes:
         """Return a COMMAND_LONG as the autopilot would send it to the plant."""
         values = (*params, *(0.0,) * (7 - len(params)))
@@ -217,14 +222,14 @@ class LockstepSession:
 
     def processes(self) -> dict[str, int]:
         """Return the number of each process that flies."""
-        sides = {"plant": self._plant.process, "autopilot": self._autopilot.process}
+        sides = {"plant": self.plant.process, "autopilot": self.autopilot.process}
         return {name: number for name, number in sides.items() if number is not None}
 
     def kill_autopilot(self) -> None:
         """End the autopilot as a power cut does, and start it again: the plant waits meanwhile."""
-        self._autopilot.kill()
-        self._autopilot.start()
-        self._autopilot.call()
+        self.autopilot.kill()
+        self.autopilot.start()
+        self.autopilot.call()
 
     def _taken_in(self, datagrams: list[bytes]) -> tuple[bytes, StateFrame]:
         *others, datagram = datagrams

@@ -28,7 +28,11 @@ _ADDRESS: Address = ("memory", 0)
 
 
 class MemoryPlant:
-    """A plant in this process."""
+    """A plant in this process.
+
+    Attributes:
+        plant: The plant; None before the first frame.
+    """
 
     process = None
 
@@ -45,7 +49,7 @@ class MemoryPlant:
         serves = tuple(self._builder.starts)
         self._answered = False
         self._end = PlantEnd(system_id=spec.system_id, frame_interval_us=round(1e3 / spec.rate) * 1000, serves=serves)
-        self._plant: Plant | None = None
+        self.plant: Plant | None = None
         self._clock = clock or StoppedClock()
 
     def receive(self, datagram: bytes) -> None:
@@ -58,9 +62,9 @@ class MemoryPlant:
         self._end.received.clear()
         if command is None:
             return
-        assert self._plant is not None, "it has sent a frame"
+        assert self.plant is not None, "it has sent a frame"
         try:
-            self._plant.answer(command, self._end.take_faults())
+            self.plant.answer(command, self._end.take_faults())
         except IntegrationError as error:
             raise SessionError(str(error)) from error
         self._answered = True
@@ -96,15 +100,19 @@ class MemoryPlant:
 
     def _offer(self) -> None:
         end = self._end
-        if self._plant is None:
-            self._plant = self._builder.build(end.feedback, end.frame_interval_us)
+        if self.plant is None:
+            self.plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
-        frame, plant_status = self._plant.measure()
-        end.offer(frame, self._clock.now_s(), plant_status, state_frame(self._plant.world))
+        frame, plant_status = self.plant.measure()
+        end.offer(frame, self._clock.now_s(), plant_status, state_frame(self.plant.world))
 
 
 class MemoryAutopilot:
-    """An autopilot in this process, with its ground side as the process has it."""
+    """An autopilot in this process, with its ground side as the process has it.
+
+    Attributes:
+        autopilot: The autopilot; another one after a restart.
+    """
 
     process = None
 
@@ -129,10 +137,15 @@ class MemoryAutopilot:
             self._ground = Ground(spec, *spec.load(), _Silence(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
-        self._autopilot = self._ground.autopilot
+        self.autopilot = self._ground.autopilot
+        self.connect()
+
+    def connect(self) -> None:
+        """Forget which frame the plant sent last: the next one may be of any time."""
+        spec = self._spec
         self._end = AutopilotEnd(
             system_id=spec.system_id,
-            frame_interval_us=self._autopilot.frame_interval_us,
+            frame_interval_us=self.autopilot.frame_interval_us,
             now_s=NEVER_LATE_S,
             feedback=spec.feedback,
         )
@@ -155,7 +168,7 @@ class MemoryAutopilot:
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         try:
-            answer(self._end, self._autopilot, datagram, NEVER_LATE_S)
+            answer(self._end, self.autopilot, datagram, NEVER_LATE_S)
         except DecisionError as error:
             raise SessionError(f"the autopilot ended: {error}") from error
 
@@ -176,7 +189,7 @@ class MemoryAutopilot:
 
     def to_stations(self) -> StepMessage:
         """Return what it sends to ground stations at that frame."""
-        self._autopilot = self._ground.serve(perf_counter())
+        self.autopilot = self._ground.serve(perf_counter())
         assert self._conductor.to_stations is not None, "it has served them"
         return self._conductor.to_stations
 

@@ -2,9 +2,10 @@
 
 import gc
 
+import pytest
+
 from colibri.autopilot.commander.rules.modes import Mode
-from tools.harness.client import Client
-from tools.harness.copter_flight import CopterFlight
+from colibri.sitl.vehicle import Sitl
 from tools.harness.stations import Station
 from tools.soak.clients import crew, faults
 
@@ -13,36 +14,32 @@ WARM_S = 8.0
 MAX_NEW_OBJECTS = 100
 
 
-class Talking(Client):
-    """A client that answers what comes with the next frame."""
+def connect(sitl: Sitl, client: Station, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a client answer what comes with the next frame."""
+    link = sitl.client(*client.identity)
 
-    def __init__(self, station: Station, port: int) -> None:
-        super().__init__(*station.identity, port=port)
-        self._station = station
-        self.now_s = 0.0
+    def arriving(datagram: bytes, now_us: int) -> None:
+        for answer in client.receive(datagram, now_us * 1e-6):
+            link.send_raw(answer)
 
-    def receive(self, datagram: bytes) -> None:
-        for answer in self._station.receive(datagram, self.now_s):
-            self.send_raw(answer)
+    monkeypatch.setattr(link, "arriving", arriving)
 
 
-def test_three_clients_at_once_are_served_each_for_itself() -> None:
+def objects(sitl: Sitl) -> int:
+    sitl.gcs.forget()
+    gc.collect()
+    return len(gc.get_objects())
+
+
+def test_three_clients_at_once_are_each_served(sitl: Sitl, monkeypatch: pytest.MonkeyPatch) -> None:
+    sitl.gcs.silent = True
     clients = crew()
-    talking = [Talking(client, 16000 + number) for number, client in enumerate(clients)]
-    flight = CopterFlight(client=talking[0])
-    for client in talking[1:]:
-        flight.add(client)
-
-    def tick() -> None:
-        for client in talking:
-            client.now_s = flight.time_s
-
-    flight.run(WARM_S, tick)
-    gc.collect()
-    before = len(gc.get_objects())
-    flight.run(LASTS_S - WARM_S, tick)
-    gc.collect()
+    for client in clients:
+        connect(sitl, client, monkeypatch)
+    sitl.run(WARM_S)
+    before = objects(sitl)
+    sitl.run(LASTS_S - WARM_S)
     assert faults(clients) == []
-    assert len(gc.get_objects()) - before < MAX_NEW_OBJECTS
-    assert flight.mode is Mode.OFFBOARD
+    assert objects(sitl) - before < MAX_NEW_OBJECTS
+    assert sitl.mode is Mode.OFFBOARD
     assert all(sum(client.acks.values()) > 20 for client in clients)

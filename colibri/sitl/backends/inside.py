@@ -1,0 +1,55 @@
+"""Plant and autopilot of a flight in memory, as objects: for tests of what no message shows or changes."""
+
+from colibri.autopilot.core.copter import Copter
+from colibri.plant.physics.world import World
+from colibri.plant.simulation.plant import Plant
+from colibri.sitl.backends.lockstep import LockstepSession
+from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
+from colibri.sitl.errors import SitlError
+
+
+class Inside:
+    """The two sides of a flight in memory.
+
+    Attributes:
+        plant: The plant.
+    """
+
+    def __init__(self, session: LockstepSession) -> None:
+        """Open a flight.
+
+        Raises:
+            SitlError: Its autopilot is in another process.
+        """
+        plant, autopilot = session.plant, session.autopilot
+        if not (isinstance(plant, MemoryPlant) and isinstance(autopilot, MemoryAutopilot)):
+            raise SitlError("nothing can be seen inside another process: fly with --sitl-link memory")
+        assert plant.plant is not None, "it has sent a frame"
+        self._session = session
+        self._autopilot = autopilot
+        self.plant: Plant = plant.plant
+
+    @property
+    def copter(self) -> Copter:
+        """The autopilot; another one after a restart."""
+        return self._autopilot.copter
+
+    @property
+    def world(self) -> World:
+        """The plant's world; the next frame is of one that is set."""
+        return self.plant.world
+
+    @world.setter
+    def world(self, world: World) -> None:
+        self.plant.world = world
+        self._measure_again()
+
+    def skip(self, frames: int) -> None:
+        """Have the plant go on by itself for some frames, with the last command."""
+        for _ in range(frames):
+            self.plant.go_on()
+        self._measure_again()
+
+    def _measure_again(self) -> None:
+        self._autopilot.connect()
+        self._session.measure_again()
