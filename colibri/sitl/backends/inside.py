@@ -1,5 +1,6 @@
 """Plant and autopilot of a flight in memory, as objects: for tests of what no message shows or changes."""
 
+from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import Copter
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
@@ -26,13 +27,18 @@ class Inside:
             raise SitlError("nothing can be seen inside another process: fly with --sitl-link memory")
         assert plant.plant is not None, "it has sent a frame"
         self._session = session
-        self._autopilot = autopilot
+        self._side = autopilot
         self.plant: Plant = plant.plant
 
     @property
+    def autopilot(self) -> Autopilot[Copter]:
+        """What flies the vehicle frame by frame; another one after a restart."""
+        return self._side.autopilot
+
+    @property
     def copter(self) -> Copter:
-        """The autopilot; another one after a restart."""
-        return self._autopilot.copter
+        """What the autopilot does at each stage of a frame."""
+        return self._side.autopilot.stages
 
     @property
     def world(self) -> World:
@@ -51,5 +57,5 @@ class Inside:
         self._measure_again()
 
     def _measure_again(self) -> None:
-        self._autopilot.connect()
+        self._side.connect()
         self._session.measure_again()

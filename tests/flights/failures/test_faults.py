@@ -1,103 +1,132 @@
-"""Flights with faults, injected as a ground station does or by nobody; and flights of an autopilot that is slow."""
+"""Flights with faults of actuators and battery, with a payload, and of an autopilot that is slow or late."""
 
-from math import dist, hypot, nan
+from collections.abc import Callable
+from math import dist, nan
 
 import pytest
 
-from colibri.mavlink.hil.faults import BAROMETER, BATTERY, GPS, GYROSCOPE, MOTOR, OFF, OK, STUCK, WRONG
-from colibri.mavlink.hil.feedback import Feedback
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.copter_flight import ACCEPTED, DENIED, CopterFlight, in_the_air
+from colibri.sitl.vehicle import Sitl
+from tests.support.flying import ACCEPTED, DENIED, UNSUPPORTED, restart
 
 INJECT = mav.MAV_CMD_INJECT_FAILURE
+NOMINAL_KG, PAYLOAD_KG = 0.698, 0.15
+CALM_HOVER = pytest.mark.sitl(airborne=5.0)
 
 
-def test_a_ground_station_weakens_a_rotor_and_the_vehicle_stays() -> None:
-    flight = in_the_air()
-    assert flight.command(INJECT, MOTOR, WRONG, 1.0, 0.65) == DENIED
-    assert flight.client.said("SYS_FAILURE_EN is 0")
-    flight.set_param("SYS_FAILURE_EN", 1)
-    assert flight.command(INJECT, GPS, OFF) == mav.MAV_RESULT_UNSUPPORTED
-    assert flight.client.said("flown by the state")
-    assert flight.command(INJECT, MOTOR, WRONG, 1.0, 65.0) == DENIED
-    assert flight.client.said("part that is left must be 0.001 to 1")
-    assert flight.command(INJECT, MOTOR, WRONG, 1.0, 0.65, nan, nan, nan) == ACCEPTED
-    assert len(flight.client.acks) == 4
-    path = flight.path(8.0)
-    assert 0.005 < max(dist(place, (0.0, 0.0, 5.0)) for place in path) < 0.5
-    weak, other = flight.rotors.controls[0], flight.rotors.controls[2]
+@CALM_HOVER
+def test_a_weak_rotor_is_injected_and_compensated(sitl: Sitl) -> None:
+    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 0.65) == DENIED
+    assert sitl.said("SYS_FAILURE_EN is 0")
+    sitl.set_param("SYS_FAILURE_EN", 1)
+    assert sitl.command(INJECT, GPS, OFF) == UNSUPPORTED
+    assert sitl.said("flown by the state")
+    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 65.0) == DENIED
+    assert sitl.said("part that is left must be 0.001 to 1")
+    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 0.65, nan, nan, nan) == ACCEPTED
+    assert len(sitl.gcs.acks) == 4
+    sitl.run(8.0)
+    away = [dist(place, (0.0, 0.0, 5.0)) for place in sitl.path]
+    assert 0.005 < max(away) < 0.5
+    weak, other = sitl.rotors.controls[0], sitl.rotors.controls[2]
     assert weak / other == pytest.approx(0.65**-0.5, rel=0.02)
-    assert flight.command(INJECT, MOTOR, OK) == ACCEPTED
-    flight.run(4.0)
-    assert flight.rotors.controls[0] == pytest.approx(flight.rotors.controls[2], rel=0.01)
+    assert sitl.inside.copter.parts.rotor_loss.watch.max_evidence == 0.0
+    assert sitl.command(INJECT, MOTOR, OK) == ACCEPTED
+    sitl.run(4.0)
+    assert sitl.rotors.controls[0] == pytest.approx(sitl.rotors.controls[2], rel=0.01)
 
 
-def test_a_battery_that_sags_is_known_to_the_autopilot() -> None:
-    flight = in_the_air()
-    flight.run(1.0)
-    before = flight.client.latest("BATTERY_STATUS")
-    assert before.battery_remaining >= 99
-    assert flight.inject(BATTERY, WRONG, 0, 0.3) == ACCEPTED
-    flight.run(2.5)
-    after = flight.client.latest("BATTERY_STATUS")
+@CALM_HOVER
+def test_the_autopilot_knows_of_a_sagging_battery(sitl: Sitl) -> None:
+    sitl.run(1.0)
+    assert sitl.gcs.latest("BATTERY_STATUS").battery_remaining >= 99
+    sitl.inject("battery", "wrong", 0, 0.3)
+    sitl.run(2.5)
+    after = sitl.gcs.latest("BATTERY_STATUS")
     assert after.battery_remaining == pytest.approx(30, abs=1)
     capacity_ah = load_vehicle("hummingbird").battery.capacity_ah  # type: ignore[union-attr]
-    assert flight.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
-    real_v = flight.world.voltage_v
+    assert sitl.inside.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
     told_v = sum(cell for cell in after.voltages if cell != 65535) / 1e3
-    assert told_v == pytest.approx(real_v, rel=0.03)
-    assert flight.position == pytest.approx((0.0, 0.0, 5.0), abs=0.1)
-    flight.restart()
-    flight.run(0.2)
-    assert flight.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
+    assert told_v == pytest.approx(sitl.inside.world.voltage_v, rel=0.03)
+    assert sitl.position == pytest.approx((0.0, 0.0, 5.0), abs=0.1)
+    restart(sitl, lambda _: None)
+    sitl.run(0.6)
+    assert sitl.inside.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
 
 
-def test_a_gps_that_jumps_and_a_gyroscope_that_errs_are_survived() -> None:
-    flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
-    flight.takeoff(5.0)
-    before = flight.position
-    assert flight.inject(GPS, WRONG, 0, 200.0, 0.0, 0.0) == ACCEPTED
-    flight.run(5.0)
-    assert dist(flight.position, before) < 5.0
-    assert flight.inject(GPS, OK) == ACCEPTED
-    assert flight.inject(GYROSCOPE, WRONG, 0, 0.02, 0.0, 0.0) == ACCEPTED
-    flight.run(5.0)
-    assert max(map(abs, flight.euler[:2])) < 0.2
-    assert flight.inject(GYROSCOPE, OK) == ACCEPTED
-    assert flight.inject(BAROMETER, STUCK) == ACCEPTED
-    flight.run(5.0)
-    assert flight.position[2] == pytest.approx(5.0, abs=2.0)
+def test_a_slow_solver_acts_late_and_skips_samples(sitl_fleet: Callable[..., list[Sitl]]) -> None:
+    def flown(solve_ms: float) -> Sitl:
+        (sitl,) = sitl_fleet(1, airborne=5.0, system=1, params={"SIM_SOLVE_MS": solve_ms})
+        sitl.run(0.5)
+        sitl.goto(2.0, 0.0, 5.0, wait=False)
+        sitl.run(6.0)
+        assert dist(sitl.position, (2.0, 0.0, 5.0)) < 0.1
+        return sitl
+
+    prompt, in_time, late = flown(0.0), flown(8.0), flown(12.0)
+    missed = [sitl.inside.copter.parts.actuation.missed for sitl in (prompt, in_time, late)]
+    assert missed[:2] == [0, 0]
+    assert missed[2] == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
+    assert len({sitl.sha256 for sitl in (prompt, in_time, late)}) == 3
+    assert flown(12.0).sha256 == late.sha256
 
 
-def flown(solve_ms: float) -> tuple[list[tuple[float, ...]], CopterFlight]:
-    """Hold, go 2 m east, hold."""
-    flight = in_the_air(values={"SIM_SOLVE_MS": solve_ms})
-    flight.run(0.5)
-    assert flight.goto(2.0, 0.0, 5.0) == ACCEPTED
-    return [tuple(place) for place in flight.path(6.0)], flight
+def test_a_late_command_gives_another_reproducible_flight(sitl_fleet: Callable[..., list[Sitl]]) -> None:
+    def flown(latency_ms: float) -> Sitl:
+        (sitl,) = sitl_fleet(1, airborne=5.0, system=1, latency=latency_ms)
+        sitl.run(1.5)
+        return sitl
+
+    prompt, late = flown(0.0), flown(5.0)
+    assert late.sha256 == flown(5.0).sha256
+    assert late.sha256 != prompt.sha256
+    assert dist(late.position, prompt.position) < 0.05
 
 
-def test_a_slow_solver_acts_late_and_skips_what_falls_due() -> None:
-    at_once, prompt = flown(0.0)
-    within, in_time = flown(8.0)
-    over, late = flown(12.0)
-    assert prompt.copter.parts.actuation.missed == in_time.copter.parts.actuation.missed == 0
-    assert late.copter.parts.actuation.missed == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
-    assert within != at_once
-    assert over != within
-    for path in (at_once, within, over):
-        x, y, z = path[-1]
-        assert hypot(x - 2.0, y, z - 5.0) < 0.1
-    assert flown(12.0)[0] == over
+# A payload that is picked up and dropped in flight: its mass is estimated, in the air alone.
 
 
-def test_a_late_command_is_a_flight_of_its_own_the_same_each_time() -> None:
-    def path(latency_us: int) -> list[tuple[float, ...]]:
-        flight = in_the_air(latency_us=latency_us)
-        return [tuple(place) for place in flight.path(1.5)]
+def mass_kg(sitl: Sitl) -> float:
+    """Return the mass that the control law has estimated."""
+    decision = sitl.inside.copter.parts.actuation.decision
+    assert decision is not None
+    return decision.diagnostics.mass_kg
 
-    prompt, late = path(0), path(5_000)
-    assert late == path(5_000)
-    assert late != prompt
-    assert dist(late[-1], prompt[-1]) < 0.05
+
+@CALM_HOVER
+def test_a_payload_is_estimated_and_kept_over_a_restart(sitl: Sitl) -> None:
+    sitl.payload_kg = PAYLOAD_KG
+    sitl.run(8.0)
+    assert 4.985 < sitl.path[:, 2].min() < 4.995
+    assert sitl.position[2] == pytest.approx(5.0, abs=1e-4)
+    learned_kg = mass_kg(sitl)
+    assert learned_kg == pytest.approx(NOMINAL_KG + PAYLOAD_KG, rel=0.03)
+    told = {message.name: message.value for message in sitl.heard("NAMED_VALUE_FLOAT")}
+    assert told["mass_kg"] == pytest.approx(learned_kg, rel=0.01)
+    sitl.inside.skip(60)
+    restart(sitl)
+    sitl.run(0.02)
+    assert mass_kg(sitl) == pytest.approx(learned_kg, rel=0.01)
+
+
+def test_the_ground_is_no_payload(sitl: Sitl) -> None:
+    """Neither as it lets the vehicle go nor as it holds it; and each take-off begins with the nominal mass."""
+    sitl.takeoff(1.5)
+    sitl.run(1.0)
+    assert mass_kg(sitl) == pytest.approx(NOMINAL_KG, rel=1e-3)
+    sitl.payload_kg = PAYLOAD_KG
+    sitl.run(3.0)
+    sitl.payload_kg = 0.0
+    sitl.land(wait=False)
+    flown_kg = []
+    ground = sitl.inside.copter.pilot.ground
+    sitl.wait_until(lambda: flown_kg.append(mass_kg(sitl)) or ground.standing, within=10.0)  # type: ignore[func-returns-value]
+    assert flown_kg[1] > 1.08 * NOMINAL_KG > flown_kg[-2] > NOMINAL_KG
+    assert flown_kg[-2] == flown_kg[-120]
+    sitl.takeoff(1.5)
+    sitl.run(1.0)
+    assert mass_kg(sitl) == pytest.approx(NOMINAL_KG, rel=1e-3)
+    assert sitl.mode is Mode.HOLD

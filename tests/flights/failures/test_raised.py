@@ -1,108 +1,87 @@
 """Exceptions in flight where `python -m tools.chaos` throws none: on three rotors, at a restart, in what is served."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import inf
 
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.control.rotor_loss.detector import RotorWatch
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.mavlink.hil.faults import MOTOR, OFF
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
+from colibri.sitl.vehicle import FORCE, Sitl
+from tests.support.flying import ACCEPTED, DENIED, refused, restart
 from tools.chaos.places import Thrower
-from tools.harness.copter_flight import ACCEPTED, DENIED, FLIGHT, in_the_air
 
-THREE = "autopilot.control.rotor_loss.three_rotors:ThreeRotors.step"
+REPLACED = pytest.mark.sitl(airborne=5.0, strict=False)
 
 
-def test_the_law_on_three_rotors_may_raise_once() -> None:
-    flight = in_the_air(6.0, strict=False)
-    assert flight.inject(MOTOR, OFF, 1) == ACCEPTED
-    flight.wait_until(lambda: flight.copter.parts.rotor_loss.flies, within=1.0)
-    flight.run(1.0)
-    thrower = Thrower(THREE, times=1.0)
+@contextmanager
+def thrown(place: str, times: float = inf) -> Iterator[None]:
+    thrower = Thrower(place, times)
     thrower.arm()
     try:
-        flight.wait_until(lambda: not flight.armed, within=20.0)
+        yield
     finally:
         thrower.disarm()
-    assert abs(flight.position[2]) < 0.1
-    assert flight.client.said("three rotors failed: last command stays")
+
+
+@REPLACED
+def test_the_law_on_three_rotors_may_raise_once(sitl: Sitl) -> None:
+    sitl.inject("motor", "off", 1)
+    sitl.wait_until(lambda: sitl.inside.copter.parts.rotor_loss.flies, within=1.0)
+    sitl.run(1.0)
+    with thrown("autopilot.control.rotor_loss.three_rotors:ThreeRotors.step", times=1.0):
+        sitl.wait_until(lambda: not sitl.armed, within=20.0)
+    assert abs(sitl.position[2]) < 0.1
+    assert sitl.said("three rotors failed: last command stays")
 
 
 @pytest.mark.parametrize("times", [1.0, inf])
-def test_a_restart_that_raises_begins_anew(times: float) -> None:
-    flight = in_the_air(5.0, strict=False)
-    thrower = Thrower("autopilot.core.flight_start:FlightStart.begin", times)
-    history = flight.history()
-    thrower.arm()
-    try:
-        flight.restart(history)
-        flight.run(2.0)
-    finally:
-        thrower.disarm()
+@REPLACED
+def test_a_restart_that_raises_begins_anew(sitl: Sitl, times: float) -> None:
+    sitl.run(0.1)
+    with thrown("autopilot.core.flight_start:FlightStart.begin", times):
+        restart(sitl)
+        sitl.run(2.0)
     if times == 1.0:
-        assert flight.mode is Mode.HOLD
-        assert abs(flight.position[2] - 5.0) < 1.0
-    assert flight.copter.defence.counts["restart"] == 1
+        assert sitl.mode is Mode.HOLD
+        assert abs(sitl.position[2] - 5.0) < 1.0
+    assert sitl.inside.copter.defence.counts["restart"] == 1
 
 
-def test_it_is_not_armed_again() -> None:
-    flight = in_the_air(2.0, strict=False)
-    thrower = Thrower("autopilot.control.loop:ControlLoop.decide", times=1.0)
-    thrower.arm()
-    flight.run(0.5)
-    thrower.disarm()
-    flight.land()
-    assert flight.arm() == DENIED
-    assert any("control law failed: restart the autopilot" in text for text in flight.client.texts)
+@REPLACED
+def test_after_an_exception_it_is_not_armed_again(sitl: Sitl) -> None:
+    with thrown("autopilot.control.loop:ControlLoop.decide", times=1.0):
+        sitl.run(0.5)
+    sitl.land()
+    refused(sitl, "control law failed: restart the autopilot", sitl.arm)
 
 
-def test_the_last_resort_lets_nothing_else_be_flown() -> None:
-    flight = in_the_air(5.0, strict=False)
-    thrower = Thrower("autopilot.commander.pilot:Pilot.step")
-    thrower.arm()
-    flight.run(0.2)
-    thrower.disarm()
-    assert flight.select(Mode.RETURN) == DENIED
-    assert flight.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 21196.0) in (ACCEPTED, DENIED)
-    flight.wait_until(lambda: not flight.rotors.armed, within=20.0)
-    assert flight.arm(force=True) == DENIED
+@REPLACED
+def test_the_last_resort_lets_nothing_else_be_flown(sitl: Sitl) -> None:
+    with thrown("autopilot.commander.pilot:Pilot.step"):
+        sitl.run(0.2)
+    refused(sitl, "", sitl.select, Mode.RETURN)
+    assert sitl.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE) in (ACCEPTED, DENIED)
+    sitl.wait_until(lambda: not sitl.rotors.armed, within=20.0)
+    refused(sitl, "", sitl.arm, force=True)
 
 
-def test_a_place_that_strict_flights_raise_from() -> None:
-    flight = in_the_air(5.0)
-    thrower = Thrower("autopilot.ground.snapshots:SnapshotBuilder.take")
-    thrower.arm()
-    try:
-        with pytest.raises(Exception, match="take"):
-            flight.run(0.1)
-    finally:
-        thrower.disarm()
+@pytest.mark.sitl(airborne=5.0)
+def test_a_strict_flight_raises(sitl: Sitl) -> None:
+    with thrown("autopilot.ground.snapshots:SnapshotBuilder.take"), pytest.raises(Exception, match="take"):
+        sitl.run(0.1)
 
 
-def test_values_that_cannot_be_flown_are_refused_at_the_start() -> None:
+def test_impossible_values_are_refused_at_the_start() -> None:
+    profile = load_profile("flight")
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
-    vehicle = load_vehicle(FLIGHT.simulation.vehicle)
+    vehicle = load_vehicle(profile.simulation.vehicle)
     with pytest.raises(ImpossibleError, match="hover needs"):
-        copter_autopilot(FLIGHT, vehicle, settings, lambda: 0.0, values={"VEH_MASS": 50.0})
-
-
-@pytest.mark.parametrize("rotor", range(4))
-def test_three_rotors_in_a_line_divide_by_nothing(rotor: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As a ground station may set them; a rotor taken for lost later once ended the process."""
-    flight = in_the_air(6.0)
-    flight.copter.parameters.set("VEH_ROT3_X", 0.0)
-    flight.step()
-
-    def lose(watch: RotorWatch, *_: object, **__: object) -> int:
-        watch.lost = rotor
-        return rotor
-
-    monkeypatch.setattr(RotorWatch, "step", lose)
-    flight.run(0.5)
-    assert flight.copter.parts.rotor_loss.flies
+        copter_autopilot(profile, vehicle, settings, lambda: 0.0, values={"VEH_MASS": 50.0})

@@ -109,7 +109,7 @@ def test_stored_parameters_are_reset_by_command(sitl: Sitl) -> None:
 def test_a_plant_that_begins_anew_restarts_the_autopilot(sitl: Sitl) -> None:
     sitl.takeoff(1.0)
     copter = sitl.inside.copter
-    step = copter.step(state_frame(starting_world(Start(), load_vehicle("hummingbird"))))
+    step = sitl.inside.autopilot.step(state_frame(starting_world(Start(), load_vehicle("hummingbird"))))
     assert not copter.pilot.state.armed
     assert not any(step.command.controls)
     assert copter.stations.system.restart == REBOOT
