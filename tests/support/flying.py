@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.process.state_folder import StateFolder
 from colibri.common.earth.geodesy import geodetic_of
@@ -29,6 +30,11 @@ def refused(sitl: Sitl, reason: str, order: Callable[..., object], *args: Any, *
     with pytest.raises(sitl.Refused) as refusal:
         order(*args, **options)
     assert re.search(reason, f"{refusal.value} {sitl.texts[before:]}")
+
+
+def in_mode(sitl: Sitl, mode: Mode) -> bool:
+    """Whether it is in a mode now: after `sitl.mode is` a type checker takes it for the same ever after."""
+    return sitl.mode is mode
 
 
 def degrees_e7(sitl: Sitl, east_m: float, north_m: float) -> tuple[int, int]:
@@ -72,6 +78,8 @@ def restart(sitl: Sitl, change: Callable[[History], History | None] = lambda kep
 
         patch.setattr(StateFolder, "history", changed)
         sitl.kill_autopilot()
+    nobody, active = mav.MAV_AUTOPILOT_INVALID, mav.MAV_STATE_ACTIVE  # it knows of no ground station
+    sitl.send("HEARTBEAT", mav.MAV_TYPE_GCS, nobody, 0, 0, active, 3)
 
 
 def reached(sitl: Sitl) -> list[int]:

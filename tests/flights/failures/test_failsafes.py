@@ -11,7 +11,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import latest, refused, restart, stream
+from tests.support.flying import in_mode, latest, refused, restart, stream
 
 PROFILE = Path(__file__).parents[3] / "autopilot" / "profiles" / "flight.toml"
 RETURN, LAND = 2, 3
@@ -59,7 +59,7 @@ def test_a_lost_ground_station_leads_home_and_clears(sitl: Sitl) -> None:
     sitl.gcs.silent = False
     sitl.run(3.0)
     assert sitl.said("ground station lost: cleared")
-    assert sitl.mode is Mode.RETURN
+    assert in_mode(sitl, Mode.RETURN)
     sitl.select(Mode.HOLD)
     assert reported_state(sitl) == mav.MAV_STATE_ACTIVE
 
@@ -73,7 +73,7 @@ def test_any_ground_station_will_do(sitl: Sitl) -> None:
     assert sitl.mode is Mode.HOLD
     other.silent = True
     sitl.run(2.1)
-    assert sitl.mode is Mode.RETURN
+    assert in_mode(sitl, Mode.RETURN)
 
 
 @pytest.mark.sitl(airborne=5.0, params={"NAV_DLL_ACT": RETURN, "COM_DL_LOSS_T": 1.0}, ready=False)
@@ -149,7 +149,7 @@ def test_a_low_voltage_counts_as_a_low_charge(sitl: Sitl) -> None:
     assert charge_state(sitl) == mav.MAV_BATTERY_CHARGE_STATE_LOW
     sitl.set_param("BAT_CRIT_VOLT", voltage_v + 0.5)
     sitl.run(0.6)
-    assert sitl.mode is Mode.LAND
+    assert in_mode(sitl, Mode.LAND)
     assert charge_state(sitl) == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
     assert sitl.said("battery critical: land")
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.core.step import Step
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
@@ -25,7 +26,7 @@ Frame = TypeVar("Frame", SensorFrame, StateFrame)
 def between(monkeypatch: pytest.MonkeyPatch, sitl: Sitl, change: Callable[[Frame], Frame]) -> None:
     """Have each frame changed on its way to the autopilot."""
     autopilot = sitl.inside.autopilot
-    step = autopilot.step
+    step: Callable[..., Step] = autopilot.step
     monkeypatch.setattr(autopilot, "step", lambda frame, plant_status: step(change(frame), plant_status))
 
 

@@ -10,7 +10,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import FORCE, Sitl
-from tests.support.flying import ACCEPTED, DENIED, refused, restart
+from tests.support.flying import ACCEPTED, DENIED, in_mode, refused, restart
 
 ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mav.MAV_CMD_NAV_TAKEOFF
@@ -97,7 +97,7 @@ def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     assert landed_state() == mav.MAV_LANDED_STATE_TAKEOFF
     sitl.run(4.0)
     assert sitl.path[:, 2].max() < 2.51
-    assert sitl.mode is Mode.HOLD
+    assert in_mode(sitl, Mode.HOLD)
     assert sitl.position == pytest.approx((0.0, 0.0, 2.5), abs=0.01)
     assert landed_state() == mav.MAV_LANDED_STATE_IN_AIR
     refused(sitl, "not disarmed: the vehicle is flying", sitl.disarm)

@@ -12,7 +12,7 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, DENIED, EVERY_KIND, SYSTEM, reached, refused
+from tests.support.flying import ACCEPTED, COMPONENT, DENIED, EVERY_KIND, SYSTEM, in_mode, reached, refused
 
 pytestmark = pytest.mark.sitl(airborne=3.0)
 ACTIVE, PAUSED, COMPLETE = mav.MISSION_STATE_ACTIVE, mav.MISSION_STATE_PAUSED, mav.MISSION_STATE_COMPLETE
@@ -113,6 +113,6 @@ def test_a_track_from_time_0_ends_in_hold(sitl: Sitl) -> None:
     sitl.run(1.5)
     assert sitl.mode is Mode.TRACK
     sitl.run(2.5)
-    assert sitl.mode is Mode.HOLD
+    assert in_mode(sitl, Mode.HOLD)
     sitl.run(2.0)
     assert sitl.speed_m_s < 0.1

@@ -19,6 +19,7 @@ from tests.support.flying import (
     SYSTEM,
     UNSUPPORTED,
     degrees_e7,
+    in_mode,
     orbit,
     refused,
 )
@@ -75,8 +76,8 @@ def test_what_a_reposition_leaves_out_stays(
         assert turned_by(sitl, 0.5 * pi - params[3]) < 0.1
     elif not isfinite(east):
         assert turned_by(sitl, 0.5 * pi) < 0.02
-    half_a_place = {"frame": RELATIVE, "x": degrees_e7(sitl, 3.0, 3.0)[0], "z": 5.0}
-    assert sitl.gcs.order_int(reposition, -1.0, 1.0, 0.0, nan, **half_a_place) == DENIED
+    half_x, _ = degrees_e7(sitl, 3.0, 3.0)
+    assert sitl.gcs.order_int(reposition, -1.0, 1.0, 0.0, nan, frame=RELATIVE, x=half_x, z=5.0) == DENIED
 
 
 def test_a_reposition_to_nowhere_pauses(sitl: Sitl) -> None:
@@ -114,8 +115,8 @@ def test_an_orbit_commanded_again_goes_on_where_it_is(sitl: Sitl) -> None:
     x, y = degrees_e7(sitl, 5.0, 0.0)
 
     def turn(radius_m: float, speed_m_s: float) -> None:
-        place = {"frame": RELATIVE, "x": x, "y": y, "z": sitl.origin.altitude_m + 6.0}
-        assert sitl.gcs.order_int(mav.MAV_CMD_DO_ORBIT, radius_m, speed_m_s, nan, nan, **place) == ACCEPTED
+        params, z = (radius_m, speed_m_s, nan, nan), sitl.origin.altitude_m + 6.0
+        assert sitl.gcs.order_int(mav.MAV_CMD_DO_ORBIT, *params, frame=RELATIVE, x=x, y=y, z=z) == ACCEPTED
 
     def away_m() -> float:
         return hypot(sitl.position[0] - 5.0, sitl.position[1])
@@ -234,7 +235,7 @@ def test_modes_by_message_and_by_standard_number(sitl: Sitl) -> None:
         assert sitl.command(standard, number) in (DENIED, UNSUPPORTED, mav.MAV_RESULT_FAILED)
     for numbers in ((1.0, nan), (nan, 4.0, 3.0), (1.0, 4.5, 3.0), (1.0, 4.0, -1.0)):
         assert sitl.command(mav.MAV_CMD_DO_SET_MODE, *numbers) in (DENIED, UNSUPPORTED)
-    assert sitl.mode is Mode.RETURN
+    assert in_mode(sitl, Mode.RETURN)
 
 
 def test_nothing_is_flown_to_outside_the_geofence(sitl: Sitl) -> None:

@@ -14,7 +14,7 @@ from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, EVERY_S, SYSTEM, refused, stream
+from tests.support.flying import ACCEPTED, COMPONENT, EVERY_S, SYSTEM, in_mode, refused, stream
 
 pytestmark = pytest.mark.sitl(airborne=5.0)
 HERE: Vector = (0.0, 0.0, 5.0)
@@ -61,7 +61,7 @@ def test_velocity_and_yaw_rate_then_silence(sitl: Sitl) -> None:
     sitl.run(0.8)
     assert sitl.mode is Mode.OFFBOARD  # COM_OF_LOSS_T is 1 s
     sitl.run(0.3)
-    assert sitl.mode is Mode.HOLD
+    assert in_mode(sitl, Mode.HOLD)
     assert sitl.said("setpoints lost: hold")
     sitl.run(2.5)
     assert sitl.speed_m_s < 0.1
