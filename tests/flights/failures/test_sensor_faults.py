@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import dist, hypot
-from typing import TypeVar
+from typing import Any
 
 import pytest
 
@@ -11,7 +11,8 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.core.step import Step
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
-from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.hil.plant_status import PlantStatus
+from colibri.mavlink.hil.sensors import Frame, SensorFrame, Updated
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
@@ -20,14 +21,17 @@ from tests.support.flying import COMPONENT, DENIED, SYSTEM, refused
 ON_SENSORS = pytest.mark.sitl(feedback="sensors", seed=3)
 OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
 TURNS = "gyroscope off: bias reset"
-Frame = TypeVar("Frame", SensorFrame, StateFrame)
 
 
-def between(monkeypatch: pytest.MonkeyPatch, sitl: Sitl, change: Callable[[Frame], Frame]) -> None:
+def between(monkeypatch: pytest.MonkeyPatch, sitl: Sitl, change: Callable[[Any], Frame]) -> None:
     """Have each frame changed on its way to the autopilot."""
     autopilot = sitl.inside.autopilot
     step: Callable[..., Step] = autopilot.step
-    monkeypatch.setattr(autopilot, "step", lambda frame, plant_status: step(change(frame), plant_status))
+
+    def changed(frame: Any, plant_status: PlantStatus) -> Step:
+        return step(change(frame), plant_status)
+
+    monkeypatch.setattr(autopilot, "step", changed)
 
 
 def stays(sitl: Sitl, seconds: float, max_m: float = 1.0) -> None:
@@ -45,7 +49,10 @@ def test_a_lost_position_is_left_by_sinking_level(sitl: Sitl) -> None:
     sitl.wait_until(lambda: sitl.said("position lost: descend"), within=30.0)
     assert sitl.mode is Mode.LAND
     refused(sitl, "the position is not known", sitl.select, Mode.HOLD)
-    slow_and_level = lambda: sitl.velocity[2] > -1.7 and max(map(abs, sitl.euler[:2])) < 0.05  # noqa: E731
+
+    def slow_and_level() -> bool:
+        return sitl.velocity[2] > -1.7 and max(map(abs, sitl.euler[:2])) < 0.05
+
     sitl.wait_until(lambda: not (sitl.armed and slow_and_level()), within=30.0)
     assert not sitl.armed
     assert dist(sitl.position[:2], place[:2]) < 3.0
