@@ -5,6 +5,14 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
+    from colibri.mavlink.client.client import Client as Client
+    from colibri.mavlink.client.commands import Command as Command
+    from colibri.mavlink.client.commands import CommandInt as CommandInt
+    from colibri.mavlink.client.parameters import ListParameters as ListParameters
+    from colibri.mavlink.client.parameters import ReadParameter as ReadParameter
+    from colibri.mavlink.client.parameters import SetParameter as SetParameter
+    from colibri.mavlink.client.plans import Download as Download
+    from colibri.mavlink.client.plans import Upload as Upload
     from colibri.mavlink.errors import MavlinkError as MavlinkError
     from colibri.mavlink.hil.feedback import Feedback as Feedback
     from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd as AutopilotEnd

@@ -1,9 +1,10 @@
-"""The vehicle's clock by TIMESYNC: its offset, and how long messages are on their way.
+"""The vehicle's clock by TIMESYNC: its offset, and the time that messages take.
 
-Of the exchanges of the last seconds the one that was quickest tells the offset: what delayed the others was jitter,
-which is all in one of their two ways (the clock filter of RFC 5905, section 10). An older one must have been so much
-quicker as the clocks may have drifted apart since. A simulator's clock may go wrong by percents: where the exchanges
-show it, they are taken at their drift. https://mavlink.io/en/services/timesync.html
+The quickest exchange of the last seconds gives the offset: jitter, all of it in one direction, delayed the others (the
+clock filter of RFC 5905, section 10). An older exchange must have been quicker by as much as the clocks may have
+drifted since. A simulator's clock may drift by percents: where the exchanges show a drift, it is estimated and
+compensated.
+https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
@@ -14,25 +15,25 @@ from typing import NamedTuple
 
 NS_PER_US = 1000
 WINDOW_US = 10_000_000
-"""Exchanges older than this count no more: the clocks drift apart by microseconds a second."""
+"""Exchanges older than this do not count: the clocks drift apart by microseconds a second."""
 ENOUGH = 5
 _EVERY_US = 100_000
 _RESET_AFTER = 3
 _RESET_US = 10_000
 _DRIFT = 0.002
-"""By which clocks may differ beside the drift that is known: a simulator's is not a quartz."""
+"""Uncertainty of the estimated drift: a simulator's clock is not a quartz."""
 _UNEVEN = 0.1
-"""Part of a drift that comes and goes: such a clock is held up by whatever else its computer does."""
+"""Fraction of a drift that varies: such a clock is held up by the load on its computer."""
 _LEAST_EXCHANGES = 10
-"""Fewer tell no drift."""
+"""Fewest exchanges to estimate a drift from."""
 _MAX_DRIFT = 0.2
-"""No larger one is believed; an offset that has changed by more is that of a vehicle that was started again."""
+"""Largest plausible drift; a larger change of the offset means that the vehicle was restarted."""
 _SURE = 4.0
-"""So many times its uncertainty a drift must be, to be one."""
+"""A drift counts from this many times its uncertainty."""
 
 
 class Exchange(NamedTuple):
-    """One TIMESYNC and its answer: when it came back, how long that took, and the offset it tells, µs."""
+    """One TIMESYNC and its answer: arrival time, round trip and offset, µs."""
 
     received_us: int
     round_trip_us: int
@@ -40,10 +41,9 @@ class Exchange(NamedTuple):
 
 
 class VehicleClock:
-    """Keeps the offset of the vehicle's clock."""
+    """Estimates the offset of the vehicle's clock."""
 
     def __init__(self) -> None:
-        """Begin knowing nothing."""
         self._exchanges: deque[Exchange] = deque(maxlen=round(WINDOW_US / _EVERY_US))
         self._next_us: int | None = None
         self._outliers: list[Exchange] = []
@@ -53,7 +53,7 @@ class VehicleClock:
 
     @property
     def known(self) -> bool:
-        """Whether there were exchanges enough."""
+        """Whether there were enough exchanges."""
         return self._known
 
     @property
@@ -81,7 +81,7 @@ class VehicleClock:
         return (0, now_us * NS_PER_US)
 
     def receive(self, tc1: int, ts1: int, now_us: int) -> None:
-        """Take in a TIMESYNC; one that asks, or answers what was never sent, counts for nothing."""
+        """Read a TIMESYNC; a request, or an answer to something never sent, is ignored."""
         sent_us = ts1 // NS_PER_US
         if tc1 == 0 or not now_us - WINDOW_US <= sent_us <= now_us:
             return
@@ -103,7 +103,7 @@ class VehicleClock:
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
-        """Whether no delays explain an exchange beside the best: the vehicle was started again."""
+        """Whether no delay explains the difference to the best exchange: the vehicle was restarted."""
         best = self._best
         if best is None:
             return False

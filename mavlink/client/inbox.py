@@ -8,7 +8,7 @@ from colibri.mavlink.wire.dialect import Message, mav
 
 
 class Heard(dict[str, list[Any]]):
-    """Messages, as their fields, by name, the latest last; empty of one that was not received."""
+    """The fields of received messages by message name, the latest last; empty for a message that was not received."""
 
     def __missing__(self, name: str) -> list[Any]:
         """Return an empty list for a message's name.
@@ -25,7 +25,7 @@ class Heard(dict[str, list[Any]]):
 
 
 class Inbox:
-    """The messages of a vehicle that were received.
+    """The messages that were received from a vehicle.
 
     Attributes:
         heard: Messages, as their fields, by name, the latest last.
@@ -35,7 +35,7 @@ class Inbox:
     """
 
     def __init__(self, remembers: int = 20_000) -> None:
-        """Begin empty; keep at most `remembers` messages of a name, and at least the last half of them."""
+        """Keep at most `remembers` messages of a name, and at least the last half of them."""
         self._remembers = remembers
         self.heard = Heard()
         self.counts: Counter[str] = Counter()
@@ -48,11 +48,11 @@ class Inbox:
         return self.heard[name][-1]
 
     def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT of the vehicle's has `part` in it."""
+        """Whether a STATUSTEXT contains `part`."""
         return any(part in text for text in self.texts)
 
     def forget(self) -> None:
-        """Forget all that was received up to now."""
+        """Delete everything received so far."""
         self.heard.clear()
         self.counts.clear()
         self.acks.clear()

@@ -1,5 +1,6 @@
-"""What a vehicle reports of itself beside its state: mode, arming, battery, estimator, fence."""
+"""What a vehicle reports beside its state: mode, arming, battery, estimator, fence, home."""
 
+from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
@@ -7,7 +8,7 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
 
 _OLDER_FROM = 128
-"""A sequence number so far behind, of 256, is that of an older message, which a link has held back."""
+"""A sequence number this far ahead, of 256, belongs to an older message that the link has delayed."""
 _AIRBORNE = frozenset(
     {mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING},
 )
@@ -23,8 +24,9 @@ _DEGREES = 1e-7
 _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 
 
+@dataclass
 class VehicleReport:
-    """The last word of a vehicle on each matter.
+    """What a vehicle last reported.
 
     Attributes:
         heartbeat_us: When the last HEARTBEAT came; None before the first.
@@ -34,45 +36,43 @@ class VehicleReport:
         armed: Whether its rotors may turn.
         system_status: MAV_STATE.
         landed_state: MAV_LANDED_STATE.
-        battery: Part of the charge that is left; nan where it is not known.
-        estimator_ok: Whether attitude, velocity and position are estimated; None before it says so.
-        prearm_ok: Whether it could be armed; None where it does not say.
+        battery: Remaining charge, 0..1; nan where unknown.
+        estimator_ok: Whether attitude, velocity and position are estimated; None before it is reported.
+        prearm_ok: Whether it could be armed; None where it is not reported.
         fence_breached: Whether it is beyond its fence.
-        altitude_amsl_m: Height above the sea; nan where it is not known.
-        home: Where its home is; None before it says so.
-        origin: Where the origin of its local frame is; None before it says so.
+        altitude_amsl_m: Height above the sea; nan where unknown.
+        home: None before it is reported.
+        origin: Of its local frame; None before it is reported.
         texts: STATUSTEXT lines.
     """
 
-    def __init__(self) -> None:
-        """Begin knowing nothing."""
-        self.heartbeat_us: int | None = None
-        self.autopilot = -1
-        self.mode = -1
-        self.mode_us: int | None = None
-        self.mode_reports_us: list[int] = []
-        self.armed = False
-        self.system_status = 0
-        self.landed_state: int = _UNKNOWN_LANDED
-        self.battery = nan
-        self.estimator_ok: bool | None = None
-        self.prearm_ok: bool | None = None
-        self.fence_breached = False
-        self.altitude_amsl_m = nan
-        self.home: Geodetic | None = None
-        self.origin: Geodetic | None = None
-        self.texts: list[str] = []
-        self._told = 0
-        self._sequence: int | None = None
-        self._tells_estimates = False
+    heartbeat_us: int | None = None
+    autopilot: int = -1
+    mode: int = -1
+    mode_us: int | None = None
+    mode_reports_us: list[int] = field(default_factory=list)
+    armed: bool = False
+    system_status: int = 0
+    landed_state: int = _UNKNOWN_LANDED
+    battery: float = nan
+    estimator_ok: bool | None = None
+    prearm_ok: bool | None = None
+    fence_breached: bool = False
+    altitude_amsl_m: float = nan
+    home: Geodetic | None = None
+    origin: Geodetic | None = None
+    texts: list[str] = field(default_factory=list)
+    _told: int = 0
+    _sequence: int | None = None
+    _tells_estimates: bool = False
 
     @property
     def airborne(self) -> bool | None:
-        """Whether it flies; None where it does not say."""
+        """Whether it flies; None where it is not reported."""
         return None if self.landed_state == _UNKNOWN_LANDED else self.landed_state in _AIRBORNE
 
     def take_new_texts(self) -> list[str]:
-        """Return the STATUSTEXT lines since this was last asked."""
+        """Return the STATUSTEXT lines since the last call."""
         new, self._told = self.texts[self._told :], len(self.texts)
         return new
 
@@ -81,7 +81,7 @@ class VehicleReport:
         return float(sum(1 for at_us in self.mode_reports_us if now_us - at_us <= 1_000_000))
 
     def receive(self, message: Message, now_us: int) -> None:
-        """Take in a message of the vehicle."""
+        """Read a message of the vehicle."""
         fields, newest = message.fields, self._is_newest(message)
         match message.name:
             case "HEARTBEAT":

@@ -1,4 +1,4 @@
-"""The vehicle's state out of whatever it streams: ODOMETRY, or attitude and position of messages of their own."""
+"""The vehicle's state from what it streams: ODOMETRY, or separate messages for attitude and position."""
 
 from math import isfinite
 from typing import Any, NamedTuple
@@ -10,9 +10,9 @@ from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_fro
 
 _MS = 1000
 _ODOMETRY_STAYS_US = 500_000
-"""After so long without ODOMETRY the other messages count."""
+"""After this long without ODOMETRY the other messages count."""
 _PAIRED_US = 60_000
-"""A position older than this beside an attitude is none."""
+"""A position must not differ more than this in time from the attitude it is paired with."""
 _EARTH: int = mav.MAV_FRAME_LOCAL_NED
 
 HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})
@@ -36,14 +36,13 @@ class TimedState(NamedTuple):
 
 
 class StateAssembler:
-    """Makes states of messages.
+    """Assembles states from messages.
 
     Attributes:
         refused: How many messages held no finite state.
     """
 
     def __init__(self) -> None:
-        """Begin without a state."""
         self._last_us = -1
         self._odometry_us: int | None = None
         self._place: tuple[int, Vector, Vector] | None = None

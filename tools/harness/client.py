@@ -3,8 +3,8 @@
 from typing import Any
 
 from colibri.autopilot.core.step import Received
+from colibri.mavlink.client import client
 from colibri.mavlink.client.inbox import Inbox
-from colibri.mavlink.wire.dialect import Codec
 
 SYSTEM, COMPONENT = 1, 1
 """Of the vehicle."""
@@ -26,12 +26,12 @@ class Client(Inbox):
         self.component = component
         self.link = link
         self.address = ("127.0.0.1", port)
-        self._codec = Codec(system, component)
+        self._client = client.Client(system, component, only=SYSTEM)
         self._to_send: list[bytes] = []
 
     def send(self, name: str, *fields: Any) -> None:
         """Send a message with the next frame."""
-        self._to_send.append(self._codec.encode(name, *fields))
+        self._to_send.append(self._client.encode(name, *fields))
 
     def send_raw(self, datagram: bytes) -> None:
         """Send any bytes with the next frame."""
@@ -44,9 +44,8 @@ class Client(Inbox):
 
     def receive(self, datagram: bytes) -> None:
         """Decode what the vehicle sent."""
-        for message in self._codec.decode(datagram):
-            if message.source == (SYSTEM, COMPONENT):
-                self.add(message)
+        for message in self._client.receive(datagram, 0):
+            self.add(message)
 
     def forget(self) -> None:
         """Forget all but the latest of each message."""
