@@ -5,12 +5,12 @@ from math import inf
 import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.sitl.vehicle import Sitl
 from tools.chaos.flights import SITUATIONS, Flown, airborne
 from tools.chaos.places import Thrower
-from tools.harness.copter_flight import CopterFlight, in_the_air
 
 
-def flown(flight: CopterFlight, situation: str, place: str, times: float) -> tuple[str, str]:
+def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, str]:
     SITUATIONS[situation](flight)
     verdict = Flown(flight, situation, Thrower(place, times)).judged()
     return verdict.outcome, verdict.said
@@ -49,15 +49,16 @@ def flown(flight: CopterFlight, situation: str, place: str, times: float) -> tup
         ("autopilot.commander.supervisor:Supervisor.step", "hover", inf, "flown on", "failsafes failed: none may act"),
     ],
 )
-def test_it_flies_on_or_lands(place: str, situation: str, times: float, outcome: str, said: str) -> None:
-    became, text = flown(in_the_air(3.0, strict=False), situation, place, times)
+@pytest.mark.sitl(airborne=3.0, strict=False)
+def test_it_flies_on_or_lands(sitl: Sitl, place: str, situation: str, times: float, outcome: str, said: str) -> None:
+    became, text = flown(sitl, situation, place, times)
     assert became == outcome
     assert text.startswith(said)
 
 
 @pytest.mark.parametrize("times", [1, inf])
 def test_without_an_estimator_it_flies_on_or_lands_blind(times: float) -> None:
-    flight = airborne(Feedback.SENSORS)
-    outcome, said = flown(flight, "hover", "autopilot.estimation.estimator:Estimator._take_in", times)
+    with airborne(Feedback.SENSORS) as flight:
+        outcome, said = flown(flight, "hover", "autopilot.estimation.estimator:Estimator._take_in", times)
     assert outcome == ("flown on" if times == 1 else "landed")
     assert said == "estimator failed: inertial sensors carry on"

@@ -15,9 +15,9 @@ from time import perf_counter
 from typing import Any
 
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.sitl.vehicle import Sitl
 from tools.chaos.flights import SITUATIONS, Flown, airborne
 from tools.chaos.places import PLACES, Thrower
-from tools.harness.copter_flight import CopterFlight
 
 SPAN_S = 4.8
 """Over which the instants of a situation are spread."""
@@ -86,7 +86,11 @@ def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:
 
 
 def _fly_all(feedback: Feedback, places: list[str], instants: int, out: int) -> None:
-    flight = airborne(feedback)
+    with airborne(feedback) as flight:
+        _fly_situations(flight, feedback, places, instants, out)
+
+
+def _fly_situations(flight: Sitl, feedback: Feedback, places: list[str], instants: int, out: int) -> None:
     for situation, prepare in SITUATIONS.items():
         pid = os.fork()
         if pid == 0:
@@ -109,12 +113,12 @@ def _wait(pid: int) -> None:
         os._exit(1)
 
 
-def _go_on(flight: CopterFlight, situation: str, seconds: float) -> None:
+def _go_on(flight: Sitl, situation: str, seconds: float) -> None:
     steers = situation == "offboard"
     flight.run(seconds, (lambda: flight.setpoint(velocity=(3.0, 1.0, 0.0))) if steers else None)
 
 
-def _fly(flight: CopterFlight, place: str, times: float, case: dict[str, Any], out: int) -> None:
+def _fly(flight: Sitl, place: str, times: float, case: dict[str, Any], out: int) -> None:
     """Fly one case in a process of its own."""
     pid = os.fork()
     if pid == 0:

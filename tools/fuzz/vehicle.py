@@ -15,10 +15,10 @@ from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import MARKER, mav
 from colibri.plant.physics.start import Start
 from colibri.sitl.vehicle import FORCE
+from tools.fuzz.flight import ACCEPTED, STANDING, BareFlight
 from tools.fuzz.messages import Messages, Sent
 from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
 from tools.harness.client import COMPONENT, SYSTEM, Client
-from tools.harness.copter_flight import ACCEPTED, STANDING, CopterFlight
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
 """Falling: what lies still has landed."""
@@ -69,7 +69,7 @@ class Target:
 
     def __init__(self, chance: random.Random, files: Files | None = None) -> None:
         """Begin on the ground; all chance comes from `chance`."""
-        self.flight = CopterFlight(files=files)
+        self.flight = BareFlight(files=files)
         self.messages = Messages(chance, [parameter.name for parameter in self.flight.copter.parameters], COMMANDS)
         self.sent: Counter[State] = Counter()
         self.accepted: Counter[int] = Counter()
@@ -166,7 +166,7 @@ class Target:
         return hypot(x, y, z) > _MAX_DISTANCE_M or z < -1.0
 
 
-def check(flight: CopterFlight) -> None:
+def check(flight: BareFlight) -> None:
     """Check what must hold at every step.
 
     Raises:

@@ -8,8 +8,9 @@ from colibri.autopilot.ground.stations import Stations
 from colibri.autopilot.process.ground_links import MAX_SAVED_S, SHARE, GroundLinks
 from colibri.common.types import Address
 from colibri.mavlink.wire.dialect import Codec
-from tools.harness.copter_flight import CopterFlight
+from colibri.sitl.vehicle import Sitl
 
+pytestmark = pytest.mark.sitl(ready=False)
 HEARTBEAT = Codec(255, 190).encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
 HERE: Address = ("127.0.0.1", 5)
 FRAME_S = 0.004
@@ -65,8 +66,8 @@ class FakeLink:
 
 
 @pytest.fixture
-def stations() -> Stations:
-    return CopterFlight().copter.stations
+def stations(sitl: Sitl) -> Stations:
+    return sitl.inside.copter.stations
 
 
 def heard_in_a_frame(links: GroundLinks, stations: Stations, clock: Clock, takes_s: float) -> Counter[int]:

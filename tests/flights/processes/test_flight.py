@@ -8,7 +8,7 @@ import pytest
 
 from colibri import plant
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
-from tools.harness.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, Flown, fly_family
+from tests.support.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, Flown, fly_family
 from tools.harness.processes import fly, rows
 
 HUMMINGBIRD = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"

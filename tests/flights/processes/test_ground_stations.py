@@ -2,16 +2,15 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.control.profile import load_profile
 from colibri.cli.main import main
 from colibri.mavlink.wire.dialect import mav
-from colibri.plant.physics.start import Start
-from tools.harness.copter_flight import CopterFlight
+from colibri.sitl.vehicle import Sitl
 from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
 from tools.harness.stations import ACCEPTED, HOLD, Ack, Station
@@ -53,15 +52,15 @@ def test_nothing_is_compiled_or_loaded_in_flight() -> None:
 
 
 @pytest.mark.parametrize("profile", ["thesis", pytest.param("se3", marks=pytest.mark.long)])
-def test_every_control_law_flies_where_it_is_sent(profile: str) -> None:
+def test_every_control_law_flies_where_it_is_sent(sitl_fleet: Callable[..., list[Sitl]], profile: str) -> None:
     """One previews a single reference, the other two that are four control samples apart."""
-    flight = CopterFlight(profile=load_profile(profile), start=Start(z=5.0, rotors=4740.0))
-    assert flight.goto(3.0, 1.0, 6.0) == ACCEPTED
-    flight.run(8.0)
-    assert flight.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
-    assert flight.select(Mode.TRACK) == ACCEPTED
-    flight.run(20.0)
-    assert flight.mode is Mode.TRACK
+    (sitl,) = sitl_fleet(1, profile=profile, airborne=5.0)
+    sitl.goto(3.0, 1.0, 6.0, wait=False)
+    sitl.run(8.0)
+    assert sitl.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
+    sitl.select(Mode.TRACK)
+    sitl.run(20.0)
+    assert sitl.mode is Mode.TRACK
 
 
 def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: Path) -> None:

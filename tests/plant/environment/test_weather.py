@@ -24,7 +24,7 @@ from colibri.plant.physics.world import Physics, World, starting_world
 from colibri.plant.spec import WorldSpec
 from colibri.plant.texts import gust
 from colibri.plant.texts import wind as read_wind
-from tools.harness.plant_flights import FRAME_US, hover, hummingbird, rpm
+from tests.support.plant_flights import FRAME_US, hover, hummingbird, rpm
 
 VEHICLE = hummingbird("drag", "rotor-lag")
 START = Start(z=9.0, rotors=rpm(VEHICLE, VEHICLE.hover_speed))

@@ -10,7 +10,7 @@ from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.vehicle.description import Battery, Vehicle
-from tools.harness.plant_flights import OFF, command, flight, hover, hummingbird, rpm, speeds
+from tests.support.plant_flights import OFF, command, flight, hover, hummingbird, rpm, speeds
 
 VEHICLE = hummingbird("battery", "rotor-lag")
 FULL_V, EMPTY_V, OHM, AH, EFFICIENCY = 12.6, 9.0, 0.03, 2.1, 0.75

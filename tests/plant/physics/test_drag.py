@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from colibri.common.types import Vector
 from colibri.plant.physics.start import Start
 from colibri.plant.texts import wind
+from tests.support.plant_flights import OFF, command, flight, hover, hummingbird, rpm, states
 from tests.support.strategies import reals, vectors
-from tools.harness.plant_flights import OFF, command, flight, hover, hummingbird, rpm, states
 
 VEHICLE = hummingbird("drag")
 MASS_KG = VEHICLE.body.mass_kg

@@ -17,8 +17,8 @@ from colibri.plant.physics.integrators import adaptive_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.plant_flights import flight, hover, hummingbird, rpm
 from tests.support.strategies import quaternions, reals, vectors
-from tools.harness.plant_flights import flight, hover, hummingbird, rpm
 
 INERTIA = (0.0034, 0.0041, 0.006)
 GRAVITY_M_S2 = 9.81

@@ -16,8 +16,8 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.texts import wind
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from tests.support.plant_flights import OFF, flight, hover, hummingbird, rpm, states
 from tests.support.strategies import quaternions, vectors
-from tools.harness.plant_flights import OFF, flight, hover, hummingbird, rpm, states
 
 VEHICLE = load_vehicle("hummingbird")
 TOUCHED_M = 1e-4

@@ -16,7 +16,7 @@ from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.plant_flights import command, flight, hummingbird, states
+from tests.support.plant_flights import command, flight, hummingbird, states
 
 UNEVEN = (480.0, 500.0, 510.0, 495.0)
 PARAMETERS = packed(parameters_of(hummingbird("drag", "rotor-lag"), (1.0, -2.0, 0.0)))

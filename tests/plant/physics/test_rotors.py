@@ -17,7 +17,7 @@ from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.plant_flights import OFF, command, flight, hummingbird, rpm, speeds
+from tests.support.plant_flights import OFF, command, flight, hummingbird, rpm, speeds
 
 LAGGING = hummingbird("rotor-lag")
 CONTROLS = st.tuples(*[st.floats(0.0, 1.0)] * 4)

@@ -23,8 +23,8 @@ from colibri.plant.sensors.instrument import Rate
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.sensors import Sensors
+from tests.support.plant_flights import OFF, command, flight, hover, hummingbird, rpm
 from tests.support.strategies import quaternions, reals
-from tools.harness.plant_flights import OFF, command, flight, hover, hummingbird, rpm
 
 HUMMINGBIRD = load_vehicle("hummingbird")
 PHYSICS = Physics(HUMMINGBIRD, "rk4")

@@ -13,7 +13,7 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.plant_flights import rpm
+from tests.support.plant_flights import rpm
 
 HUMMINGBIRD = load_vehicle("hummingbird")
 SAMPLE_US = 8000

@@ -6,9 +6,8 @@ import pytest
 
 from colibri.autopilot.core.defence.inertial_estimate import turned
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, tilt_deg
-from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.physics.world import state_frame
-from tools.chaos.flights import airborne
+from colibri.sitl.vehicle import Sitl
 from tools.chaos.places import Thrower
 
 
@@ -21,18 +20,19 @@ def test_an_attitude_turns_at_its_rates() -> None:
     assert euler_from_quaternion(still) == pytest.approx(euler_from_quaternion(attitude))
 
 
-def test_the_inertial_estimate_lasts_for_a_landing() -> None:
-    flight = airborne(Feedback.SENSORS)
+@pytest.mark.sitl(feedback="sensors", strict=False)
+def test_the_inertial_estimate_lasts_for_a_landing(sitl: Sitl) -> None:
+    sitl.takeoff(5.0)
     thrower = Thrower("autopilot.estimation.estimator:Estimator._take_in")
     thrower.arm()
     try:
-        flight.run(5.5)  # shortly before it touches down
+        sitl.run(5.5)  # shortly before it touches down
     finally:
         thrower.disarm()
-    estimate, truth = flight.copter.parts.state_source.estimate, state_frame(flight.world)
+    estimate, truth = sitl.inside.copter.parts.state_source.estimate, state_frame(sitl.inside.world)
     assert estimate is not None
     assert not estimate.health.horizontal_position
-    assert flight.copter.pilot.saving.name == "DESCEND"
+    assert sitl.inside.copter.pilot.saving.name == "DESCEND"
     frame = estimate.frame
     (x, y, z), (e, n, u) = frame.velocity_enu_m_s, truth.velocity_enu_m_s
     assert hypot(x - e, y - n) < 0.6

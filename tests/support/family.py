@@ -1,6 +1,6 @@
 """Families of flights: the same track from starts a millimetre apart, so that no verdict hangs on one trajectory.
 
-`python -m tools.harness.family`: a table of tilts and distances on lemniscates that no vehicle can follow.
+`python -m tests.support.family`: a table of tilts and distances on lemniscates that no vehicle can follow.
 """
 
 from collections.abc import Iterator
