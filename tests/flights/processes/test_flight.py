@@ -180,14 +180,14 @@ def check_recovered(flown: list[Flown]) -> None:
     assert min(it.z_m.min() for it in flown) > 17.0
 
 
-def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost() -> None:
+def test_an_impossible_track_is_followed_upright() -> None:
     """36 m/s and 400 m/s²: from some starts a millimetre apart, for these are chaotic flights."""
     check_upright_and_near(fly_family("lemniscate:lap=1.0", FEW_STARTS, 6.0))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("lap_s", LAPS_S)
-def test_what_no_vehicle_can_follow_is_followed_upright_from_any_start(lap_s: float) -> None:
+def test_an_impossible_track_is_followed_from_any_start(lap_s: float) -> None:
     """The bounds of docs/flight.md over 50 starts of 40 s each."""
     check_upright_and_near(fly_family(f"lemniscate:lap={lap_s}", STARTS, DURATION_S))
 

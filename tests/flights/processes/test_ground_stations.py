@@ -63,7 +63,7 @@ def test_every_control_law_flies_where_it_is_sent(sitl_fleet: Callable[..., list
     assert sitl.mode is Mode.TRACK
 
 
-def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: Path) -> None:
+def test_a_watched_flight_is_paced_to_the_wall_clock(tmp_path: Path) -> None:
     station = Station(255)
     with OnPort(station) as port:
         report = fly(tmp_path, "hover", "--gcs", port.url, "--duration", "1.5")

@@ -62,7 +62,7 @@ def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         return Flown(flying, out)
 
 
-def test_what_is_downloaded_over_a_link_that_loses_is_the_file_on_disk(flown: Flown) -> None:
+def test_a_download_over_a_lossy_link_is_the_file_on_disk(flown: Flown) -> None:
     (log,) = flown.logs.iterdir()
     assert log.name == "00001.ulg"
     assert flown.content == log.read_bytes()

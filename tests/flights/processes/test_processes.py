@@ -121,7 +121,7 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
             assert "another frame rate" in second.wait_for("refused")["text"]
 
 
-def test_an_autopilot_that_wants_sensors_of_a_vehicle_without_is_told(tmp_path: Path, logs: Path) -> None:
+def test_sensor_feedback_of_a_vehicle_without_is_an_error(tmp_path: Path, logs: Path) -> None:
     plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
     autopilot = start_autopilot(logs, url, "--vehicle", "hummingbird", "--feedback", "sensors")
     with running(plant, autopilot):

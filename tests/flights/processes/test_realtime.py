@@ -35,7 +35,7 @@ def flown_on(plant: Process, seconds: float) -> Callable[[], bool]:
     return has
 
 
-def test_rotors_stop_when_the_autopilot_dies_and_turn_for_the_next(tmp_path: Path) -> None:
+def test_rotors_stop_with_a_dead_autopilot_until_the_next(tmp_path: Path) -> None:
     logs, out = tmp_path / "logs", tmp_path / "flight"
     logs.mkdir()
     plant, url = start(logs, out, "--cut-after", "0.3")

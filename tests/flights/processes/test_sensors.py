@@ -69,7 +69,7 @@ def test_seeds_are_flights(tmp_path: Path) -> None:
     assert hashes[0] == hashes[2] != hashes[1]
 
 
-def test_the_vehicle_stands_until_it_has_found_its_bearings_then_flies_its_track(tmp_path: Path) -> None:
+def test_the_track_begins_once_the_estimate_is_aligned(tmp_path: Path) -> None:
     options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "30", "--seed", "1")
     figures = fly(tmp_path, *ON_SENSORS, *options)
     truth = rows(tmp_path / "plant.csv")
@@ -81,7 +81,7 @@ def test_the_vehicle_stands_until_it_has_found_its_bearings_then_flies_its_track
     assert figures["qp_failures"] == 0
 
 
-def test_an_autopilot_that_wants_the_state_gets_it_from_the_same_plant(tmp_path: Path) -> None:
+def test_one_plant_serves_state_as_well_as_sensors(tmp_path: Path) -> None:
     plant = Process(tmp_path, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(tmp_path / "out"), "--duration", "1")
     url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
     autopilot = Process(tmp_path, "autopilot", "--plant", url)

@@ -43,7 +43,7 @@ def test_it_outlives_the_seconds_in_which_it_knows_nothing(tmp_path: Path) -> No
             assert not any(event["armed"] for event in autopilot.events("status"))
 
 
-def test_a_simulator_has_no_state_to_tell_and_its_vehicle_needs_sensors(tmp_path: Path) -> None:
+def test_a_simulator_sends_no_state_and_needs_sensors(tmp_path: Path) -> None:
     autopilot = Process(tmp_path, "autopilot", "--simulator", "tcp:127.0.0.1:4560", "--vehicle", "hummingbird-thesis")
     with running(autopilot):
         assert autopilot.wait() == 2

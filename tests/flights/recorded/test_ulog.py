@@ -121,7 +121,7 @@ def test_battery_status_and_what_is_said(on_state: Flown) -> None:
     assert on_state.log.initial_parameters == {each.name: each.default for each in defined}
 
 
-def test_on_sensors_there_is_what_they_measure_and_what_is_made_of_it(on_sensors: Flown) -> None:
+def test_on_sensors_measurements_and_estimates_are_logged(on_sensors: Flown) -> None:
     estimate = rows(on_sensors.folder / "estimate.csv")
     position = on_sensors["vehicle_local_position"]
     same(
@@ -194,7 +194,7 @@ def test_px4s_tables_have_each_row(
         assert len(list(csv.DictReader(table))) == len(either.decided["t"])
 
 
-def test_what_was_written_before_both_processes_are_killed_is_whole(tmp_path: Path) -> None:
+def test_a_log_is_whole_up_to_the_kill_of_both_processes(tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
     flight = [sys.executable, "-m", "colibri", "fly", "spiral", "--quiet", "--speed", "4", "--out", str(tmp_path)]
     with subprocess.Popen(flight) as process:
@@ -216,7 +216,7 @@ def test_what_was_written_before_both_processes_are_killed_is_whole(tmp_path: Pa
 
 
 @pytest.mark.parametrize("feedback", ["state", "sensors"])
-def test_a_vehicle_of_ground_stations_leaves_its_parameters_and_state(tmp_path: Path, feedback: str) -> None:
+def test_parameters_and_state_are_logged_for_ground_stations(tmp_path: Path, feedback: str) -> None:
     ports = ["--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
     flies = ["--quiet", "--speed", "max", "--duration", "3", "--feedback", feedback, "--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "colibri", "sitl", *ports, *flies], check=True, timeout=PATIENCE_S)

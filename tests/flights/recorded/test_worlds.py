@@ -75,7 +75,7 @@ def test_a_part_left_out_is_that_table_alone(part: str) -> None:
     assert vehicle.without(()) == vehicle
 
 
-def test_wind_carries_a_flight_away_and_comes_from_where_it_is_said_to(tmp_path: Path) -> None:
+def test_wind_blows_from_where_it_is_set(tmp_path: Path) -> None:
     for name, wind in {"calm": "0@0", "west": "4@270"}.items():
         fly(tmp_path / name, *REALISTIC, "4", "--link", "memory", "--wind", wind, "--start", "z=2")
     calm, west = (rows(tmp_path / name / "flight.csv") for name in ("calm", "west"))

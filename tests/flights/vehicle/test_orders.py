@@ -310,3 +310,10 @@ def test_a_parameter_that_changes_in_flight_jolts_nothing(sitl: Sitl, name: str,
     assert jolts.max() < 1.2
     sitl.run(1.0)
     assert sitl.velocity[0] > 3.0
+
+
+@pytest.mark.seeds(1, 2)
+@pytest.mark.wind("4@270", turbulence="light")
+def test_it_holds_its_place_in_turbulence(sitl: Sitl) -> None:
+    sitl.run(2.0)
+    sitl.hold(lambda: sitl.is_at((0.0, 0.0, 5.0), near_m=0.5, slow_m_s=1.0), for_=3.0)
