@@ -111,6 +111,7 @@ class PlantSpec(WorldSpec, ProcessSpec):
         float | None,
         Option("times real time, or max (default: max; with --realtime 1)", "N", above=0.0, endless=True),
     ] = None
+    tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog in --out, too")] = False
     truth: Annotated[bool, Option("append the true state to each frame, for a program in between (for tests)")] = False
 
     @property

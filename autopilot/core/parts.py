@@ -20,7 +20,6 @@ from colibri.autopilot.core.subscription import Flown, Subscribers
 from colibri.autopilot.core.trial import Trial
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.ground.battery_monitor import BatteryMonitor
-from colibri.autopilot.ground.onboard_log import SAMPLE_EVERY_US
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
@@ -31,7 +30,6 @@ from colibri.autopilot.parameters.definitions import Numbers, behaviour, definit
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import WARNING
-from colibri.mavlink.ulog.recorder import Recorder
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -81,11 +79,8 @@ def parts_of(
     tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first)
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
     defence = Defence(pilot, lines.say, strict=strict)
-    recorder = Recorder(
-        vehicle.name, settings.system_id, parameters, with_battery=True, sample_every_us=SAMPLE_EVERY_US
-    )
     stations = Stations(
-        *(settings, pilot, missions, fence, lines, parameters, recorder),
+        *(settings, pilot, missions, fence, lines, parameters, vehicle.name),
         takes_attitude=attitude is not None,
         defence=defence,
     )

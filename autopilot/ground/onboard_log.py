@@ -1,24 +1,41 @@
 """The log that ground stations list and download: a ULog of each flight, from arming to disarming."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from colibri.mavlink.files.flight_log import FlightLog
 from colibri.mavlink.files.tree import Files
+from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.statustext import Line
 from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.recorder import Recorder
 
 LOGS = "logs"
-SAMPLE_EVERY_US = 40_000
-"""A log must come over a radio, and several fit into memory: PX4's, too, have fewer samples than the control loop."""
+
+
+class _Topics(TopicLog):
+    """Appends topics to the log of the current flight."""
+
+    def __init__(self, log: FlightLog) -> None:
+        super().__init__()
+        self._log = log
+
+    def begin(self, beginning: Callable[[], bytes]) -> None:
+        """Pass it over: the recorder begins each log."""
+
+    def append(self, encoded: bytes) -> None:
+        """Append messages to it, if there is one."""
+        self._log.record(encoded)
 
 
 class OnboardLog:
     """Records snapshots and status texts while the rotors are armed."""
 
-    def __init__(self, recorder: Recorder, files: Files) -> None:
-        self._recorder = recorder
+    def __init__(self, vehicle: str, system_id: int, parameters: Parameters, files: Files) -> None:
+        """Record a vehicle into folder `logs` of `files`."""
         self._log = FlightLog(files, (LOGS,))
+        self._topics = _Topics(self._log)
+        self._recorder = Recorder(self._topics, vehicle, system_id, parameters, with_battery=True)
         self._snapshot: Snapshot | None = None
         self._armed = False
 
@@ -38,15 +55,15 @@ class OnboardLog:
         if log.name is None:
             return
         for line in said:
-            log.record(recorder.say(now_us, *line))
+            recorder.say(now_us, *line)
         if snapshot is not None and snapshot is not self._snapshot:
-            log.record(recorder.update(snapshot))
+            recorder.update(snapshot)
         self._snapshot = snapshot
         if ends:
-            log.record(recorder.take())
+            self._topics.flush()
         log.update(armed, now_us)
 
     def close(self) -> None:
         """Close the log."""
-        self._log.record(self._recorder.take())
+        self._topics.flush()
         self._log.close()

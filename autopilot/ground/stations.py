@@ -46,7 +46,6 @@ from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.telemetry.table import telemetry
-from colibri.mavlink.ulog.recorder import Recorder
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
 
@@ -110,7 +109,7 @@ class Stations:
         fence: Fence,
         lines: StatusQueue,
         parameters: Parameters,
-        recorder: Recorder,
+        vehicle_name: str,
         *,
         takes_attitude: bool,
         defence: Guarding,
@@ -166,7 +165,7 @@ class Stations:
             caught=defence.caught,
         )
         self.snapshot: Snapshot | None = None
-        self.log = OnboardLog(recorder, files)
+        self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
 
     def use(self, channel: int, kind: str) -> None:
         """Stream to `channel` what its kind gets by default."""

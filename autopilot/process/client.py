@@ -77,7 +77,8 @@ class Client:
                     autopilot.serve()
                 self._frame_came = True
                 self._report_if_unknown(step)
-                self._keep(partial(AutopilotLog.write, step=step))
+                datagram = received[0] if received and isinstance(self._end, AutopilotEnd) else None
+                self._keep(partial(AutopilotLog.write, step=step, datagram=datagram))
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:

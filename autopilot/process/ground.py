@@ -110,8 +110,7 @@ class Ground:
         """Record in `log` what the vehicle begins with, and what it receives."""
         self._log = log
         log.begin_again(self._values, self._past_bytes)
-        if log.topics:
-            log.topics.follow(self.copter.parameters)
+        log.follow(self.copter.parameters)
 
     @property
     def copter(self) -> Copter:

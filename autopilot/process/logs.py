@@ -1,110 +1,116 @@
-"""The autopilot's own logs of a flight."""
+"""What the autopilot records of a flight: how it began, what it received, decided and estimated."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback, Horizon
 from colibri.autopilot.core.step import Step
-from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.estimate import Check, Estimate
+from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.measurements.table import kinds_of
-from colibri.autopilot.process.flight_topics import FlightTopics
-from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, line
-from colibri.common.process.log_files import CsvLog, LogError, LogFile
+from colibri.autopilot.parameters.definitions import definitions
+from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, encoded
+from colibri.common.process.log_files import LogError
+from colibri.common.process.shared_log import SharedLog
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.parameters.store import Value
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.hil.state import STATE_BYTES, StateFrame
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.ulog import messages
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.blocks import Thinning
+from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, ESTIMATE, FILTER, MEASURED
+from colibri.mavlink.ulog.inputs import Kind, encode_input
+from colibri.mavlink.ulog.log import FileLog, TopicLog
+from colibri.mavlink.ulog.reader import FILE
+from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
+from colibri.mavlink.ulog.samples import SampleBlocks
+from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
+from colibri.mavlink.ulog.status import Status, status_message
 
 if TYPE_CHECKING:
     from colibri.autopilot.core.step import Received
 
-
-DECISION_COLUMNS = (
-    *("t", "phi_ref", "theta_ref", "psi_ref"),
-    *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
-    *(f"active_{kind}" for kind in Active._fields),
-    "delay_us",
-    "mass_kg",
-    "path_lag_s",
-    "qp_iterations",
-)
-
-ESTIMATE_COLUMNS = (
-    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
-    *(f"sd_{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "east", "north", "up")),
-    *("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z"),
-    *("flags", "rejected", "resets"),
-)
-_CHECK_COLUMNS = (
-    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
-    *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
-)
-
-
-def check_columns(kinds: Sequence[str]) -> tuple[str, ...]:
-    """Return the columns of `filter.csv` for a vehicle that has these kinds of measurements."""
-    return (*_CHECK_COLUMNS, *(f"nis_{kind}" for kind in kinds), *(f"believed_{kind}" for kind in kinds))
+_FLYING = Status(armed=True, custom_mode=custom_mode(Mode.TRACK))
+_STILL = (nan,) * 4
+_NO_REFERENCES = (nan,) * 11
 
 
 class AutopilotLog:
-    """What the autopilot writes: its start, what it received, one row a control sample, and what it estimates then.
+    """Records control samples, what was received, and PX4's topics: of a track from its steps, else from snapshots.
 
     Attributes:
-        topics: What it writes to `flight.ulg`; None where it writes none.
+        topics: Where it is recorded.
     """
 
-    def __init__(self, folder: Path, setup: Setup, *, ulog: bool = True) -> None:
-        """Create `autopilot.csv` and `inputs.jsonl` in `folder`; on sensors also `estimate.csv` and `filter.csv`.
-
-        What is received is appended to what the process before received: it may have died in mid-flight.
-        """
-        self._setup = setup
+    def __init__(self, topics: TopicLog, setup: Setup) -> None:
+        """Record a flight that begins with `setup`."""
+        self.topics, self._setup = topics, setup
         self._begins = True
         self._time_us = 0
-        self._inputs = LogFile(folder / "inputs.jsonl", "ab")
-        self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
-        self._estimates = self._checks = None
-        if setup.feedback is Feedback.SENSORS:
-            self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
-            vehicle = setup.vehicle_tables
-            kinds = kinds_of(vehicle.sensors) if vehicle and vehicle.sensors else []
-            self._checks = CsvLog(folder / "filter.csv", check_columns(kinds))
-        self.topics = FlightTopics(folder, setup) if ulog else None
-        self._untold: tuple[Step, tuple[float, ...]] | None = None
-        self._rows = [log for log in (self._decisions, self._estimates, self._checks) if log is not None]
+        sensors = setup.vehicle_tables and setup.vehicle_tables.sensors
+        self._kinds = kinds_of(sensors) if sensors else []
+        self._recorder: Recorder | None = None
+        self._views: tuple[SampleBlocks, SensingBlocks] | None = None
+        if topics.for_viewers and not setup.ground:
+            self._views = (SampleBlocks(), SensingBlocks())
+        self._status_us, self._thinning = -1, Thinning()
+        self._fallback: Fallback | None = None
 
-    def write(self, step: Step) -> None:
-        """Append a control sample; of a frame between two of them, only the check of the filter.
+    def write(self, step: Step, datagram: bytes | None = None) -> None:
+        """Append a control sample; of a frame between two of them, the command, and the check of the filter.
 
-        Topics of a sample are written with the next frame: where that is between samples, there is time for it.
+        Args:
+            step: Of the autopilot.
+            datagram: The frame as it was received; None where a replay cannot have it.
+
+        Raises:
+            LogError: It cannot be written.
         """
-        self._tell()
-        if step.command.time_us < self._time_us and self.topics:
-            self.topics.begin_again()
-        self._time_us = step.command.time_us
-        if self.topics:
-            self.topics.begin()
-        if self._begins:
-            self._begins = False
-            self._inputs.append(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
-        if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
-            check = step.estimate.check
-            self._checks.add((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.accepted))
+        time_us = step.command.time_us
+        if time_us < self._time_us:
+            self._begin_anew()
+        self._time_us = time_us
+        if self.topics.for_viewers:
+            self._write_input(step, datagram)
+        if step.estimate is not None and step.estimate.check is not None:
+            self.topics.add(FILTER, self._check_row(step.estimate.check))
         if step.decision is None:
             return
-        if self._estimates is not None and step.estimate is not None:
-            self._write_estimate(self._estimates, step.estimate)
+        if step.estimate is not None:
+            self.topics.add(ESTIMATE, _estimate_row(step.estimate))
         how = step.decision.diagnostics
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         counts = (how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s, how.qp_iterations)
         decided = (*step.decision.attitude_reference, *codes, *times_us, *counts)
-        self._decisions.add((step.command.time_us / 1e6, *decided))
-        if self.topics and not self._setup.ground:
-            self._untold = (step, decided)
+        self.topics.add(DECISION, (time_us / 1e6, *decided))
+        if self._views is not None:
+            self._note(time_us, how.fallback)
+            if self._thinning.is_due(time_us):
+                self._view(*self._views, step, decided)
+
+    def follow(self, parameters: Parameters) -> None:
+        """Record the snapshots of a vehicle with these parameters from now on."""
+        vehicle = self._setup.vehicle_tables
+        name = self._setup.vehicle if vehicle is None else vehicle.name
+        self._recorder = Recorder(self.topics, name, self._setup.system_id, parameters, with_battery=False)
+
+    def beginning(self) -> bytes:
+        """Return the beginning of a file, with the parameters as they are now."""
+        if self._recorder is not None:
+            return self._recorder.begin()
+        profile, vehicle = self._setup.profile_tables, self._setup.vehicle_tables
+        if profile is None or vehicle is None:
+            return beginning(self._setup.vehicle, {})
+        return beginning(vehicle.name, Parameters(definitions(profile, vehicle, self._setup.system_id)).values)
 
     def write_snapshot(self, snapshot: Snapshot) -> None:
         """Append what ground stations are told.
@@ -112,17 +118,16 @@ class AutopilotLog:
         Raises:
             LogError: It cannot be written.
         """
-        if self.topics:
-            self.topics.write_snapshot(snapshot)
+        if self._recorder is not None:
+            self._recorder.update(snapshot)
 
     def say(self, time_us: int, severity: int, text: str) -> None:
-        """Append a line that ground stations are told.
+        """Append a status text.
 
         Raises:
             LogError: It cannot be written.
         """
-        if self.topics:
-            self.topics.say(time_us, severity, text)
+        self.topics.append(messages.logged_string(time_us, severity, text))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
@@ -138,11 +143,9 @@ class AutopilotLog:
         failed: LogError | None = None
         for received in datagrams:
             datagram, link, address, loopback = received
-            entry = ReceivedDatagram(
-                time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram
-            )
+            entry = ReceivedDatagram(link=link, address=address, loopback=loopback, datagram=datagram)
             try:
-                self._inputs.append(line(entry))
+                self.topics.append(encode_input(self._time_us, Kind.DATAGRAM, encoded(entry)))
             except LogError as error:
                 failed = error
             yield received
@@ -155,31 +158,84 @@ class AutopilotLog:
         Raises:
             LogError: It cannot be written.
         """
-        self._tell()
-        for log in self._rows:
-            log.flush()
-        if self.topics:
-            self.topics.flush()
+        self.topics.flush()
 
     def close(self) -> None:
-        """Close the files."""
-        with suppress(LogError):
-            self._tell()
-        for log in (self._inputs, *self._rows):
-            log.close()
-        if self.topics:
-            self.topics.close()
+        """Write what waits, if that can be done, and close the log."""
+        self.topics.close()
 
-    def _tell(self) -> None:
-        """Write the topics of the last sample, unless that is done."""
-        untold, self._untold = self._untold, None
-        if self.topics and untold:
-            self.topics.write(*untold)
+    def _begin_anew(self) -> None:
+        """Begin anew, as time begins again: another plant flies another flight."""
+        self.topics.close()
+        self._status_us, self._thinning = -1, Thinning()
+        self._fallback = None
+        self._begins = True
 
-    def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
-        frame = estimate.frame
-        state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
-        deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
-        biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
-        counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
-        log.add((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
+    def _write_input(self, step: Step, datagram: bytes | None) -> None:
+        """Write what a replay needs; a datagram with nothing but the state follows from the truth."""
+        time_us, controls, armed = step.command
+        if self._begins:
+            self._begins = False
+            setup = msgspec.structs.replace(self._setup, first_us=time_us)
+            self.topics.begin(self.beginning)
+            self.topics.append(encode_input(time_us, Kind.SETUP, encoded(setup)))
+        if datagram is None:
+            return
+        if self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES:
+            self.topics.queue(encode_input(time_us, Kind.FRAME, datagram))
+        self.topics.add(COMMAND, (time_us / 1e6, *controls, armed))
+
+    def _note(self, time_us: int, fallback: Fallback | None) -> None:
+        """Write status and texts that are due."""
+        setup = self._setup
+        if self._status_us < 0:
+            self.say(time_us, INFO, f"{setup.track or 'no track'}, profile {setup.profile}, {setup.controller}")
+        if time_us >= self._status_us:
+            self._status_us = time_us + STATUS_EVERY_US
+            self.topics.append(status_message(time_us, _FLYING, setup.system_id))
+        if fallback is not self._fallback:
+            self._fallback = fallback
+            said = (INFO, "the QP is solved again") if fallback is None else (WARNING, f"fallback: {fallback}")
+            self.say(time_us, *said)
+
+    def _view(self, samples: SampleBlocks, sensings: SensingBlocks, step: Step, decided: tuple[float, ...]) -> None:
+        """Write a control sample of a track in PX4's topics."""
+        estimate, frame = step.estimate, step.frame
+        known = frame if estimate is None else estimate.frame
+        if not isinstance(known, StateFrame):
+            return
+        _, place, velocity, attitude, rates = known
+        controls = step.command.controls if step.command.armed else _STILL
+        references = _NO_REFERENCES if step.references is None else _first(step.references)
+        row = (self._time_us, *place, *velocity, *attitude, *rates, *controls, *references, *decided)
+        self.topics.add(samples, row)
+        if estimate is not None and isinstance(frame, SensorFrame):
+            self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
+
+    def _check_row(self, check: Check) -> tuple[float, ...]:
+        """Return the row of `FILTER`; kinds of measurements that the vehicle lacks are not a number."""
+        nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
+        counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
+        return (check.time_us / 1e6, *check.state, *check.covariance, *counts)
+
+
+def log_in(folder: Path, setup: Setup) -> AutopilotLog:
+    """Return what records into `flight.ulg` in the folder of a flight; the file begins with the first frame."""
+    log = AutopilotLog(FileLog(lambda: SharedLog(folder / FILE, log.beginning())), setup)
+    return log
+
+
+def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
+    frame = estimate.frame
+    state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
+    deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
+    biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
+    counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
+    return (frame.time_us / 1e6, *state, *deviations, *biases, *counts)
+
+
+def _first(references: Horizon) -> tuple[float, ...]:
+    """Return position, velocity, acceleration, yaw and its rate of the first reference."""
+    position, velocity, acceleration, _, _, yaw, yaw_rate, _ = references
+    p, v, a = position.item, velocity.item, acceleration.item
+    return (p(0), p(1), p(2), v(0), v(1), v(2), a(0), a(1), a(2), yaw.item(0), yaw_rate.item(0))

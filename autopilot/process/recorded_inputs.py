@@ -1,11 +1,7 @@
-"""What an autopilot was started with and received, beside the plant's frames: enough to fly a recorded flight again.
-
-A log of lines of JSON: how it began, then each datagram of a ground station with the frame after which it was served.
-One that was restarted in mid-flight has another beginning in it.
-"""
+"""What an autopilot was started with and received: enough to replay a recorded flight."""
 
 from collections.abc import Iterable
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import msgspec
 
@@ -14,11 +10,12 @@ from colibri.autopilot.errors import AutopilotError
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
+from colibri.mavlink.ulog.inputs import InputRecord, Kind
 from colibri.plant.vehicle.description import Vehicle
 
 
 class InputsError(AutopilotError):
-    """A file is no such log; the message names the line."""
+    """A log has no such inputs; the message is the one line that a user needs."""
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="began", tag_field="what"):
@@ -73,14 +70,12 @@ class ReceivedDatagram(
     """A datagram of a ground station.
 
     Attributes:
-        time_us: Of the frame after which it was served.
         link: Number of the link.
         address: Where from.
         loopback: Whether from this computer.
         datagram: The bytes; in base 64 in the log.
     """
 
-    time_us: int
     link: int
     address: tuple[str, int] | None
     loopback: bool
@@ -91,31 +86,44 @@ Input: TypeAlias = Setup | ReceivedDatagram
 _DECODER = msgspec.json.Decoder(Input)
 
 
-def line(what: Input) -> bytes:
-    """Return a line of the log."""
-    return msgspec.json.encode(what) + b"\n"
+def encoded(what: Input) -> bytes:
+    """Return an input as JSON."""
+    return msgspec.json.encode(what)
 
 
-def read(log: bytes) -> list[Input]:
-    """Return the inputs of the last flight of a log; of a process that was killed, the last line may be cut off.
+class Inputs(NamedTuple):
+    """What an autopilot received in a flight.
+
+    Attributes:
+        setups: How it began, by the first frame that it answered; a restart in flight is another beginning.
+        datagrams: What ground stations sent, by the frame after which it was served.
+        frames: Datagrams of the plant, by their frames.
+    """
+
+    setups: dict[int, Setup]
+    datagrams: dict[int, list[ReceivedDatagram]]
+    frames: dict[int, bytes]
+
+
+def read_inputs(records: Iterable[InputRecord]) -> Inputs:
+    """Return the inputs of a log.
 
     Raises:
-        InputsError: This is no such log.
+        InputsError: A record is none of these, or the autopilot never began.
     """
-    *lines, _ = log.split(b"\n")
-    inputs: list[Input] = []
-    for number, text in enumerate(lines, 1):
+    inputs = Inputs({}, {}, {})
+    for time_us, kind, content in records:
+        if kind == Kind.FRAME:
+            inputs.frames.setdefault(time_us, content)
+            continue
         try:
-            what = _DECODER.decode(text)
+            what = _DECODER.decode(content)
         except msgspec.MsgspecError as error:
-            raise InputsError(f"line {number}: {error}") from error
-        if isinstance(what, Setup) and what.first_us <= max(_beginnings(inputs), default=-1):
-            inputs.clear()  # of a flight before
-        inputs.append(what)
-    if not _beginnings(inputs):
-        raise InputsError("nothing has begun")
+            raise InputsError(f"input at t = {time_us * 1e-6:.3f} s: {error}") from error
+        if isinstance(what, Setup):
+            inputs.setups[time_us] = what
+        else:
+            inputs.datagrams.setdefault(time_us, []).append(what)
+    if not inputs.setups:
+        raise InputsError("no autopilot has begun in it")
     return inputs
-
-
-def _beginnings(inputs: Iterable[Input]) -> list[int]:
-    return [what.first_us for what in inputs if isinstance(what, Setup)]

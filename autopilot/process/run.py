@@ -9,7 +9,7 @@ from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.process.client import Client
-from colibri.autopilot.process.logs import AutopilotLog
+from colibri.autopilot.process.logs import log_in
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.autopilot.spec import TRACK, AutopilotSpec, name_of
 from colibri.common.errors import Error
@@ -37,7 +37,7 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
         setup = setup_of(spec, profile, vehicle, spec.flown and file_text(spec.flown)) if spec.out else None
     except Error as error:
         fail(keep_failure(error, spec.out))
-    log = AutopilotLog(spec.out, setup, ulog=spec.ulog) if spec.out and setup else None
+    log = log_in(spec.out, setup) if spec.out and setup else None
     if ground and log:
         ground.record(log)
     if spec.stepped and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once

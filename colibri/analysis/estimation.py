@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.consistency import NAVIGATION, Errors
-from colibri.analysis.logs import Rows, at_times, read_blocks, read_columns, read_series
-from colibri.analysis.recording import RecordingError, path_times, read_lags
-from colibri.autopilot.estimation.measurements.table import KINDS
+from colibri.analysis.logs import RecordingError, Rows, at_times, read_blocks, read_series
+from colibri.analysis.recording import path_times, read_lags
+from colibri.autopilot.estimation.measurements.table import KINDS, kinds_of
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, nearest_turn, rotation_matrix
 from colibri.common.types import Array, Vector
 from colibri.flights.plan import FlightPlan
+from colibri.mavlink.ulog.flight_topics import ESTIMATE, FILTER, TRUTH, Topic
+from colibri.mavlink.ulog.log import TopicReader
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
 MEASURED = KINDS
@@ -76,27 +78,27 @@ class _Common(NamedTuple):
     true: NDArray[np.bool_]
 
 
-def read_estimation(plan: FlightPlan, start_s: float) -> Estimation:
-    """Compare `estimate.csv` and `filter.csv` of a flight, from `start_s` on, with its `plant.csv`.
+def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estimation:
+    """Compare estimate and filter of a flight, from `start_s` on, with the truth.
 
     Raises:
         RecordingError: Nothing was estimated.
     """
-    errors = _read_errors(plan, start_s)
-    if not errors.size and not _common(plan, "estimate.csv", -np.inf).said.any():
+    errors = _read_errors(plan, log, start_s)
+    if not errors.size and not _common(log, ESTIMATE, -np.inf).said.any():
         raise RecordingError("the flight ended before there was an estimate")
-    columns = read_columns(plan.out / "filter.csv")
-    kinds = tuple(kind for kind in MEASURED if f"nis_{kind}" in columns)
-    sums, counts = ([columns.index(f"{what}_{kind}") for kind in kinds] for what in ("nis", "believed"))
-    nees, nis, accepted = np.split(_read_checks(plan, start_s, [*sums, *counts]), [1, 1 + len(kinds)])
+    sensors = plan.vehicle.sensors
+    kinds = tuple(kinds_of(sensors)) if sensors else ()
+    sums, counts = ([FILTER.names.index(f"{what}_{kind}") for kind in kinds] for what in ("nis", "believed"))
+    nees, nis, accepted = np.split(_read_checks(log, start_s, [*sums, *counts]), [1, 1 + len(kinds)])
     return Estimation(errors[:3], errors[3:6], errors[6], nees[0], nis, accepted, kinds)
 
 
-def _read_errors(plan: FlightPlan, start_s: float) -> Array:
+def _read_errors(plan: FlightPlan, log: TopicReader, start_s: float) -> Array:
     """Return by how much each estimate is off in position and attitude, and how far off it tracks, (7, n)."""
-    common = _common(plan, "estimate.csv", start_s)
-    errors, lags, first = np.empty((7, np.count_nonzero(common.said))), read_lags(plan), 0
-    for said, true in _beside_truth(plan, "estimate.csv", common):
+    common = _common(log, ESTIMATE, start_s)
+    errors, lags, first = np.empty((7, np.count_nonzero(common.said))), read_lags(log), 0
+    for said, true in _beside_truth(log, ESTIMATE, common):
         at = slice(first, first + len(said))
         errors[:3, at] = (said[:, 1:4] - true[:, 7:10]).T
         angles = zip(said[:, 7:11].tolist(), true[:, 10:14].tolist(), strict=True)
@@ -107,26 +109,26 @@ def _read_errors(plan: FlightPlan, start_s: float) -> Array:
     return errors
 
 
-def _read_checks(plan: FlightPlan, start_s: float, columns: list[int]) -> Array:
+def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
     """Return of each check of the filter the normalised estimation error squared, and columns, (1 + columns, m)."""
     parts = [np.empty((1 + len(columns), 0))]
-    for checks, truth in _beside_truth(plan, "filter.csv", _common(plan, "filter.csv", start_s)):
+    for checks, truth in _beside_truth(log, FILTER, _common(log, FILTER, start_s)):
         nees = [_errors(check, true).nees() for check, true in zip(checks, truth, strict=True)]
         parts.append(np.vstack([nees, checks[:, columns].T]))
     return np.concatenate(parts, axis=1)
 
 
-def _common(plan: FlightPlan, log: str, start_s: float) -> _Common:
-    """Return which rows of a log and which of the plant's are of the same instants, from `start_s` on."""
-    (said_s,), (true_s,) = (read_series(plan.out / name, 0) for name in (log, "plant.csv"))
+def _common(log: TopicReader, topic: Topic, start_s: float) -> _Common:
+    """Return which rows of a topic and which of the truth are of the same instants, from `start_s` on."""
+    (said_s,), (true_s,) = (read_series(log, each, "t") for each in (topic, TRUTH))
     late = said_s >= start_s
     return _Common(late & at_times(said_s, true_s), at_times(true_s, said_s[late]))
 
 
-def _beside_truth(plan: FlightPlan, log: str, common: _Common) -> Iterator[tuple[Array, Array]]:
-    """Yield the rows of a log, and the plant's, of the instants that both have; in blocks, two arrays of as many."""
-    truth = Rows(plan.out / "plant.csv", common.true)
-    for said in read_blocks(plan.out / log, common.said):
+def _beside_truth(log: TopicReader, topic: Topic, common: _Common) -> Iterator[tuple[Array, Array]]:
+    """Yield the rows of a topic, and the truth, of the instants that both have; in blocks, two arrays of as many."""
+    truth = Rows(log, TRUTH, common.true)
+    for said in read_blocks(log, topic, common.said):
         yield said, truth.take(len(said))
 
 

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from heapq import merge
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,12 @@ import msgspec
 import numpy as np
 
 from colibri.common.errors import Error
+from colibri.mavlink.ulog.flight_topics import FILTER, FLIGHT_TOPICS
+from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
 
 if TYPE_CHECKING:
     from pyulog import ULog
 
-LOG = "flight.ulg"
-"""In the folder of a flight."""
 _NS_PER_US = 1000
 _LOG_SCHEMA = {
     "type": "object",
@@ -36,18 +37,17 @@ class ExportError(Error):
     """A log cannot be exported; the message is the one line that a user needs."""
 
 
-def read_log(path: Path) -> tuple[Path, "ULog"]:
-    """Return the ULog at a path, or of the flight in that folder, and its own path.
+def read_log(log: Path) -> "ULog":
+    """Return a ULog as pyulog reads it.
 
     Raises:
         ExportError: There is none, or what reads it is not installed.
     """
     with _needed("pyulog", "export"):
         from pyulog import ULog
-    log = path / LOG if path.is_dir() else path
     try:
         with log.open("rb") as file:
-            return log, ULog(file)
+            return ULog(file)
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error
     except Exception as error:  # whatever pyulog stumbles over in what is none
@@ -74,9 +74,36 @@ def write_mcap(log: "ULog", path: Path) -> Path:
     return path
 
 
+def log_file(path: Path) -> Path:
+    """Return the log at a path, or in the folder of a flight."""
+    return path / FILE if path.is_dir() else path
+
+
+def write_flight_tables(path: Path, folder: Path) -> bool:
+    """Write the topics that are Colibri's own as tables, `plant.csv` and so on; return whether the log has them."""
+    try:
+        log = FlightFile(path)
+    except (OSError, LogFormatError):
+        return False
+    for topic in FLIGHT_TOPICS:
+        blocks = log.blocks(topic)
+        first = next(blocks, None)
+        if first is None:
+            continue
+        known = ~np.isnan(first).all(axis=0) if topic is FILTER else np.ones(len(topic.names), np.bool_)
+        with _table(folder, topic.table).open("w", encoding="utf-8") as file:
+            file.write(",".join(np.array(topic.names)[known]) + "\n")
+            for block in chain([first], blocks):
+                file.writelines(",".join(map(repr, row)) + "\n" for row in block[:, known].tolist())
+    return True
+
+
 def write_csv(log: "ULog", folder: Path) -> Path:
-    """Write a table of each topic, `vehicle_attitude.csv` and so on; return the folder."""
+    """Write a table of each topic but Colibri's own, `vehicle_attitude.csv` and so on; return the folder."""
+    own = {topic.name for topic in FLIGHT_TOPICS}
     for name, topic, _ in _topics(log):
+        if name in own:
+            continue
         with _table(folder, f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(topic.data)

@@ -1,50 +1,60 @@
-"""The logs of a flight, read in blocks: what that takes in memory does not grow with the flight."""
+"""The topics of a flight, read in blocks: the memory for that does not grow with the flight."""
 
-from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.common.errors import InFlightError
 from colibri.common.types import Array
+from colibri.mavlink.ulog.flight_topics import Topic
+from colibri.mavlink.ulog.log import TopicReader
+from colibri.mavlink.ulog.reader import FILE, FlightFile
 
-BLOCK_BYTES = 1 << 18
-"""Of text: some seconds of a flight."""
 _AT_ONCE = 4096
 
 
-def read_columns(path: Path) -> list[str]:
-    """Return the names of a log's columns."""
-    with path.open(encoding="utf-8") as log:
-        return log.readline().rstrip("\n").split(",")
+class RecordingError(InFlightError):
+    """The log holds no flight."""
 
 
-def read_blocks(path: Path, wanted: NDArray[np.bool_] | None = None) -> Iterator[Array]:
-    """Yield the rows of a log in their order, in blocks (k, columns) of at least one.
+def log_of(folder: Path) -> FlightFile:
+    """Return the log in the folder of a flight.
+
+    Raises:
+        RecordingError: There is none: the flight ended before its first frame.
+        LogFormatError: It is no log of a flight of this version.
+    """
+    try:
+        return FlightFile(folder / FILE)
+    except FileNotFoundError as error:
+        raise RecordingError(f"{folder / FILE} is missing: the flight ended before it began") from error
+
+
+def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None = None) -> Iterator[Array]:
+    """Yield the rows of a topic in their order, in blocks (k, columns) of at least one.
 
     Args:
-        path: The log. Only complete rows count: a process that was killed may leave half of one.
+        log: Of the flight.
+        topic: The topic.
         wanted: Which of the rows are wanted, (n,), none after them; None for all.
     """
     first = 0
-    for lines in _lines(path):
+    for block in log.blocks(topic):
         if wanted is not None:
-            chosen = wanted[first : first + len(lines)]
-            first += len(lines)
-            lines = [line for line, is_wanted in zip(lines, chosen.tolist(), strict=False) if is_wanted]
-        if lines:
-            yield np.fromstring(b",".join(lines), sep=",").reshape(len(lines), -1)
+            chosen = wanted[first : first + len(block)]
+            first += len(block)
+            block = block[: len(chosen)][chosen]
+        if len(block):
+            yield block
 
 
-def read_series(path: Path, *columns: int) -> list[Array]:
-    """Return some columns of a log, each with the numbers of all its complete rows, (n,)."""
-    series = [array("d") for _ in columns]
-    for lines in _lines(path):
-        rows = [line.split(b",", max(columns) + 1) for line in lines]
-        for numbers, column in zip(series, columns, strict=True):
-            numbers.extend([float(row[column]) for row in rows])
-    return [np.frombuffer(numbers) for numbers in series]
+def read_series(log: TopicReader, topic: Topic, *columns: str) -> list[Array]:
+    """Return some columns of a topic, each with the numbers of all rows, (n,)."""
+    places = [topic.names.index(column) for column in columns]
+    parts = [np.empty((len(columns), 0)), *(block[:, places].T for block in log.blocks(topic))]
+    return list(np.concatenate(parts, axis=1))
 
 
 def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
@@ -60,12 +70,12 @@ def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
 
 
 class Rows:
-    """The rows of a log, as many at a time as are asked for."""
+    """The rows of a topic, as many at a time as are asked for."""
 
-    def __init__(self, path: Path, wanted: NDArray[np.bool_] | None = None) -> None:
+    def __init__(self, log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None = None) -> None:
         """Take the rows that `read_blocks` yields."""
-        self._blocks = read_blocks(path, wanted)
-        self._rest: Array = np.empty((0, len(read_columns(path))))
+        self._blocks = read_blocks(log, topic, wanted)
+        self._rest: Array = np.empty((0, len(topic.names)))
 
     def take(self, count: int) -> Array:
         """Return the next `count` rows, (count, columns); fewer at the end of the log."""
@@ -77,13 +87,3 @@ class Rows:
         rows = np.concatenate(parts)
         self._rest = rows[count:]
         return rows[:count]
-
-
-def _lines(path: Path) -> Iterator[list[bytes]]:
-    """Yield the complete lines behind the first in blocks: those that end, and have as many columns as that has."""
-    with path.open("rb") as log:
-        commas = log.readline().count(b",")
-        rest = b""
-        while text := log.read(BLOCK_BYTES):
-            *lines, rest = (rest + text).split(b"\n")
-            yield [line for line in lines if line.count(b",") == commas]

@@ -1,16 +1,28 @@
-"""What is kept of a flight: `flight.csv` and `report.json`."""
+"""What is kept of a flight: `flight.csv` and `report.json`; or a report alone, of a flight in memory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from colibri.analysis.logs import RecordingError, log_of
 from colibri.analysis.lost import Lost, lost
-from colibri.analysis.recording import FlightReader, RecordingError, Samples, TableFile
-from colibri.analysis.report import Report, report, write_report
+from colibri.analysis.recording import FlightReader, Samples, TableWriter
+from colibri.analysis.report import Report, encoded_report, report
 from colibri.analysis.series.flight_series import FlightSeries, read_flight
 from colibri.common.errors import InFlightError
+from colibri.common.process.failure_file import FAILURE, failure_text
 from colibri.flights.fly import fly_plan
-from colibri.flights.folder import prepare
+from colibri.flights.folder import PROVENANCE
 from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.provenance import encoded_provenance
+from colibri.mavlink.ulog.log import MemoryLog, TopicReader
+from colibri.mavlink.ulog.reader import FILE, LogFormatError
+
+TABLE, REPORT = "flight.csv", "report.json"
 
 
 class Outcome(NamedTuple):
@@ -18,11 +30,20 @@ class Outcome(NamedTuple):
 
     Attributes:
         report: None where it ended before its first control sample.
-        failure: Why it came to an early end; empty if it did not.
+        log: Its topics.
+        error: That ended it early; None if it came to its end.
+        failure_text: The content of `failure.txt`; empty if it came to its end.
     """
 
     report: Report | None
-    failure: str
+    log: TopicReader
+    error: InFlightError | None
+    failure_text: str
+
+    @property
+    def failure(self) -> str:
+        """Why it came to an early end; empty if it did not."""
+        return self.failure_text.partition("\n")[0]
 
     @property
     def lost(self) -> str:
@@ -30,42 +51,97 @@ class Outcome(NamedTuple):
         return self.failure or (self.report and self.report["lost"]) or ""
 
 
-def fly_to_its_end(plan: FlightPlan) -> Outcome:
-    """Fly into an empty folder and keep what came of it, also of a flight that ends early."""
-    prepare(plan.out)
-    try:
-        return Outcome(keep_flight(plan, fly_plan(plan)), "")
-    except InFlightError as error:
-        return Outcome(keep_what_there_is(plan, str(error)), str(error))
+def fly_to_its_end(plan: FlightPlan, *, for_viewers: bool = False, failure_file: str = FAILURE) -> Outcome:
+    """Fly and judge, also a flight that ends early; in memory, or for two processes in a temporary folder.
+
+    Args:
+        plan: What to fly.
+        for_viewers: As of a `TopicLog`.
+        failure_file: What `failure.txt` is called where it will lie.
+    """
+    if plan.spec.link != "udp":
+        log = MemoryLog(for_viewers=for_viewers)
+        try:
+            summary = fly_plan(plan, topics=log)
+        except InFlightError as error:
+            cause = error.__cause__
+            _, text = failure_text(cause if isinstance(cause, InFlightError) else error, failure_file)
+            return _early(plan, log, error, text)
+        return Outcome(report_of(plan, log, summary), log, None, "")
+    with TemporaryDirectory(prefix="colibri-") as folder:
+        plan = replace(plan, spec=replace(plan.spec, out=Path(folder)))
+        try:
+            summary = fly_plan(plan)
+        except InFlightError as error:
+            file = Path(folder) / FAILURE
+            text = file.read_text(encoding="utf-8") if file.exists() else str(error)
+            return _early(plan, log_of(plan.out), error, text.replace(str(file), failure_file))
+        file_log = log_of(plan.out)
+        return Outcome(report_of(plan, file_log, summary), file_log, None, "")
+
+
+def _early(plan: FlightPlan, log: TopicReader, error: InFlightError, text: str) -> Outcome:
+    """Return what came of a flight that came to an early end."""
+    found = None
+    with suppress(RecordingError):
+        found = report_of(plan, log, None, text.partition("\n")[0])
+    return Outcome(found, log, error, text)
+
+
+def report_of(
+    plan: FlightPlan,
+    log: TopicReader,
+    summary: Summary | None,
+    failure: str | None = None,
+    *others: Callable[[Samples], None],
+) -> Report:
+    """Return the report of a flight; one that came to an early end is lost by its `failure`.
+
+    `others` are handed each part of the flight on the way: what draws it, say.
+
+    Raises:
+        RecordingError: There is no complete control sample in it.
+    """
+    flight = read_flight(FlightReader(plan, log), *others)
+    return report(plan, log, summary, flight, _lost(plan, flight, failure))
 
 
 def keep_flight(plan: FlightPlan, summary: Summary, *others: Callable[[Samples], None]) -> Report:
-    """Write `flight.csv` and `report.json` of a flight that came to its end; return the report.
-
-    `others` are handed each part of the flight on the way: what draws it, say.
-    """
-    flight = _write_table(plan, *others)
-    return _write_report(plan, flight, summary, lost(plan, flight))
+    """Write `flight.csv` and `report.json` of a flight that came to its end; return the report; see `report_of`."""
+    return _write_outcome(plan, summary, None, *others)
 
 
 def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | None:
     """Write what there is of a flight that came to no end; a report only where it is known `why`: it is lost then."""
-    try:
-        flight = _write_table(plan)
+    with suppress(RecordingError, LogFormatError, OSError):
         if why is not None:
-            return _write_report(plan, flight, None, Lost(float(flight.t[-1]), why))
-    except (RecordingError, OSError):
-        pass
+            return _write_outcome(plan, None, why)
+        with (plan.out / TABLE).open("w", encoding="utf-8") as file:
+            read_flight(FlightReader(plan), TableWriter(file).add)
     return None
 
 
-def _write_table(plan: FlightPlan, *others: Callable[[Samples], None]) -> FlightSeries:
-    reader = FlightReader(plan)
-    with TableFile(plan.out / "flight.csv") as table:
-        return read_flight(reader, table.add, *others)
+def files_of(plan: FlightPlan, report: Report | None, log: TopicReader) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each file of a flight that has its log in memory, but for its figures."""
+    yield PROVENANCE, encoded_provenance(plan)
+    yield FILE, b"".join(log.encoded())
+    if report is not None:
+        table = StringIO()
+        writer = TableWriter(table)
+        for part in FlightReader(plan, log):
+            writer.add(part)
+        yield TABLE, table.getvalue().encode()
+        yield REPORT, encoded_report(report)
 
 
-def _write_report(plan: FlightPlan, flight: FlightSeries, summary: Summary | None, lost: Lost | None) -> Report:
-    figures = report(plan, summary, flight, lost)
-    write_report(figures, plan.out / "report.json")
-    return figures
+def _write_outcome(
+    plan: FlightPlan, summary: Summary | None, failure: str | None, *others: Callable[[Samples], None]
+) -> Report:
+    with (plan.out / TABLE).open("w", encoding="utf-8") as file:
+        found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file).add, *others)
+    (plan.out / REPORT).write_bytes(encoded_report(found))
+    return found
+
+
+def _lost(plan: FlightPlan, flight: FlightSeries, failure: str | None) -> Lost | None:
+    return lost(plan, flight) if failure is None else Lost(float(flight.t[-1]), failure)

@@ -1,22 +1,22 @@
-"""What a flight left behind: the logs of plant and autopilot, joined into one row a control sample."""
+"""What a flight left behind: truth and decisions, joined into one row a control sample."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from hashlib import sha256
 from math import isnan
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.analysis.logs import Rows, at_times, read_blocks, read_series
+from colibri.analysis.logs import RecordingError, Rows, at_times, log_of, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.common.errors import InFlightError
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
+from colibri.mavlink.ulog.flight_topics import DECISION, TRUTH
+from colibri.mavlink.ulog.log import TopicReader
 from colibri.plant.vehicle.description import Vehicle
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
@@ -31,12 +31,7 @@ COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENC
 _PLANT_STATE = slice(1, 14)
 _PLANT_ATTITUDE = slice(10, 14)
 _PLANT_ROTORS = slice(14, 18)
-_LAG = 16
 _SAME_S = 1e-7
-
-
-class RecordingError(InFlightError):
-    """The logs hold no flight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,25 +105,32 @@ class Lags(NamedTuple):
 
 
 class FlightReader:
-    """The logs of plant and autopilot, joined part by part: a flight of any length in some MB of memory.
+    """Truth and decisions of a flight, joined part by part: a flight of any length in some MB of memory.
 
     Attributes:
         plan: Of the flight.
+        log: What is read.
         samples: How many control samples there are, the start among them.
         path_lag_s: As of a `Recording`.
     """
 
-    def __init__(self, plan: FlightPlan) -> None:
-        """Read of the logs in the plan's folder what joins them: some 20 bytes a control sample.
+    def __init__(self, plan: FlightPlan, log: TopicReader | None = None) -> None:
+        """Read what joins them: some 20 bytes a control sample.
+
+        Args:
+            plan: Of the flight.
+            log: Of the flight; None for that in the plan's folder.
 
         Raises:
-            RecordingError: There is no complete control sample in them.
+            RecordingError: There is no complete control sample in it.
+            LogFormatError: It is no log of a flight of this version.
         """
         self.plan = plan
-        (plant_s,) = read_series(plan.out / "plant.csv", 0)
+        self.log = log_of(plan.out) if log is None else log
+        (plant_s,) = read_series(self.log, TRUTH, "t")
         if not len(plant_s):
             raise RecordingError("the flight ended before it began")
-        lags = read_lags(plan)
+        lags = read_lags(self.log)
         lags = lags.first(int(np.searchsorted(lags.decided_s, plant_s[-1])))
         self._sampled = _at_samples(plant_s, lags.decided_s)
         self.samples = int(np.count_nonzero(self._sampled))
@@ -147,9 +149,9 @@ class FlightReader:
     def __iter__(self) -> Iterator[Samples]:
         """Yield all control samples in their order, in parts of at least one."""
         self._states = sha256()
-        decided = Rows(self.plan.out / "autopilot.csv")
+        decided = Rows(self.log, DECISION)
         frames, yaw_rad, begins = 0, self.plan.start_yaw_rad, True
-        for block in read_blocks(self.plan.out / "plant.csv"):
+        for block in read_blocks(self.log, TRUTH):
             sampled = self._sampled[frames : frames + len(block)]  # frames that were logged since then do not count
             frames += len(sampled)
             self._states.update(block[: len(sampled), _PLANT_STATE].tobytes())
@@ -183,21 +185,17 @@ class FlightReader:
         )
 
 
-def read_recording(plan: FlightPlan) -> Recording:
-    """Join the logs in the plan's folder, all in memory.
-
-    Raises:
-        RecordingError: There is no complete control sample in them.
-    """
-    reader = FlightReader(plan)
+def read_recording(plan: FlightPlan, log: TopicReader | None = None) -> Recording:
+    """Join truth and decisions, all in memory; arguments and errors are those of `FlightReader`."""
+    reader = FlightReader(plan, log)
     parts = list(reader)
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)}
     return Recording(**whole, path_lag_s=reader.path_lag_s, trajectory_sha256=reader.trajectory_sha256)
 
 
-def read_lags(plan: FlightPlan) -> Lags:
+def read_lags(log: TopicReader) -> Lags:
     """Return by which path time was behind the clock at each decision of a flight."""
-    return Lags(*read_series(plan.out / "autopilot.csv", 0, _LAG))
+    return Lags(*read_series(log, DECISION, "t", "path_lag_s"))
 
 
 def path_times(times_s: Array, lags: Lags) -> Array:
@@ -207,21 +205,13 @@ def path_times(times_s: Array, lags: Lags) -> Array:
     return times
 
 
-class TableFile:
-    """A flight's table as CSV, written part by part; numbers keep every bit."""
+class TableWriter:
+    """Writes the table of a flight as CSV, part by part; numbers keep every bit."""
 
-    def __init__(self, path: Path) -> None:
-        """Create the file, with the names of the columns."""
-        self._file = path.open("w", encoding="utf-8")
-        self._file.write(",".join(COLUMNS) + "\n")
-
-    def __enter__(self) -> Self:
-        """Return it, open."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Close the file."""
-        self._file.close()
+    def __init__(self, file: TextIO) -> None:
+        """Write the names of the columns."""
+        self._file = file
+        file.write(",".join(COLUMNS) + "\n")
 
     def add(self, part: Samples) -> None:
         """Append the rows of a part."""
@@ -230,8 +220,8 @@ class TableFile:
 
 def write_recording(recording: Recording, path: Path) -> None:
     """Write the table as CSV; numbers keep every bit."""
-    with TableFile(path) as table:
-        table.add(recording)
+    with path.open("w", encoding="utf-8") as file:
+        TableWriter(file).add(recording)
 
 
 def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:

@@ -18,13 +18,16 @@ from colibri.common.elementary import acos
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan, Summary
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.ulog.log import TopicReader
 
 Report: TypeAlias = dict[str, Any]
 
 _SMALL_M = 0.01
 
 
-def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost: Lost | None) -> Report:
+def report(
+    plan: FlightPlan, log: TopicReader, summary: Summary | None, flight: FlightSeries, lost: Lost | None
+) -> Report:
     """Return the figures of a flight; one that came to an early end has no summary.
 
     Errors are distances to the reference of the same instant, or of the path time then; effort is
@@ -61,7 +64,7 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": rms(settled) if len(settled) else None,
         "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
-        **_estimation_figures(plan, settled),
+        **_estimation_figures(plan, log, settled),
         "max_tilt_deg": degrees(acos(max(-1.0, min(1.0, float(flight.upright.min()))))),
         "effort_n_m": rms(flight.moment_n_m),
         "solve_time_us": _quantiles(flight.solve_time_us),
@@ -79,16 +82,21 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
     }
 
 
-def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
+def _estimation_figures(plan: FlightPlan, log: TopicReader, settled: Array) -> Report:
     """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
     if plan.spec.feedback is Feedback.SENSORS:
-        return read_estimation(plan, SETTLED_AFTER_S).figures()
+        return read_estimation(plan, log, SETTLED_AFTER_S).figures()
     return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
+
+
+def encoded_report(figures: Report) -> bytes:
+    """Return the report as JSON."""
+    return f"{json.dumps(figures, indent=2)}\n".encode()
 
 
 def write_report(figures: Report, path: Path) -> None:
     """Write the report as JSON."""
-    path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    path.write_bytes(encoded_report(figures))
 
 
 def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> None:

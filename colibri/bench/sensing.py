@@ -1,6 +1,6 @@
 """What sensors cost: a step of the estimator, and a flight on them beside one on the state."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,10 +14,10 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.flights.fly import fly_plan
 from colibri.flights.in_process import SYSTEM_ID
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.sensors import OWN_MESSAGES, SensorFrame, decode_sensors
-from colibri.mavlink.wire import dialect
-from colibri.mavlink.wire.dialect import Codec, Message
-from colibri.mavlink.wire.tlog import decode
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.ulog.inputs import InputRecord, Kind
+from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import load_vehicle
 
 TRACK = "spiral"
@@ -36,7 +36,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
     duration_s = max(duration_s, _MIN_S)
     report("estimator")
     fly_plan(plan_of(profile, folder, duration_s, "memory", Feedback.SENSORS))
-    frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))
+    frames = list(sensor_frames(FlightFile(folder / FILE).inputs()))
     steps = {
         ALWAYS: summary(_timed(profile, frames, lambda _time_us: True)),
         IN_FLIGHT: summary(_timed(profile, frames, lambda time_us: time_us % CONTROL_US == 0)),
@@ -56,21 +56,13 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
     }
 
 
-def sensor_frames(tlog: bytes) -> Iterator[SensorFrame]:
-    """Read the sensors' frames of a telemetry log, in order."""
-    codec = Codec(SYSTEM_ID, dialect.AUTOPILOT_COMPONENT)
-    parts: list[Message] = []
-    own = {row.message for row in OWN_MESSAGES}
-    for _, frame in decode(tlog):
-        for message in codec.decode(frame):
-            if message.name == "HIL_SENSOR":
-                if parts:
-                    yield decode_sensors(*parts)
-                parts = [message]
-            elif message.name in own and parts:
-                parts.append(message)
-    if parts:
-        yield decode_sensors(*parts)
+def sensor_frames(inputs: Iterable[InputRecord]) -> Iterator[SensorFrame]:
+    """Read the sensors' frames of a flight's log, in order."""
+    end = AutopilotEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US, now_s=0.0, feedback=Feedback.SENSORS)
+    for _, kind, datagram in inputs:
+        received = end.receive(datagram, 0.0) if kind == Kind.FRAME else None
+        if received is not None and isinstance(received.frame, SensorFrame):
+            yield received.frame
 
 
 def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], bool]) -> list[float]:

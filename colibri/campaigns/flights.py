@@ -1,14 +1,12 @@
 """One flight of a campaign, where it is flown: from its factors to its row."""
 
 from collections.abc import Generator, Iterable, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import replace
 from enum import StrEnum
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from colibri.analysis.outcome import fly_to_its_end
+from colibri.analysis.outcome import files_of, fly_to_its_end
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import file_text
@@ -124,9 +122,8 @@ def check(points: Iterable[Point], common: Common) -> None:
         Error: One of them cannot begin.
     """
     for point in points:
-        with TemporaryDirectory(prefix="colibri-") as folder:
-            plan = plan_point(common, point, Path(folder))
-            build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
+        plan = plan_point(common, point)
+        build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
 
 
 def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
@@ -137,29 +134,28 @@ def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Gener
 
 
 def fly_point(common: Common, point: Point) -> Flown:
-    """Fly once; return what came of it. Nothing stays on the disk."""
+    """Fly once, in memory; return what came of it."""
     nothing = (None,) * len(common.metrics)
-    with TemporaryDirectory(prefix="colibri-") as scratch:
-        folder = Path(scratch) / "flight"
-        try:
-            plan = plan_point(common, point, folder)
-            outcome = fly_to_its_end(plan)
-        except Error as error:
-            why = str(error).replace(scratch, "")
-            return Flown(point.flight, Verdict.REFUSED, why, nothing, "")
-        verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
-        keep = common.logs == "all" or (common.logs == "lost" and verdict.is_lost)
-        files = _files(folder.iterdir() if keep else [folder / FAILURE], folder, point.folder)
-        why = outcome.lost.replace(str(folder), point.folder)
-        contents = provenance_of(plan).sha256["all"]
-        if outcome.report is None:
-            return Flown(point.flight, verdict, why, nothing, "", contents, files)
-        flight = Flight(plan, outcome.report)
-        metrics = tuple(_metric(metric, flight) for metric in common.metrics)
-        return Flown(point.flight, verdict, why, metrics, flight.sha256, contents, files)
+    failure_file = f"{point.folder}/{FAILURE}"
+    try:
+        plan = plan_point(common, point)
+        outcome = fly_to_its_end(plan, for_viewers=common.logs != "none", failure_file=failure_file)
+    except Error as error:
+        return Flown(point.flight, Verdict.REFUSED, str(error), nothing, "")
+    verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
+    files = {failure_file: outcome.failure_text.encode()} if outcome.failure else {}
+    if common.logs == "all" or (common.logs == "lost" and verdict.is_lost):
+        kept = files_of(plan, outcome.report, outcome.log)
+        files |= {f"{point.folder}/{name}": content for name, content in kept}
+    contents = provenance_of(plan).sha256["all"]
+    if outcome.report is None:
+        return Flown(point.flight, verdict, outcome.lost, nothing, "", contents, files)
+    flight = Flight(plan, outcome.report, outcome.log)
+    metrics = tuple(_metric(metric, flight) for metric in common.metrics)
+    return Flown(point.flight, verdict, outcome.lost, metrics, flight.sha256, contents, files)
 
 
-def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
+def plan_point(common: Common, point: Point) -> FlightPlan:
     """Return the plan of a flight, from nothing but `common` and its factors.
 
     Raises:
@@ -169,7 +165,7 @@ def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
     options = {name: value for name, value in factors.items() if key_of(name) is None} | {"seed": point.seed}
     if options.get("wind") in common.winds:
         options["wind"] = common.winds[options["wind"]]
-    spec = from_values(FlightSpec, {**options, "out": out, "ulog": common.logs != "none"}, OptionError)
+    spec = from_values(FlightSpec, options, OptionError)
     profile = spec.chosen(with_keys(factors, "profile", _object(spec.profile, common.profiles)))
     assumed = _object(spec.vehicle or profile.simulation.vehicle, common.vehicles)
     vehicle = with_keys(factors, "vehicle", assumed)
@@ -200,12 +196,3 @@ def _metric(metric: Metric, flight: Flight) -> float | None:
         return metric.value(flight)
     except Exception as error:
         raise MetricError(f"metric {metric.name} raised {type(error).__name__}: {error}") from error
-
-
-def _files(wanted: Iterable[Path], folder: Path, called: str) -> dict[str, bytes]:
-    """Return what is in files that there are, as it will lie in the folder `called`, by which name it knows itself."""
-    found = {}
-    for path in wanted:
-        with suppress(FileNotFoundError):
-            found[f"{called}/{path.name}"] = path.read_bytes().replace(str(folder).encode(), called.encode())
-    return found

@@ -19,15 +19,18 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Write the topics of a ULog in other formats; return the exit code."""
-    from colibri.analysis.export import read_log, write_csv, write_mcap, write_parquet
+    from colibri.analysis.export import log_file, read_log, write_csv, write_flight_tables, write_mcap, write_parquet
     from colibri.common.errors import Error
 
     if not (args.mcap or args.csv or args.parquet):
         fail("export to what? --mcap, --csv, --parquet, or several of them")
     written = []
     try:
-        path, log = read_log(args.log)
+        path = log_file(args.log)
         tables = path.with_name(f"{path.stem}-topics")
+        if args.csv and write_flight_tables(path, tables):
+            written.append(tables)
+        log = read_log(path)
         if args.mcap:
             written.append(write_mcap(log, path.with_suffix(".mcap")))
         if args.csv:

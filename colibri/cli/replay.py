@@ -10,10 +10,10 @@ def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri replay`."""
     add = parser.add_argument
     add(
-        "tlog",
+        "log",
         type=Path,
-        metavar="FLIGHT.TLOG",
-        help="as `colibri fly` leaves it, with inputs.jsonl beside it; or its folder",
+        metavar="DIR|FLIGHT.ULG",
+        help="folder of a flight, or its flight.ulg",
     )
     add("--quiet", action="store_true", help="say nothing but errors")
 

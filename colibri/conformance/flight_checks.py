@@ -1,19 +1,17 @@
 """Flights: hover held, the thesis's tracks, wind; and how long a step takes."""
 
 from collections.abc import Iterator
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from colibri.analysis.outcome import fly_to_its_end
+from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.registry import in_words
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.conformance.rows import Result, Row, judged, not_applicable
 from colibri.conformance.step_records import fly_for_steps
 from colibri.conformance.subject import Subject
-from colibri.experiments.table import read_table
 
 AREA, TIME_AREA = "flights", "time"
 _HOVER_S, _MAX_DRIFT_M = 8.0, 0.5
@@ -92,16 +90,14 @@ def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
 
 def fly(subject: Subject, track: str, **options: Any) -> Flown:
     """Fly to the end, whatever it is."""
-    with TemporaryDirectory(prefix="colibri-") as folder:
-        try:
-            outcome = fly_to_its_end(subject.plan(track, Path(folder), **options))
-        except Exception as error:
-            return Flown(in_words(error), np.empty(0))
-        if outcome.report is None:
-            return Flown(outcome.lost, np.empty(0))
-        table = read_table(Path(folder) / "flight.csv")
-    off = [table[axis] - table[f"{axis}_ref"] for axis in ("x", "y", "z")]
-    return Flown(outcome.lost, np.sqrt(sum(axis * axis for axis in off)))
+    try:
+        plan = subject.plan(track, **options)
+        outcome = fly_to_its_end(plan)
+    except Exception as error:
+        return Flown(in_words(error), np.empty(0))
+    if outcome.report is None:
+        return Flown(outcome.lost, np.empty(0))
+    return Flown(outcome.lost, read_recording(plan, outcome.log).position_error_m)
 
 
 def _length(metres: float) -> str:

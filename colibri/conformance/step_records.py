@@ -134,7 +134,7 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
     exchange = Direct(autopilot)
     try:
         while plant.world.time_us + plant.interval_us <= plan.spec.duration * 1e6:
-            _, command = exchange(plant)
+            _, command, _ = exchange(plant)
             plant.answer(command)
     except DecisionError as error:
         return Flown(recorders[0].steps, str(error), error)

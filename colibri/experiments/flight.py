@@ -1,43 +1,40 @@
 """`colibri.fly`: one flight from Python, and what came of it as an object."""
 
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from shutil import copytree, rmtree
-from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
-from weakref import finalize
 
-from colibri.analysis.outcome import keep_flight
-from colibri.analysis.recording import FlightReader
+from colibri.analysis.outcome import files_of, fly_to_its_end
+from colibri.analysis.recording import COLUMNS, FlightReader
 from colibri.analysis.report import Report, report_rows
 from colibri.analysis.series.figure_series import FigureSeries
 from colibri.common.errors import unknown
 from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
-from colibri.experiments.table import Table, read_table
-from colibri.flights.fly import fly_plan
-from colibri.flights.folder import prepare
+from colibri.experiments.table import Table, table_of
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec, OptionError
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.ulog.flight_topics import ESTIMATE, TRUTH
+from colibri.mavlink.ulog.log import TopicReader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 class Flight:
-    """What came of a flight. Its logs lie in a temporary folder, which goes with it; `save` keeps them.
+    """A flight that was flown, in memory; `save` writes its log and tables.
 
     Attributes:
         plan: What was flown.
         report: The numbers of `report.json`.
+        log: Its topics.
     """
 
-    def __init__(self, plan: FlightPlan, report: Report) -> None:
-        """Be the flight of `plan`, whose folder goes with this."""
+    def __init__(self, plan: FlightPlan, report: Report, log: TopicReader) -> None:
         self.plan = plan
         self.report = report
-        finalize(self, rmtree, plan.out, ignore_errors=True)
+        self.log = log
 
     @property
     def sha256(self) -> str:
@@ -53,18 +50,18 @@ class Flight:
     @cached_property
     def samples(self) -> Table:
         """`flight.csv`, a row a control sample: state, inputs, references; m, s, rad, N."""
-        return read_table(self.plan.out / "flight.csv")
+        return table_of(COLUMNS, (part.table for part in FlightReader(self.plan, self.log)))
 
     @cached_property
     def frames(self) -> Table:
-        """`plant.csv`, a row a frame: the true state, rotors, battery and wind."""
-        return read_table(self.plan.out / "plant.csv")
+        """A row a frame: the true state, rotors, battery and wind."""
+        return table_of(TRUTH.names, self.log.blocks(TRUTH))
 
     @cached_property
     def estimate(self) -> Table | None:
-        """`estimate.csv`, a row a control sample: what the autopilot made of its sensors; None without them."""
-        path = self.plan.out / "estimate.csv"
-        return read_table(path) if path.exists() else None
+        """A row a control sample: the autopilot's estimate from its sensors; None without them."""
+        table = table_of(ESTIMATE.names, self.log.blocks(ESTIMATE))
+        return table if self.plan.spec.feedback is Feedback.SENSORS else None
 
     def plot(self, what: str = "error") -> "Figure":
         """Return a figure of the flight: `error`, `position`, `attitude`, `inputs`, `rotors` or `trajectory`.
@@ -75,7 +72,7 @@ class Flight:
         from colibri.analysis.figures import figures_of
 
         series = FigureSeries(self.plan)
-        for part in FlightReader(self.plan):
+        for part in FlightReader(self.plan, self.log):
             series.add(part)
         known = []
         for name, figure in figures_of(series, self.plan):
@@ -85,7 +82,7 @@ class Flight:
         raise OptionError(unknown("figure", what, known))
 
     def save(self, folder: str | Path) -> Path:
-        """Write logs, tables, report and figures of the flight into a folder that is new or empty; return it.
+        """Write log, table, report and provenance of the flight into a folder that is new or empty; return it.
 
         Raises:
             OptionError: It holds something, or cannot be written.
@@ -94,7 +91,9 @@ class Flight:
         try:
             if path.exists() and any(path.iterdir()):
                 raise OptionError(f"save: {path} is not empty: choose another folder")
-            copytree(self.plan.out, path, dirs_exist_ok=True)
+            path.mkdir(parents=True, exist_ok=True)
+            for name, content in files_of(self.plan, self.report, self.log):
+                (path / name).write_bytes(content)
         except OSError as error:
             raise OptionError(f"save: cannot write to {path}: {error.strerror}") from error
         return path
@@ -118,13 +117,10 @@ def fly(track: str, **options: Any) -> Flight:
     Raises:
         Error: What the command line would say in one line.
     """
-    folder = Path(mkdtemp(prefix="colibri-"))
-    try:
-        given = {"track": track, **options}
-        spec = from_values(FlightSpec, given, OptionError, keywords_of(FlightSpec))
-        plan = FlightPlan.of(replace(spec, out=folder))
-        prepare(folder)
-        return Flight(plan, keep_flight(plan, fly_plan(plan)))
-    except BaseException:
-        rmtree(folder, ignore_errors=True)
-        raise
+    spec = from_values(FlightSpec, {"track": track, **options}, OptionError, keywords_of(FlightSpec))
+    plan = FlightPlan.of(spec)
+    outcome = fly_to_its_end(plan, for_viewers=True)
+    if outcome.error is not None:
+        raise outcome.error
+    assert outcome.report is not None, "a flight that came to its end has a report"
+    return Flight(plan, outcome.report, outcome.log)

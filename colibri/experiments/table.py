@@ -1,12 +1,12 @@
 """Tables of a flight as NumPy has them: one structured array, a field a column."""
 
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from colibri.analysis.logs import read_blocks, read_columns
 from colibri.common.errors import Error
+from colibri.common.types import Array
 
 
 class PandasError(Error):
@@ -34,8 +34,7 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
         return DataFrame({name: self[name] for name in self.dtype.names or ()})
 
 
-def read_table(path: Path) -> Table:
-    """Return the complete rows of a log."""
-    columns = read_columns(path)
-    rows = np.concatenate([np.empty((0, len(columns))), *read_blocks(path)])
+def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> Table:
+    """Return blocks of rows as one table."""
+    rows = np.concatenate([np.empty((0, len(columns))), *blocks])
     return rows.view([(name, np.float64) for name in columns])[:, 0].view(Table)

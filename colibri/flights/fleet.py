@@ -34,8 +34,6 @@ SDK_PORT = 14540
 MAX_FLEET = 100
 _MAX_DEATHS, _LOOP_S = 3, 60.0
 """A vehicle whose processes die more often than that in that time is not started again."""
-_OF_AUTOPILOT = ("autopilot.csv", "estimate.csv", "filter.csv")
-"""What an autopilot writes anew; `inputs.jsonl` goes on where the one before has died."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +179,7 @@ def _start_plant(member: Member, spec: FleetSpec) -> None:
         vehicle=spec.plant_vehicle or spec.vehicle or load_profile(spec.profile).simulation.vehicle,
         start=spec.started(Start(psi=home.yaw_enu_deg))._asdict(),
         seed=spec.seed + member.instance,
+        tlog=True,
         **_common(member, spec),
     )
     member.children.append(Child(plant))
@@ -256,19 +255,12 @@ def start_again(member: Member, spec: FleetSpec, lines: StatusLines) -> None:
     lines.died(member.instance, child.name, f"{how_it_ended(code)}; started again")
     if child.name == "plant":
         end_children(reversed(member.children))
-        _set_aside(member, spec, LOGS)
+        folder = spec.folder(member.instance)
+        if folder is not None:
+            set_aside(*(folder / name for name in LOGS))
         member.children.clear()
         _start_plant(member, spec)
     else:
         end_children([child])
-        _set_aside(member, spec, _OF_AUTOPILOT)
         member.children.remove(child)
         _start_autopilot(member, spec)
-
-
-def _set_aside(member: Member, spec: FleetSpec, names: Sequence[str]) -> None:
-    """Give logs of processes that have died names of their own: autopilot.csv becomes autopilot-1.csv."""
-    folder = spec.folder(member.instance)
-    if folder is not None:
-        for name in names:
-            set_aside(folder / name)

@@ -8,6 +8,7 @@ from colibri.common.process.lifecycle import EXIT_FAILED, loading
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.flights.provenance import write_provenance
+from colibri.mavlink.ulog.log import TopicLog
 
 
 def fly_plan(
@@ -15,8 +16,11 @@ def fly_plan(
     progress: Callable[[float], None] = unseen,
     say: Callable[[str], None] = unseen,
     compiling: Callable[[int], None] = unseen,
+    topics: TopicLog | None = None,
 ) -> Summary:
     """Fly a plan over its link, and note in its folder what it is made of; return what was measured meanwhile.
+
+    A flight in this process that is recorded in `topics` writes nothing.
 
     `progress` is called with the simulated time, s; `say` with a line for each ground link and each ground station that
     connects; `compiling` with the number of functions compiled so far.
@@ -24,7 +28,8 @@ def fly_plan(
     Raises:
         FlightError: It came to an early end; why is also in `FAILURE`, with the traceback where foreign code raised.
     """
-    write_provenance(plan)
+    if topics is None:
+        write_provenance(plan)
     if plan.spec.link == "udp":
         return fly_processes(plan, progress, say, compiling)
     with loading():
@@ -33,6 +38,7 @@ def fly_plan(
 
     on_compile(compiling)
     try:
-        return fly_locally(plan, progress)
+        return fly_locally(plan, progress, topics)
     except InFlightError as error:
-        raise FlightError(keep_failure(error, plan.out), EXIT_FAILED, said=False) from error
+        folder = plan.out if topics is None else None
+        raise FlightError(keep_failure(error, folder), EXIT_FAILED, said=False) from error

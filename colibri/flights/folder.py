@@ -10,10 +10,7 @@ from colibri.common.process.folder_lock import FolderInUseError, FolderLock
 from colibri.common.process.lifecycle import fail
 
 PROVENANCE = "provenance.json"
-LOGS = (
-    *("flight.csv", "flight.tlog", "flight.ulg", "plant.csv", "autopilot.csv", "inputs.jsonl"),
-    *("estimate.csv", "filter.csv", "report.json", FAILURE, PROVENANCE),
-)
+LOGS = ("flight.ulg", "flight.csv", "flight.tlog", "report.json", FAILURE, PROVENANCE)
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 
 

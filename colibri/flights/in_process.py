@@ -10,7 +10,7 @@ from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
-from colibri.autopilot.process.logs import AutopilotLog
+from colibri.autopilot.process.logs import AutopilotLog, log_in
 from colibri.autopilot.process.run import setup_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading
@@ -20,7 +20,9 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.process.logs import PlantLogs
+from colibri.mavlink.ulog.log import TopicLog
+from colibri.mavlink.wire.tlog import TlogWriter
+from colibri.plant.process.logs import TRAFFIC, TruthLog
 from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import Plant, PlantBuilder
 
@@ -32,12 +34,16 @@ _NEVER_LATE_S = 0.0
 class Exchange(Protocol):
     """How a frame of the plant gets to the autopilot, and its command back."""
 
-    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
-        """Return the autopilot's step and the command that reached the plant."""
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand, bytes | None]:
+        """Return the autopilot's step, the command that reached the plant, and the frame's datagram if there is one."""
 
 
-def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) -> Summary:
-    """Fly `plan` in this process; `progress` is called with the simulated time, s.
+def fly_locally(
+    plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
+) -> Summary:
+    """Fly `plan` in this process, and record it in `topics`, or else in the plan's folder.
+
+    `progress` is called with the simulated time, s.
 
     Raises:
         ControllerError: The control law cannot be used.
@@ -50,30 +56,31 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
         autopilot, plant = put_together(plan, perf_counter)
     interval_us = plant.interval_us
     setup = setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle, plan.contents.track_file)
-    plant_logs = PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.spec.ulog)
-    log = AutopilotLog(plan.out, setup, ulog=plan.spec.ulog)
+    log = log_in(plan.out, setup) if topics is None else AutopilotLog(topics, setup)
+    truth = TruthLog(log.topics, plan.plant_vehicle)
+    traffic = TlogWriter(plan.out / TRAFFIC) if plan.spec.tlog and topics is None else None
     exchange: Exchange = Direct(autopilot)
     if plan.spec.link == "memory":
-        exchange = InMemory(autopilot, interval_us, plan.spec.feedback, plant_logs)
+        exchange = InMemory(autopilot, interval_us, plan.spec.feedback, traffic)
     end_us, is_paced = plan.spec.duration * 1e6, isfinite(plan.spec.pace)
     try:
-        plant_logs.write_world(plant.world)
+        truth.write_world(plant.world)
         with gc_frozen():
             began_s = perf_counter()
             while plant.world.time_us + interval_us <= end_us:
                 if is_paced:
                     sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.spec.pace - perf_counter()))
-                step, command = exchange(plant)
+                step, command, datagram = exchange(plant)
                 plant.answer(command)
-                log.write(step)
-                plant_logs.write_world(plant.world)
+                log.write(step, datagram)
+                truth.write_world(plant.world)
                 progress(plant.world.time_us / 1e6)
-            plant_logs.flush()
             log.flush()
             wall_time_s = perf_counter() - began_s
     finally:
-        plant_logs.close()
         log.close()
+        if traffic:
+            traffic.close()
     return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
 
 
@@ -97,19 +104,21 @@ class Direct:
         """Ask `autopilot`."""
         self._autopilot = autopilot
 
-    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand, bytes | None]:
         """Return the autopilot's step and its command as it is."""
         step = self._autopilot.step(*plant.measure())
-        return step, step.command
+        return step, step.command, None
 
 
 class InMemory:
     """Carries the datagrams that the two processes would send, in the same conversation."""
 
-    def __init__(self, autopilot: Autopilot[Any], frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
+    def __init__(
+        self, autopilot: Autopilot[Any], frame_interval_us: int, feedback: Feedback, traffic: TlogWriter | None
+    ) -> None:
         """Let `autopilot` call the plant and request `feedback`."""
         self._autopilot = autopilot
-        self._logs = logs
+        self._traffic = traffic
         self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback])
         self._autopilot_end = AutopilotEnd(
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S, feedback=feedback
@@ -117,29 +126,31 @@ class InMemory:
         self._autopilot_end.poll(_NEVER_LATE_S)
         self._to_plant(time_us=0)
 
-    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
-        """Return the autopilot's step and the command as the plant decoded it."""
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand, bytes | None]:
+        """Return the autopilot's step, the command as the plant decoded it, and the frame's datagram."""
         with_battery = self._plant_end.sends_battery(plant.world.time_us)
         frame, plant_status = plant.measure(with_battery=with_battery)
         self._plant_end.offer(frame, _NEVER_LATE_S, plant_status)
-        step = self._to_autopilot(frame.time_us)
+        step, datagram = self._to_autopilot(frame.time_us)
         command = self._to_plant(frame.time_us)
         assert step is not None, "the autopilot answers every new frame"
         assert command is not None, "the answer names the frame awaited"
-        return step, command
+        return step, command, datagram
 
-    def _to_autopilot(self, time_us: int) -> Step | None:
-        step = None
-        sent = self._plant_end.take_outbox()
-        self._logs.write_traffic(time_us, [], sent)
-        for outgoing in sent:
-            step = answer(self._autopilot_end, self._autopilot, outgoing.datagram, _NEVER_LATE_S) or step
-        return step
+    def _to_autopilot(self, time_us: int) -> tuple[Step | None, bytes]:
+        step, datagram = None, b""
+        for outgoing in self._plant_end.take_outbox():
+            if self._traffic:
+                self._traffic.write(time_us, list(outgoing.frames))
+            datagram = outgoing.datagram
+            step = answer(self._autopilot_end, self._autopilot, datagram, _NEVER_LATE_S) or step
+        return step, datagram
 
     def _to_plant(self, time_us: int) -> ActuatorCommand | None:
         command = None
         for datagram in self._autopilot_end.take_outbox():
             command = self._plant_end.receive(datagram, _ADDRESS, _NEVER_LATE_S) or command
-        self._logs.write_traffic(time_us, self._plant_end.received, [])
+        if self._traffic:
+            self._traffic.write(time_us, list(self._plant_end.received))
         self._plant_end.received.clear()
         return command

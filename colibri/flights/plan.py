@@ -178,6 +178,7 @@ class FlightPlan:
             integrator=self.integrator,
             start=self.start._asdict(),
             speed=spec.pace,
+            tlog=spec.tlog or bool(spec.gcs),
         )
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:

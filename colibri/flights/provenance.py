@@ -21,7 +21,7 @@ from colibri.flights.spec import FlightSpec
 from colibri.plant.environment.weather import RecordedWind
 from colibri.plant.vehicle.description import Vehicle
 
-_NOT_KEPT = ("out", "ulog", "gcs", "signing_key", "insecure", "speed")
+_NOT_KEPT = ("out", "tlog", "gcs", "signing_key", "insecure", "speed")
 """No flight depends on them."""
 _NAMES = ("track", "profile", "controller", "solver", "delay", "vehicle", "plant_vehicle", "without")
 """What they stand for is kept by content."""
@@ -97,11 +97,16 @@ def _named(plan: FlightPlan) -> FlightSpec:
     )
 
 
+def encoded_provenance(plan: FlightPlan) -> bytes:
+    """Return what a flight is made of, as it is written to its folder."""
+    return msgspec.json.format(msgspec.json.encode(provenance_of(plan)), indent=1) + b"\n"
+
+
 def write_provenance(plan: FlightPlan) -> None:
     """Write what a flight is made of to its folder, or end with one line."""
-    text = msgspec.json.format(msgspec.json.encode(provenance_of(plan)), indent=1)
+    content = encoded_provenance(plan)
     try:
-        (plan.out / PROVENANCE).write_bytes(text + b"\n")
+        (plan.out / PROVENANCE).write_bytes(content)
     except OSError as error:
         fail(f"cannot write to --out {plan.out}: {error.strerror}")
 

@@ -1,7 +1,8 @@
 """`colibri replay`: the frames of a recorded flight, fed to the autopilot alone: is each command what it was?"""
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+import json
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from math import degrees
 from pathlib import Path
@@ -19,20 +20,21 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.loading import load_track, with_file
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.autopilot.process.recorded_inputs import Input, InputsError, ReceivedDatagram, Setup, read
+from colibri.autopilot.process.recorded_inputs import Inputs, InputsError, Setup, read_inputs
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
-from colibri.common.rotations import euler_from_quaternion
+from colibri.common.rotations import earth_from_body, euler_from_quaternion
 from colibri.common.serialization import of_bytes
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, encode_actuators
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, encode_actuators, encode_state
+from colibri.mavlink.ulog.flight_topics import COMMAND, TRUTH
+from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from colibri.mavlink.wire.tlog import Logged, TlogError, decode
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-INPUTS, TLOG = "inputs.jsonl", "flight.tlog"
 _CUT_OFF_US = 1_000_000
 """Processes that are killed leave logs that end less apart than this."""
 _NO_CLOCK_S = 0.0
@@ -45,12 +47,12 @@ class Recorded(NamedTuple):
     Attributes:
         time_us: Simulated time.
         datagram: What the autopilot received.
-        command: What it answered; None where nothing of it was recorded.
+        command: What it answered.
     """
 
     time_us: int
     datagram: bytes
-    command: ActuatorCommand | None
+    command: ActuatorCommand
 
 
 class Answer(NamedTuple):
@@ -58,14 +60,14 @@ class Answer(NamedTuple):
 
     Attributes:
         time_us: Of the frame.
-        command: What it had answered; None where nothing of that was recorded.
+        command: What it had answered.
         autopilot: That answered.
         step: Its answer.
         known: Its state estimate; None before the first estimate.
     """
 
     time_us: int
-    command: ActuatorCommand | None
+    command: ActuatorCommand
     autopilot: Autopilot[Any]
     step: Step
     known: StateFrame | None
@@ -118,108 +120,127 @@ class ReplayError(Error):
 
 def replay(args: argparse.Namespace) -> int:
     """Replay as the command line says; return the exit code."""
-    if args.tlog.is_dir():
-        args.tlog /= TLOG
+    log = args.log / FILE if args.log.is_dir() else args.log
     try:
-        outcome = replay_flight(args.tlog)
-        ended_us = _logged_us(args.tlog)
+        flight = _read(log)
+        outcome = _compare(flight)
     except ReplayError as error:
         fail(str(error))
+    ended_us = _ended_us(flight)
     if outcome.difference is not None:
         print(outcome.difference)  # noqa: T201
-        fail(f"{args.tlog}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
+        fail(f"{log}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
     if not args.quiet:
         print(f"{outcome.commands} commands up to t = {outcome.last_us * 1e-6:.3f} s, all identical")  # noqa: T201
-        for name in _changed(_inputs(args.tlog.parent / INPUTS, args.tlog)):
+        for name in _changed(flight.inputs.setups.values()):
             print(f"{name} is another by now: replayed as it flew")  # noqa: T201
     if ended_us - outcome.last_us > _CUT_OFF_US:
         cut = f"ends at t = {outcome.last_us * 1e-6:.3f} s, and the flight went on to t = {ended_us * 1e-6:.3f} s"
-        fail(f"{args.tlog} {cut}: it was cut off", EXIT_FAILED)
+        fail(f"{log} {cut}: it was cut off", EXIT_FAILED)
     return 0
 
 
-def replay_flight(tlog: Path) -> Replayed:
-    """Replay a flight from its telemetry log and the autopilot's log of inputs beside it.
+def replay_flight(path: Path) -> Replayed:
+    """Replay a flight from its log, or the folder with it.
 
     Profile, vehicle and waypoints are those of the log, whatever their files are by now.
 
     Raises:
         ReplayError: They cannot be replayed.
     """
-    recorded, inputs = _read(tlog)
-    try:
-        return _compare(recorded, inputs)
-    except ReplayError:
-        raise
-    except Error as error:
-        raise ReplayError(f"{tlog.parent / INPUTS}: {error}") from error
+    return _compare(_read(path))
 
 
-def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
-    """Yield each frame of the plant once, in order, with the command that answered it."""
-    codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
-    plant = (setup.system_id, dialect.PLANT_COMPONENT)
-    sent: dict[int, dict[bytes, None]] = {}
-    commands: dict[int, ActuatorCommand] = {}
-    for logged_us, frame in log:
-        time_us = logged_us - setup.boot_unix_us
-        for message in codec.decode(frame):
-            if message.source == plant:
-                sent.setdefault(time_us, {})[frame] = None  # once, however often it was sent
-            elif message.source == codec.source and message.name == "HIL_ACTUATOR_CONTROLS":
-                command = decode_actuators(message)
-                if command is not None:
-                    commands.setdefault(command.time_us, command)
-    for time_us in sorted(sent):
-        yield Recorded(time_us, b"".join(sent[time_us]), commands.get(time_us))
-
-
-def answers_of(tlog: Path) -> Iterator[Answer]:
-    """Yield the answers of the autopilot to the frames of a flight, as `replay_flight` reads it, one after the other.
+def answers_of(path: Path) -> Iterator[Answer]:
+    """Yield the answers of the autopilot to the frames of a flight, one after the other; `path` as of `replay_flight`.
 
     Raises:
         ReplayError: They cannot be replayed.
     """
-    yield from _answers(*_read(tlog))
+    yield from _answers(_read(path))
 
 
-def _read(tlog: Path) -> tuple[list[Recorded], list[Input]]:
-    log = _bytes(tlog)
-    inputs = _inputs(tlog.parent / INPUTS, tlog)
-    setups = [what for what in inputs if isinstance(what, Setup)]
+class _Flight(NamedTuple):
+    """A recorded flight: its log, and what the autopilot received."""
+
+    path: Path
+    log: FlightFile
+    inputs: Inputs
+
+
+def _read(path: Path) -> _Flight:
+    if path.is_dir():
+        path /= FILE
     try:
-        recorded = list(recorded_frames(decode(log), setups[0]))
-    except TlogError as error:
-        raise ReplayError(f"{tlog}: {error}: expected the flight.tlog of a flight") from error
-    if not any(each.command for each in recorded):
-        raise ReplayError(f"{tlog}: no frame of {setups[0].feedback} feedback is answered in it: nothing to replay")
-    return recorded, inputs
+        log = FlightFile(path)
+        flight = _Flight(path, log, read_inputs(log.inputs()))
+    except OSError as error:
+        raise ReplayError(f"cannot read {path}: {error.strerror}") from error
+    except LogFormatError as error:
+        raise ReplayError(str(error)) from error
+    except InputsError as error:
+        raise ReplayError(f"{path}: {error}") from error
+    if next(_recorded(flight), None) is None:
+        (setup, *_) = flight.inputs.setups.values()
+        raise ReplayError(f"{path}: no frame of {setup.feedback} feedback is answered in it: nothing to replay")
+    return flight
 
 
-def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
+def _recorded(flight: _Flight) -> Iterator[Recorded]:
+    """Yield each frame that was answered, with its command; up to the first frame that the log lacks."""
+    (setup, *_) = flight.inputs.setups.values()
+    codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
+    truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
+    true: StateFrame | None = None
+    for time_s, c1, c2, c3, c4, armed in (row for block in flight.log.blocks(COMMAND) for row in block.tolist()):
+        time_us = round(1e6 * time_s)
+        datagram = flight.inputs.frames.get(time_us)
+        while datagram is None and (true is None or true.time_us < time_us):
+            true = next(truth, None)
+            if true is None:
+                return
+        if datagram is None:
+            assert true is not None
+            if true.time_us > time_us:
+                return
+            datagram = b"".join(encode_state(codec, true))
+        yield Recorded(time_us, datagram, ActuatorCommand(time_us, (c1, c2, c3, c4), bool(armed)))
+
+
+def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:
+    """Yield the frames of state feedback."""
+    for block in log.blocks(TRUTH):
+        for time_s, u, v, w, p, q, r, x, y, z, qw, qx, qy, qz, *_ in block.tolist():
+            attitude = (qw, qx, qy, qz)
+            velocity = earth_from_body(attitude, (u, v, w))
+            yield StateFrame(round(1e6 * time_s), (x, y, z), velocity, attitude, (p, q, r))
+
+
+def _compare(flight: _Flight) -> Replayed:
     """Compare answers with what was commanded, until one differs."""
-    codec = Codec(next(what for what in inputs if isinstance(what, Setup)).system_id, dialect.AUTOPILOT_COMPONENT)
+    (setup, *_) = flight.inputs.setups.values()
+    codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
     commands = last_us = 0
-    for answer in _answers(recorded, inputs):
-        if answer.command is not None:
+    try:
+        for answer in _answers(flight):
             replayed = _carried(codec, answer.step.command)
             if replayed != answer.command:
                 difference = Difference(answer.command, replayed, answer.autopilot.stages.mode, answer.known)
                 return Replayed(commands, last_us, difference)
             commands, last_us = commands + 1, answer.time_us
+    except ReplayError:
+        raise
+    except Error as error:
+        raise ReplayError(f"{flight.path}: {error}") from error
     return Replayed(commands, last_us, None)
 
 
-def _answers(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Iterator[Answer]:
+def _answers(flight: _Flight) -> Iterator[Answer]:
     """Answer each frame as the autopilot did that was started last before it."""
-    setups = {what.first_us: what for what in inputs if isinstance(what, Setup)}
-    inbox: dict[int, list[Received]] = {}
-    for what in inputs:
-        if isinstance(what, ReceivedDatagram):
-            inbox.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
+    setups, inbox = flight.inputs.setups, flight.inputs.datagrams
     autopilot: Autopilot[Any] | None = None
     known: StateFrame | None = None
-    for time_us, datagram, command in recorded:
+    for time_us, datagram, command in _recorded(flight):
         if time_us in setups:
             autopilot = _begun(setups[time_us])
             end = _end(setups[time_us], autopilot)
@@ -235,7 +256,8 @@ def _answers(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Iterator[
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)
         yield Answer(frame.time_us, command, autopilot, step, known)
-        autopilot.serve(inbox.get(frame.time_us, ()))
+        served = inbox.get(frame.time_us, ())
+        autopilot.serve([Received(each.datagram, each.link, each.address, each.loopback) for each in served])
 
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
@@ -246,10 +268,10 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
     return arrived
 
 
-def _changed(inputs: Iterable[Input]) -> list[str]:
+def _changed(setups: Iterable[Setup]) -> list[str]:
     """Return the profiles and vehicles of a log that are others under their names by now; none that is gone."""
     changed = []
-    for setup in (what for what in inputs if isinstance(what, Setup)):
+    for setup in setups:
         with suppress(Error):
             now = load_profile(setup.profile).with_choices(setup.controller, setup.solver, setup.delay_s)
             if setup.profile_tables not in (None, now):
@@ -260,13 +282,12 @@ def _changed(inputs: Iterable[Input]) -> list[str]:
     return list(dict.fromkeys(changed))
 
 
-def _logged_us(tlog: Path) -> int:
-    """Return until when the plant has logged the flight of a telemetry log; 0 where its own log is not beside it."""
-    try:
-        *_, last, _ = (tlog.parent / "plant.csv").read_text(encoding="utf-8").split("\n")
-        return round(float(last.partition(",")[0]) * 1e6)
-    except (OSError, ValueError):
-        return 0
+def _ended_us(flight: _Flight) -> int:
+    """Return when the flight ended, by its truth or the report beside the log."""
+    ended_s = max((float(block[-1, 0]) for block in flight.log.blocks(TRUTH)), default=0.0)
+    with suppress(OSError, ValueError, KeyError):
+        ended_s = max(ended_s, json.loads((flight.path.parent / "report.json").read_text("utf-8"))["sim_time_s"])
+    return round(1e6 * ended_s)
 
 
 def _begun(setup: Setup) -> Autopilot[Any]:
@@ -309,26 +330,6 @@ def _end(setup: Setup, autopilot: Autopilot[Any]) -> AutopilotEnd:
 
 def _clock() -> float:
     return _NO_CLOCK_S
-
-
-def _inputs(path: Path, tlog: Path) -> list[Input]:
-    try:
-        return read(path.read_bytes())
-    except FileNotFoundError as error:
-        raise ReplayError(
-            f"{path} is missing: replay needs it beside {tlog.name}, as `colibri fly` leaves it"
-        ) from error
-    except OSError as error:
-        raise ReplayError(f"cannot read {path}: {error.strerror}") from error
-    except InputsError as error:
-        raise ReplayError(f"{path}: {error}") from error
-
-
-def _bytes(tlog: Path) -> bytes:
-    try:
-        return tlog.read_bytes()
-    except OSError as error:
-        raise ReplayError(f"cannot read {tlog}: {error.strerror}") from error
 
 
 def _known(frame: Frame, step: Step, before: StateFrame | None) -> StateFrame | None:

@@ -49,7 +49,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     ] = None
     duration: Annotated[float, Option("simulated time", "S", "s", above=0.0)] = 100.0
     out: Annotated[Path, Option("folder for logs and figures", "DIR", keyword=False)] = Path("out")
-    ulog: Annotated[bool, Option("write no flight.ulg", keyword=False)] = True
+    tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False
 
     @classmethod
     def of(cls, track: str, **options: Any) -> "FlightSpec":

@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import msgspec
 
@@ -94,8 +93,7 @@ def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flow
     kept = {each.contents: each for each in read_journal(file) if len(each.metrics) == len(common.metrics)}
     found = {}
     for point in points if kept else ():
-        with TemporaryDirectory(prefix="colibri-") as folder:
-            contents = provenance_of(plan_point(common, point, Path(folder) / "flight")).sha256["all"]
+        contents = provenance_of(plan_point(common, point)).sha256["all"]
         if contents in kept:
             found[point.flight] = kept[contents]._replace(flight=point.flight)
     return found

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 from math import isnan, nan
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.analysis.logs import read_series
 from colibri.analysis.lost import LOST_M
 from colibri.analysis.recording import SETTLED_AFTER_S, Recording, read_recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
@@ -15,10 +14,10 @@ from colibri.campaigns.definition import Point
 from colibri.campaigns.flights import Common, plan_point
 from colibri.common.errors import InFlightError
 from colibri.common.types import Array
-from colibri.flights.folder import prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
-from colibri.plant.process.logs import TRUTH_COLUMNS
+from colibri.mavlink.ulog.flight_topics import TRUTH
+from colibri.mavlink.ulog.log import MemoryLog
 
 _AWAY_M = 200.0
 _GROUNDED_M = 0.1
@@ -106,26 +105,23 @@ class Flown:
 
 def fly(common: Common, point: Point) -> Flown:
     """Fly a flight of a campaign and return what came of it, also when it ended early; leave no files."""
-    with TemporaryDirectory(prefix="colibri-") as folder:
-        plan = plan_point(common, point, Path(folder) / "flight")
-        prepare(plan.out)
-        failure = None
-        try:
-            fly_locally(plan)
-        except InFlightError as error:
-            failure = str(error)
-        recording = read_recording(plan)
-        limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, recording["t"]))
-        return Flown(recording, limits, failure)
+    plan = plan_point(common, point)
+    log, failure = MemoryLog(), None
+    try:
+        fly_locally(plan, topics=log)
+    except InFlightError as error:
+        failure = str(error)
+    recording = read_recording(plan, log)
+    limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, log, recording["t"]))
+    return Flown(recording, limits, failure)
 
 
-def _top_speed(plan: FlightPlan, t: Array) -> Array:
+def _top_speed(plan: FlightPlan, log: MemoryLog, t: Array) -> Array:
     """Return the largest rotor speed, which is proportional to the battery's voltage, at times `t` (n,)."""
     vehicle = plan.plant_vehicle
     if vehicle.battery is None:
         return np.full_like(t, vehicle.rotors.max_speed)
-    columns = (TRUTH_COLUMNS.index("t"), TRUTH_COLUMNS.index("voltage_v"))
-    time_s, voltage_v = np.loadtxt(plan.out / "plant.csv", delimiter=",", skiprows=1, usecols=columns, unpack=True)
+    time_s, voltage_v = read_series(log, TRUTH, "t", "voltage_v")
     voltage_v[0] = vehicle.battery.full_voltage_v  # not known before the first step
     speed: Array = vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
     return speed

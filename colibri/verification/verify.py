@@ -83,7 +83,7 @@ def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
     folder: Path = args.out / case.name
     first, second = (_flown(case, folder / again, args.link, args.duration) for again in ("first", "second"))
     third = _flown(case, folder / "memory", "memory", args.duration)
-    replayed = replay_flight(folder / "first" / "flight.tlog")
+    replayed = replay_flight(folder / "first")
     return Verdict(case.name, (first, second, third), replayed.commands, replayed.difference is None)
 
 

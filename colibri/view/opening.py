@@ -8,7 +8,7 @@ from pathlib import Path
 from colibri.common.process.lifecycle import loading
 from colibri.view.page.server import address, serve, stop
 
-_NEEDED = ("provenance.json", "plant.csv", "autopilot.csv")
+_NEEDED = ("provenance.json", "flight.ulg")
 
 
 def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:

@@ -11,15 +11,21 @@ FAILURE = "failure.txt"
 
 def keep_failure(error: Error, folder: Path | None) -> str:
     """Write why a flight has ended to `folder`, if there is one; return the line that a user needs."""
-    line, raised = str(error), ""
     if folder is None:
-        return line
+        return str(error)
     path = folder / FAILURE
-    if isinstance(error, ForeignError) and error.__cause__ is not None:
-        line, raised = f"{line}; its traceback is in {path}", "".join(format_exception(error.__cause__))
+    line, text = failure_text(error, str(path))
     with suppress(OSError):  # a full disk, say, which then is the reason itself
-        path.write_text(f"{line}\n{raised}", encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     return line
+
+
+def failure_text(error: Error, file: str) -> tuple[str, str]:
+    """Return the line that a user needs of an error, and the content of its `file`."""
+    line, raised = str(error), ""
+    if isinstance(error, ForeignError) and error.__cause__ is not None:
+        line, raised = f"{line}; its traceback is in {file}", "".join(format_exception(error.__cause__))
+    return line, f"{line}\n{raised}"
 
 
 def kept_failure(folder: Path) -> str | None:

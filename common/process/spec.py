@@ -18,8 +18,7 @@ class ProcessSpec:
     """Identity and logs of a process."""
 
     system_id: Annotated[int, Option("MAVLink system", "ID", least=1, most=255)] = 1
-    out: Annotated[Path | None, Option("write the logs of this process there", "DIR")] = None
-    ulog: Annotated[bool, Option("write no flight.ulg there")] = True
+    out: Annotated[Path | None, Option("write flight.ulg there", "DIR")] = None
     boot_unix_us: Annotated[
         int,
         Option(

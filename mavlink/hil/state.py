@@ -18,6 +18,8 @@ LOCKSTEP_FLAG = 1
 _UNIT_NORM_TOLERANCE = 1e-3
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
+STATE_BYTES = _ATTITUDE.size + _POSITION.size
+"""Size of a datagram that is nothing but a frame of state feedback."""
 _ACTUATORS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
 
 
@@ -56,7 +58,7 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
     """Read a datagram that is nothing but the two frames of `source`, with no zeros left out; None of any other."""
-    if len(datagram) != _ATTITUDE.size + _POSITION.size:
+    if len(datagram) != STATE_BYTES:
         return None
     attitude = _ATTITUDE.read(datagram, 0, source)
     position = _POSITION.read(datagram, _ATTITUDE.size, source)

@@ -1,4 +1,4 @@
-"""Rows of numbers that become messages a block at a time, and the vehicle's motion as topics."""
+"""Rows of numbers that become messages a block at a time, and the vehicle's motion in PX4's frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -9,43 +9,47 @@ from typing import TypeAlias
 import numpy as np
 
 from colibri.common.types import Array, Vector
-from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.topics import Records
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
-BLOCK_ROWS = 64
-"""As the other logs have it: half a second at 125 Hz."""
+BLOCK_ROWS = 16
+"""Of PX4's topics: 0.64 s."""
+EVERY_US = 40_000
+"""Interval of PX4's topics, which serve viewers: as PX4 logs them, or more often."""
+
+
+class Thinning:
+    """Picks the first of the samples of each `EVERY_US` of simulated time: the same in every log of a flight."""
+
+    def __init__(self) -> None:
+        self._before_us: int | None = None
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether the sample of a time, which comes next, is picked."""
+        before_us, self._before_us = self._before_us, time_us
+        return time_us % EVERY_US == 0 if before_us is None else time_us // EVERY_US != before_us // EVERY_US
+
 
 Turn: TypeAlias = Callable[[Vector], Vector]
 """To other axes: components permuted, and some of them negated."""
 
 
 class Blocks(ABC):
-    """Rows that wait until they are a block, packed: fewer bytes and objects than numbers of Python's."""
+    """Encodes rows of some topics, a block at a time.
+
+    Attributes:
+        block_rows: Rows of a block.
+        pack: Packs a row as doubles: fewer bytes and objects than numbers of Python.
+    """
+
+    block_rows = BLOCK_ROWS
 
     def __init__(self, columns: int) -> None:
-        """Expect rows of so many numbers."""
-        self._pack = Struct(f"<{columns}d").pack
-        self._columns = columns
-        self._waiting: list[bytes] = []
-
-    def add(self, row: Sequence[float]) -> bytes:
-        """Take a row; return the messages of a block once it is one, else nothing."""
-        self._waiting.append(self._pack(*row))
-        return self.take() if len(self._waiting) >= BLOCK_ROWS else b""
-
-    def take(self) -> bytes:
-        """Return the messages of the rows that wait, behind a mark for readers that have lost their place."""
-        rows, self._waiting = self._waiting, []
-        if not rows:
-            return b""
-        table = np.frombuffer(b"".join(rows)).reshape(len(rows), self._columns)
-        with np.errstate(all="ignore"):  # a vehicle that is lost may have numbers that no float has
-            return messages.SYNC + self.encode(table)
+        self.pack = Struct(f"<{columns}d")
 
     @abstractmethod
     def encode(self, table: Array) -> bytes:
-        """Return the messages of at most `BLOCK_ROWS` rows, (rows, columns)."""
+        """Return the messages of at most `block_rows` rows, (rows, columns)."""
 
 
 class Turned:

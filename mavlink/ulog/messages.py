@@ -7,7 +7,7 @@ formats, information, parameters), and from the first subscription on the data. 
 from collections.abc import Mapping
 from struct import Struct
 
-_MAGIC = b"ULog\x01\x12\x35"
+MAGIC = b"ULog\x01\x12\x35"
 _VERSION = 1
 _HEAD = Struct("<HB")
 _SUBSCRIPTION = Struct("<BH")
@@ -15,7 +15,9 @@ _LOGGED = Struct("<BQ")
 _TYPES = {int: ("int32_t", Struct("<i")), float: ("float", Struct("<f"))}
 _MAX_TEXT_BYTES = 1000
 
-DATA = ord("D")
+DATA, FORMAT = ord("D"), ord("F")
+HEADER_BYTES = len(MAGIC) + 1 + 8
+"""Of the file, before its first message."""
 HEAD_BYTES = _HEAD.size
 
 
@@ -30,7 +32,7 @@ SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))
 
 def header(start_us: int = 0) -> bytes:
     """Return the beginning of a file whose log starts at a time, µs, with no flag set."""
-    return _MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
+    return MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
 
 
 def format_of(name: str, fields: str) -> bytes:

@@ -8,6 +8,8 @@ from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, Snapshot
 from colibri.mavlink.ulog import messages, topics
 from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.blocks import Thinning
+from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
 from colibri.mavlink.ulog.status import Status, status_message
@@ -19,71 +21,70 @@ _NO_REFERENCE = (nan,) * 3
 
 
 class Recorder:
-    """Turns snapshots into messages of a ULog: what each call returns is to be appended to the file."""
+    """Writes snapshots to a log."""
 
     def __init__(
-        self, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool, sample_every_us: int = 0
+        self, log: TopicLog, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool
     ) -> None:
-        """Record `vehicle`.
+        """Record `vehicle`; its battery not where the plant writes of it to the same file.
 
-        Args:
-            vehicle: Its name.
-            system_id: Its system id.
-            parameters: Its parameters.
-            with_battery: Whether its battery is recorded; not where the plant writes of it to the same file.
-            sample_every_us: Of the snapshots that come sooner after one only changes are recorded.
+        Snapshots are thinned, but for changes of the status.
         """
-        self._vehicle, self._system_id, self._parameters = vehicle, system_id, parameters
-        self._with_battery, self._sample_every_us = with_battery, sample_every_us
+        self._log, self._vehicle, self._system_id, self._parameters = log, vehicle, system_id, parameters
+        self._with_battery = with_battery
         self._samples, self._sensings = SampleBlocks(), SensingBlocks()
         self._revision, self._values = parameters.revision, dict(parameters.values)
         self._status: Status | None = None
         self._status_us = 0
-        self._sampled_us: int | None = None
+        self._thinning = Thinning()
 
     def begin(self) -> bytes:
         """Return the beginning of a file."""
-        self._status = self._sampled_us = None
+        self._status, self._thinning = None, Thinning()
         self._revision, self._values = self._parameters.revision, dict(self._parameters.values)
         return beginning(self._vehicle, self._values)
 
-    def update(self, snapshot: Snapshot) -> bytes:
-        """Record a snapshot."""
-        recorded = self._changed_parameters() + self._changed_status(snapshot)
-        now_us = snapshot.time_us
-        if self._sampled_us is not None and 0 <= now_us - self._sampled_us < self._sample_every_us:
-            return recorded
-        self._sampled_us = now_us
-        recorded += self._samples.add(sample_row(snapshot))
+    def update(self, snapshot: Snapshot) -> None:
+        """Record a snapshot.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        self._record_parameters()
+        self._record_status(snapshot)
+        if not self._thinning.is_due(snapshot.time_us):
+            return
+        self._log.add(self._samples, sample_row(snapshot))
         row = sensing_row(snapshot)
-        return recorded if row is None else recorded + self._sensings.add(row)
+        if row is not None:
+            self._log.add(self._sensings, row)
 
-    def say(self, time_us: int, severity: int, text: str) -> bytes:
-        """Record a line that the vehicle says."""
-        return messages.SYNC + messages.logged_string(time_us, severity, text)
+    def say(self, time_us: int, severity: int, text: str) -> None:
+        """Record a status text.
 
-    def take(self) -> bytes:
-        """Return what waits."""
-        return self._samples.take() + self._sensings.take()
+        Raises:
+            LogError: It cannot be written.
+        """
+        self._log.append(messages.SYNC + messages.logged_string(time_us, severity, text))
 
-    def _changed_parameters(self) -> bytes:
+    def _record_parameters(self) -> None:
         if self._parameters.revision == self._revision:
-            return b""
+            return
         known, values = self._values, self._parameters.values
         self._revision, self._values = self._parameters.revision, dict(values)
         changed: Mapping[str, Value] = {name: value for name, value in values.items() if known.get(name) != value}
-        return messages.SYNC + messages.parameters(changed)
+        self._log.append(messages.SYNC + messages.parameters(changed))
 
-    def _changed_status(self, snapshot: Snapshot) -> bytes:
-        """Return the status where it has changed, and every second; with it the battery, and what waits."""
+    def _record_status(self, snapshot: Snapshot) -> None:
+        """Record the status where it has changed, and every second; with it the battery, and what waits."""
         now_us, status = snapshot.time_us, status_of(snapshot)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
-            return b""
+            return
         self._status, self._status_us = status, now_us
-        recorded = self.take() + status_message(now_us, status, self._system_id)
+        self._log.flush()
+        self._log.append(status_message(now_us, status, self._system_id))
         if snapshot.battery is not None and self._with_battery:
-            recorded += battery_message(now_us, snapshot.battery)
-        return recorded
+            self._log.append(battery_message(now_us, snapshot.battery))
 
 
 def sample_row(s: Snapshot) -> tuple[float, ...]:

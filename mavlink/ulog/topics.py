@@ -73,7 +73,17 @@ PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}
 """Types that are fields of topics."""
 NUMBERS = {name: number for number, name in enumerate(TOPICS)}
 """Of a topic in the file: the same for all that write to one."""
-_CODES = {"uint64_t": "Q", "uint16_t": "H", "uint8_t": "B", "int32_t": "i", "int8_t": "b", "float": "f", "bool": "?"}
+_CODES = {
+    "uint64_t": "Q",
+    "uint32_t": "I",
+    "uint16_t": "H",
+    "uint8_t": "B",
+    "int32_t": "i",
+    "int8_t": "b",
+    "double": "d",
+    "float": "f",
+    "bool": "?",
+}
 """Of the types, as `struct` and NumPy have them."""
 
 
@@ -108,6 +118,16 @@ def _layout(text: str) -> list[tuple[str, Any, tuple[int]]]:
     ]
 
 
+def message_layout(fields: str) -> "np.dtype[np.void]":
+    """Return the layout of data messages whose topic has these fields."""
+    return np.dtype([("size", "<u2"), ("kind", "u1"), ("number", "<u2"), *_layout(fields)])
+
+
+def head(layout: "np.dtype[np.void]", number: int) -> tuple[int, int, int]:
+    """Return size, kind and topic number of data messages of a layout."""
+    return layout.itemsize - messages.HEAD_BYTES, messages.DATA, number
+
+
 class Records:
     """Data messages of some topics, one of each a row, whose fields are assigned for many rows at once.
 
@@ -116,12 +136,10 @@ class Records:
 
     def __init__(self, rows: int, *topics: str) -> None:
         """Have room for so many rows; all fields are 0."""
-        head = [("size", "<u2"), ("kind", "u1"), ("number", "<u2")]
-        self._rows = np.zeros(rows, [(topic, [*head, *_layout(TOPICS[topic])]) for topic in topics])
+        self._rows = np.zeros(rows, [(topic, message_layout(TOPICS[topic])) for topic in topics])
         for topic in topics:
             of_topic = self._rows[topic]
-            of_topic["size"] = of_topic.dtype.itemsize - messages.HEAD_BYTES
-            of_topic["kind"], of_topic["number"] = messages.DATA, NUMBERS[topic]
+            of_topic["size"], of_topic["kind"], of_topic["number"] = head(of_topic.dtype, NUMBERS[topic])
         self._assigned = {
             (topic, name): self._rows[topic][name] for topic in topics for name, *_ in _fields(TOPICS[topic])
         }

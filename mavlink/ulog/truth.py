@@ -1,6 +1,5 @@
-"""The truth as topics: what `plant.csv` has, at most 125 times a second."""
+"""The truth in PX4's topics, for viewers."""
 
-from collections.abc import Sequence
 from math import isnan, nan, pi
 from typing import NamedTuple
 
@@ -9,23 +8,15 @@ import numpy as np
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, put_valid
+from colibri.mavlink.ulog.flight_topics import TRUTH
 from colibri.mavlink.ulog.topics import Records, record
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
-COLUMNS = (
-    *("t", "u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz"),
-    *("omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", "wind_east", "wind_north", "wind_up"),
-)
-"""Of `plant.csv`: time (s), velocity and rates (m/s, rad/s, FLU body), position (m, ENU), attitude (wxyz, FLU to ENU),
-rotor speeds (vehicle's unit), voltage (V), charge used (Ah), wind (m/s)."""
-INTERVAL_S = 0.008
-
-_SAME_S = 1e-7
 _ROTORS, _ALL_OF_THEM = 4, 0b1111
 _UNKNOWN, _NO_WARNING = -1.0, 0
 _S_PER_H = 3600.0
 
-_turned = Turned(COLUMNS, RATES=(frd_from_flu, "p q r"), POSITION=(ned_from_enu, "x y z"))
+_turned = Turned(TRUTH.names, RATES=(frd_from_flu, "p q r"), POSITION=(ned_from_enu, "x y z"))
 _RATES, _POSITION = _turned.places.values()
 
 
@@ -42,26 +33,19 @@ class TruthVehicle(NamedTuple):
 
 
 class TruthBlocks(Blocks):
-    """Encodes rows of `COLUMNS`."""
+    """Encodes rows of `TRUTH`."""
 
     def __init__(self, vehicle: TruthVehicle) -> None:
         """Encode for a vehicle."""
-        super().__init__(len(COLUMNS))
+        super().__init__(len(TRUTH.names))
         self._capacity_ah = vehicle.capacity_ah
         self._rpm_per_unit = vehicle.rad_s_per_speed_unit * 30.0 / pi
-        self._last_s = self._charge_s = self._charge_ah = nan
+        self._charge_s = self._charge_ah = nan
         self._records = Records(
             BLOCK_ROWS, topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS
         )
         put_valid(self._records, topics.POSITION_TRUTH)
         self._records[topics.ESCS, "esc_count"][:] = (_ROTORS, _ALL_OF_THEM, _ALL_OF_THEM)
-
-    def add(self, row: Sequence[float]) -> bytes:
-        """Take a row as `Blocks` does, unless it comes too soon behind the last one."""
-        if 0.0 <= row[0] - self._last_s < INTERVAL_S - _SAME_S:
-            return b""
-        self._last_s = row[0]
-        return super().add(row)
 
     def encode(self, table: Array) -> bytes:
         """Return the messages of rows."""

@@ -35,7 +35,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     text = f"{text}; {all_parameters_by(str(spec.vehicle), 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
     end = ArduPilotEnd(Physics(vehicle, spec.integrator, weather), start, motors, vehicle.rotors)
-    logs = PlantLogs(spec.out, vehicle, speaks_mavlink=False, ulog=spec.ulog) if spec.out else None
+    logs = PlantLogs(spec.out, vehicle) if spec.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=spec.duration)
     return EXIT_INTERRUPTED if stop else 0

@@ -1,65 +1,88 @@
-"""The plant's own logs of a flight."""
+"""What the plant records of a flight: the truth at every frame, and on request every MAVLink frame."""
 
+from functools import partial
 from pathlib import Path
 
-from colibri.common.process.log_files import CsvLog, set_aside
+from colibri.common.process.log_files import set_aside
+from colibri.common.process.shared_log import SharedLog, remove_unused
 from colibri.mavlink.hil.lockstep_plant import Outgoing
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.blocks import Thinning
+from colibri.mavlink.ulog.flight_topics import TRUTH
+from colibri.mavlink.ulog.log import FileLog, TopicLog
+from colibri.mavlink.ulog.reader import FILE
+from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
 from colibri.mavlink.wire.tlog import TlogWriter
-from colibri.plant.physics.equations import STATE
 from colibri.plant.physics.world import World
-from colibri.plant.process.truth_topics import NAME, TruthTopics
 from colibri.plant.vehicle.description import Vehicle
 
-TRUTH, TRAFFIC = "plant.csv", "flight.tlog"
-WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
-TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
+TRAFFIC = "flight.tlog"
 
 
 def truth_row(world: World) -> tuple[float, ...]:
-    """Return what `TRUTH_COLUMNS` names; `nan` volts where there is no battery."""
+    """Return the row of `TRUTH`; `nan` volts without a battery."""
     battery = (world.voltage_v, world.charge_used_ah)
     return (world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s)
 
 
-class PlantLogs:
-    """What the plant writes: the truth at every frame, also as topics, and every MAVLink frame."""
+class TruthLog:
+    """Writes the truth to a log, also as PX4's topics where these are recorded."""
 
-    def __init__(
-        self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, speaks_mavlink: bool = True, ulog: bool = True
-    ) -> None:
-        """Create `plant.csv` in `folder`, and `flight.tlog` where the plant `speaks_mavlink`.
+    def __init__(self, log: TopicLog, vehicle: Vehicle) -> None:
+        capacity_ah = 0.0 if vehicle.battery is None else vehicle.battery.capacity_ah
+        self._log = log
+        self._blocks, self._thinning = None, Thinning()
+        if log.for_viewers:
+            self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah))
 
-        With `ulog` there is `flight.ulg`, too. `boot_unix_us` is the Unix time at simulated time 0; without it times
-        of `flight.tlog` are simulated.
+    def write_world(self, world: World) -> None:
+        """Append the truth.
+
+        Raises:
+            LogError: It cannot be written.
         """
-        self._vehicle, self._has_topics = vehicle, ulog
-        self._boot_unix_us = boot_unix_us
-        self._speaks_mavlink = speaks_mavlink
-        self._folder = folder
+        row = truth_row(world)
+        self._log.add(TRUTH, row)
+        if self._blocks and self._thinning.is_due(world.time_us):
+            self._log.add(self._blocks, row)
+
+
+class PlantLogs:
+    """The plant's files: `flight.ulg`, beside the autopilot, which begins it, and on request `flight.tlog`."""
+
+    def __init__(self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, tlog: bool = False) -> None:
+        """Write into `folder`.
+
+        Args:
+            folder: Of the flight; the log of an earlier flight in it is removed.
+            vehicle: That is flown.
+            boot_unix_us: Unix time at simulated time 0; without it times of `flight.tlog` are simulated.
+            tlog: Whether every MAVLink frame is written to `flight.tlog`.
+        """
+        self._folder, self._vehicle, self._boot_unix_us, self._has_tlog = folder, vehicle, boot_unix_us, tlog
         self._open()
 
     def _open(self) -> None:
-        self._truth = CsvLog(self._folder / TRUTH, TRUTH_COLUMNS)
-        self._tlog = TlogWriter(self._folder / TRAFFIC) if self._speaks_mavlink else None
-        self._topics = TruthTopics(self._folder, self._vehicle) if self._has_topics else None
+        path = self._folder / FILE
+        remove_unused(path)
+        self._log = FileLog(partial(SharedLog, path, beginning(self._vehicle.name, {}), goes_on=True))
+        self._truth = TruthLog(self._log, self._vehicle)
+        self._tlog = TlogWriter(self._folder / TRAFFIC) if self._has_tlog else None
 
     def begin_again(self) -> None:
-        """Begin the files of another flight; those of the last one become `plant-1.csv`, `flight-1.tlog`, and so on.
+        """Begin the files of another flight; those of the last one become `flight-1.ulg`, `flight-1.tlog`, and so on.
 
         Raises:
             LogError: The last one's cannot be written or renamed.
         """
         self.flush()
         self.close()
-        set_aside(*(self._folder / name for name in (TRUTH, TRAFFIC, NAME)))
+        set_aside(*(self._folder / name for name in (FILE, TRAFFIC)))
         self._open()
 
     def write_world(self, world: World) -> None:
         """Append the truth."""
-        row = truth_row(world)
-        self._truth.add(row)
-        if self._topics:
-            self._topics.add(row)
+        self._truth.write_world(world)
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
@@ -78,16 +101,12 @@ class PlantLogs:
         Raises:
             LogError: It cannot be written.
         """
-        self._truth.flush()
+        self._log.flush()
         if self._tlog:
             self._tlog.flush()
-        if self._topics:
-            self._topics.flush()
 
     def close(self) -> None:
-        """Close all."""
-        if self._topics:
-            self._topics.close()
-        self._truth.close()
+        """Write what waits, if that can be done, and close all."""
+        self._log.close()
         if self._tlog:
             self._tlog.close()

@@ -35,7 +35,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
         fail(str(error))
     if spec.truth:  # several flights share the cores: whoever waits gives way at once
         link.spin_s = 0.0
-    logs = PlantLogs(spec.out, builder.vehicle, spec.boot_unix_us, ulog=spec.ulog) if spec.out else None
+    logs = PlantLogs(spec.out, builder.vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
     interval_us = round(1e3 / spec.rate) * 1000
     end = PlantEnd(
         system_id=spec.system_id, frame_interval_us=interval_us, serves=tuple(builder.starts), waits=not spec.realtime

@@ -143,16 +143,16 @@ def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: py
     (row,) = csv.DictReader((out / "compare.csv").read_text(encoding="utf-8").splitlines())
     assert tuple(row) == COLUMNS
     assert (row["controller"], row["RMS (m)"], row["why"]) == ("t2", "-", "")
-    flown = (folder / "plant.csv").stat().st_mtime_ns
+    flown = (folder / "flight.csv").stat().st_mtime_ns
     capsys.readouterr()
     assert main([*command, "--resume"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("--resume: 1 of 1 flights were flown already, by the same contents\n")
     assert max(map(len, said.splitlines()[2:])) <= 80, "as wide as a terminal"
-    assert (folder / "plant.csv").stat().st_mtime_ns == flown
+    assert (folder / "flight.csv").stat().st_mtime_ns == flown
     written(tmp_path / "p", "t2.toml", "poles = [-5.0, -6.0]", "poles = [-1.0, -1.1]")
     assert main([*command, "--resume"]) == 0
-    assert (folder / "plant.csv").stat().st_mtime_ns > flown
+    assert (folder / "flight.csv").stat().st_mtime_ns > flown
     assert json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["profile"]["name"] == "t2"
 
 

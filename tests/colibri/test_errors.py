@@ -127,7 +127,7 @@ def exit_code(*command: str) -> int | str | None:
 @pytest.mark.parametrize(
     ("command", "line"),
     [
-        (["replay", "nowhere.tlog"], "cannot read nowhere.tlog: No such file or directory"),
+        (["replay", "nowhere.ulg"], "cannot read nowhere.ulg: No such file or directory"),
         (["compare", "--profile", "fast"], 'unknown profile "fast" (choose'),
         (["compare", "--seeds", "1-2", "--track", "loop"], 'unknown track "loop" (choose'),
         (["sitl", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly" (choose'),

@@ -5,15 +5,21 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 from pyulog import ULog
 
-from colibri.autopilot.process.recorded_inputs import Setup, read
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
 from colibri.cli.main import main
 from colibri.flights.replay import replay_flight
-from colibri.mavlink.hil.state import ActuatorCommand, decode_actuators, encode_actuators
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, mav
-from colibri.mavlink.wire.tlog import STAMP, decode
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.flight_topics import COMMAND
+from colibri.mavlink.ulog.inputs import Kind, encode_input
+from colibri.mavlink.ulog.reader import FlightFile
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.tlog import decode
 from tools.harness.observer import Observer
 from tools.harness.processes import Process, fly, running
 
@@ -35,7 +41,7 @@ def copy(flight: Path, tmp_path: Path) -> Path:
 
 
 def test_a_flight_is_replayed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for named in (flight / "flight.tlog", flight):
+    for named in (flight / "flight.ulg", flight):
         assert main(["replay", str(named)]) == 0
         assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
 
@@ -54,7 +60,7 @@ def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
     Path("my-flight.toml").write_text("", encoding="utf-8")
     Path("my-hummingbird.toml").unlink()
     identical = "250 commands up to t = 0.996 s, all identical\n"
-    flight = str(tmp_path / "out" / "flight.tlog")
+    flight = str(tmp_path / "out" / "flight.ulg")
     monkeypatch.chdir("/")
     assert main(["replay", flight]) == 0
     assert capsys.readouterr().out == identical
@@ -65,10 +71,10 @@ def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
 
 
 def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tlog = copy / "flight.tlog"
-    tlog.write_bytes(tlog.read_bytes()[:5000])
+    log = copy / "flight.ulg"
+    log.write_bytes(log.read_bytes()[:80_000])
     with pytest.raises(SystemExit) as end:
-        main(["replay", str(tlog)])
+        main(["replay", str(log)])
     assert end.value.code == 1
     said = capsys.readouterr()
     assert said.out.endswith(" s, all identical\n")
@@ -77,79 +83,85 @@ def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, capsys: pytest.C
 
 def test_a_flight_on_sensors_is_replayed(tmp_path: Path) -> None:
     fly(tmp_path, "line", "--feedback", "sensors", "--seed", "2", "--link", "memory", "--duration", "4")
-    assert replay_flight(tmp_path / "flight.tlog") == (1000, 3_996_000, None)
+    assert replay_flight(tmp_path) == (1000, 3_996_000, None)
 
 
-def change(tlog: Path, changed: Callable[[ActuatorCommand], ActuatorCommand]) -> None:
-    """Change the command of one instant."""
-    codec = Codec(1, AUTOPILOT_COMPONENT)
-    log = b""
-    for time_us, frame in decode(tlog.read_bytes()):
-        (message,) = codec.decode(frame)
-        if time_us == CHANGED_US and message.name == "HIL_ACTUATOR_CONTROLS":
-            command = decode_actuators(message)
-            assert command is not None
-            frame = encode_actuators(codec, changed(command))
-        log += STAMP.pack(time_us) + frame
-    tlog.write_bytes(log)
+def change(log: Path, time_us: int, more: float) -> None:
+    """Change the first rotor's command of one instant."""
+    content = bytearray(log.read_bytes())
+    rows = np.concatenate(list(FlightFile(log).blocks(COMMAND)))
+    (row,) = rows[np.rint(1e6 * rows[:, 0]) == time_us]
+    recorded = COMMAND.encode(row[None])
+    row[1] += more
+    at = content.index(recorded)
+    content[at : at + len(recorded)] = COMMAND.encode(row[None])
+    log.write_bytes(content)
 
 
 def test_the_first_command_that_differs_is_named(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the least that the wire can carry."""
-
-    def a_little(command: ActuatorCommand) -> ActuatorCommand:
-        first, *others = command.controls
-        return ActuatorCommand(command.time_us, (first + 2e-7, *others), command.armed)  # type: ignore[arg-type]
-
-    change(copy / "flight.tlog", a_little)
+    change(copy / "flight.ulg", CHANGED_US, 2e-7)
     with pytest.raises(SystemExit) as end:
-        main(["replay", str(copy / "flight.tlog")])
+        main(["replay", str(copy)])
     assert end.value.code == 1
     said = capsys.readouterr()
     assert said.out.startswith("first difference at t = 1.000 s, in mode track\n")
     assert "m/s, roll" in said.out
-    assert said.err.endswith("flight.tlog: the autopilot does not answer as it did, after 250 commands\n")
+    assert said.err.endswith("flight.ulg: the autopilot does not answer as it did, after 250 commands\n")
 
 
 def test_another_autopilot_is_found_out(copy: Path) -> None:
-    inputs = copy / "inputs.jsonl"
-    inputs.write_text(inputs.read_text().replace('"whole-lpv-mpc"', '"geometric-se3"').replace('"flight"', '"se3"'))
-    difference = replay_flight(copy / "flight.tlog").difference
+    log = FlightFile(copy / "flight.ulg")
+    (setup,) = read_inputs(log.inputs()).setups.values()
+    other = msgspec.structs.replace(setup, controller="geometric-se3", profile_tables=load_profile("se3"))
+    content = b"".join(log.encoded()) + encode_input(0, Kind.SETUP, encoded(other))  # the last one holds
+    (copy / "flight.ulg").write_bytes(content)
+    difference = replay_flight(copy).difference
     assert difference is not None
     assert difference.recorded.time_us == 0
 
 
-def test_of_a_flight_that_was_cut_off_what_there_is_is_replayed(copy: Path) -> None:
-    tlog = copy / "flight.tlog"
-    tlog.write_bytes(tlog.read_bytes()[:-300])
-    commands, _, difference = replay_flight(tlog)
+def test_a_frame_that_the_log_lacks_ends_the_replay(copy: Path) -> None:
+    """Both processes append blocks: of one that is killed the last ones are missing."""
+    log = copy / "flight.ulg"
+    log.write_bytes(log.read_bytes()[:-40_000])
+    commands, _, difference = replay_flight(log)
     assert difference is None
-    assert 490 < commands < 500
+    assert 300 < commands < 500
+
+
+def forget_log(folder: Path) -> None:
+    (folder / "flight.ulg").unlink()
 
 
 def forget_inputs(folder: Path) -> None:
-    (folder / "inputs.jsonl").unlink()
+    (folder / "flight.ulg").write_bytes(beginning("Test", {}))
 
 
 def garble_inputs(folder: Path) -> None:
-    (folder / "inputs.jsonl").write_text('{"what": "began"}\n')
+    (folder / "flight.ulg").write_bytes(beginning("Test", {}) + encode_input(0, Kind.SETUP, b'{"what": "began"}'))
 
 
 def garble_log(folder: Path) -> None:
-    (folder / "flight.tlog").write_bytes(b"x" * 100)
+    (folder / "flight.ulg").write_bytes(b"x" * 100)
 
 
-def empty_log(folder: Path) -> None:
-    (folder / "flight.tlog").write_bytes(b"")
+def forget_truth(folder: Path) -> None:
+    log = FlightFile(folder / "flight.ulg")
+    (setup,) = read_inputs(log.inputs()).setups.values()
+    content = beginning("Test", {}) + encode_input(0, Kind.SETUP, encoded(setup))
+    content += b"".join(map(COMMAND.encode, log.blocks(COMMAND)))
+    (folder / "flight.ulg").write_bytes(content)
 
 
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (forget_inputs, "inputs.jsonl is missing"),
-        (garble_inputs, "inputs.jsonl: line 1: "),
-        (garble_log, "flight.tlog: no MAVLink frame at byte 8"),
-        (empty_log, "flight.tlog: no frame of state feedback is answered in it"),
+        (forget_log, "flight.ulg: No such file"),
+        (forget_inputs, "flight.ulg: no autopilot has begun in it"),
+        (garble_inputs, "flight.ulg: input at t = 0.000 s: "),
+        (garble_log, "flight.ulg: not a ULog"),
+        (forget_truth, "flight.ulg: no frame of state feedback is answered in it"),
     ],
 )
 def test_what_cannot_be_replayed_is_one_line(
@@ -157,7 +169,7 @@ def test_what_cannot_be_replayed_is_one_line(
 ) -> None:
     spoil(copy)
     with pytest.raises(SystemExit) as end:
-        main(["replay", str(copy / "flight.tlog")])
+        main(["replay", str(copy)])
     assert end.value.code == 2
     error = capsys.readouterr().err
     assert said in error
@@ -169,8 +181,8 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
     dated = f"--boot-unix-us={BOOT_UNIX_US}"
     out, logs = tmp_path / "out", tmp_path / "logs"
     logs.mkdir()
-    start = (dated, "--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4", "--out", str(out))
-    plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", *start)
+    start = (dated, "--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4")
+    plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", *start, "--tlog", "--out", str(out))
     with Observer() as seen, running(plant):
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
         options = (dated, "--plant", url, f"--gcs={seen.url}", "--out", str(out), "--state", str(tmp_path / "state"))
@@ -188,9 +200,9 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
             date = seen.request("SYSTEM_TIME", "COMMAND_LONG", mav.MAV_CMD_REQUEST_MESSAGE, 0, 2, *[0.0] * 6)
             plant.process.send_signal(signal.SIGINT)
             plant.wait()
-    setups = [what for what in read((out / "inputs.jsonl").read_bytes()) if isinstance(what, Setup)]
+    setups = list(read_inputs(FlightFile(out / "flight.ulg").inputs()).setups.values())
     assert [bool(setup.history) for setup in setups] == [False, True]
-    commands, last_us, difference = replay_flight(out / "flight.tlog")
+    commands, last_us, difference = replay_flight(out)
     assert difference is None
     assert commands > 500
     assert last_us > setups[1].first_us + 2_000_000

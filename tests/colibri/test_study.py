@@ -31,16 +31,16 @@ def short() -> Flown:
     return fly(common_of(planned), next(planned.points()))
 
 
-def plans(flights: Sequence[Settings], folder: Path) -> list[FlightPlan]:
+def plans(flights: Sequence[Settings]) -> list[FlightPlan]:
     """Return flights of studies as they are planned."""
     planned = campaign(flights)
     common = common_of(planned)
-    return [plan_point(common, point, folder) for point in planned.points()]
+    return [plan_point(common, point) for point in planned.points()]
 
 
 def plan_of(**settings: Any) -> FlightPlan:
     """Return a flight of a study as it is planned."""
-    (plan,) = plans([settings], Path())
+    (plan,) = plans([settings])
     return plan
 
 
@@ -63,12 +63,12 @@ def test_the_studies() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: Path) -> None:
+def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str) -> None:
     cases = of_name(name).cases
     assert len({(case.row, case.group) for case in cases}) == len(cases)
     assert len({case.row for case in cases}) * len({case.group for case in cases}) == len(cases)
     flights = [case.flight for case in cases]
-    for flight, plan in zip(flights, plans(flights, tmp_path), strict=True):
+    for flight, plan in zip(flights, plans(flights), strict=True):
         assert plan.spec.duration == flight.get("duration", 100.0)
         assert plan.spec.track == flight["track"]
 

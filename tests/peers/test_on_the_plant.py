@@ -13,7 +13,7 @@ import pytest
 
 from tests.peers.on_the_plant import HOVER_S, TAKE_OFF_M
 from tests.peers.programs import ALONE, PROGRAMS, program_of
-from tools.harness.processes import rows
+from tools.harness.processes import topic_rows
 
 pytestmark = pytest.mark.peers
 
@@ -25,8 +25,8 @@ MINUTES = 6.0
 def test_it_takes_off_and_hovers_and_so_does_the_next(whom: str, tmp_path: Path) -> None:
     command = [*ALONE, sys.executable, "-m", "tests.peers.on_the_plant", whom, str(program_of(whom)), str(tmp_path)]
     run(command, check=True, timeout=60.0 * MINUTES)
-    for name in ("plant-1.csv", "plant.csv"):
-        flown = rows(tmp_path / "plant" / name)
+    for name in ("flight-1.ulg", "flight.ulg"):
+        flown = topic_rows(tmp_path / "plant" / name)
         assert flown["t"][0] < 0.01
         assert np.diff(flown["t"]).min() > 0.0
         hovering = flown["t"] > flown["t"][-1] - 0.5 * HOVER_S

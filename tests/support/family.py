@@ -65,7 +65,7 @@ def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     exchange, states, fallback = Direct(autopilot), [], []
     with gc_frozen():
         while plant.world.time_us < duration_s * 1e6:
-            step, command = exchange(plant)
+            step, command, _ = exchange(plant)
             plant.answer(command)
             states.append((plant.world.time_us * 1e-6, *plant.world.state))
             fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)

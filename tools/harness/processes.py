@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from colibri.analysis.logs import read_series
 from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
 from colibri.common.process.lifecycle import nudge_m
 from colibri.common.types import Array
+from colibri.mavlink.ulog.flight_topics import TRUTH, Topic
+from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 GIVE_UP_AFTER_S = 60.0
@@ -51,6 +54,12 @@ def rows(path: Path) -> dict[str, Array]:
     header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
     return dict(zip(header, table.T, strict=True))
+
+
+def topic_rows(log: Path, topic: Topic = TRUTH) -> dict[str, Array]:
+    """Read a topic of a log, or of the log in a flight's folder, as columns; the truth by default."""
+    flown = FlightFile(log / FILE if log.is_dir() else log)
+    return dict(zip(topic.names, read_series(flown, topic, *topic.names), strict=True))
 
 
 def reference(track: str) -> dict[str, Array]:
@@ -137,4 +146,4 @@ def start_autopilot(folder: Path, url: str, *options: str) -> Process:
 
 def states(out: Path) -> Array:
     """Return the plant's states at every frame."""
-    return np.genfromtxt(out / "plant.csv", delimiter=",", skip_header=1)[:, :14]
+    return np.stack(list(topic_rows(out).values())[:14], axis=1)

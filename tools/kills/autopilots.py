@@ -10,7 +10,7 @@ import numpy as np
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.flight_record import tilt_deg
-from tools.harness.processes import Process, rows
+from tools.harness.processes import Process, topic_rows
 from tools.kills.between import COMPILES_S, Between, Phase
 from tools.kills.station import HOVERS, LEGS, Station, mission
 
@@ -87,7 +87,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int =
             process.kill()
         station.close()
     words = "".join(process.errors() for process in processes)
-    truth = rows(folder / "plant.csv")
+    truth = topic_rows(folder)
     return Flight(judged(truth, killer.kills), station.flown, float(truth["t"][-1]), words)
 
 

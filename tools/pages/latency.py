@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from math import pi
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.ulog.log import MemoryLog
 
 LAWS = ("whole-lpv-mpc", "lpv-mpc", "geometric-se3")
 ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
@@ -45,7 +45,7 @@ How much *d* is, the plant says beside its frames, of the last command that has 
 `cmd_delay`, µs by its own clock). Compensated is the median of the last 25, taken over where it differs by 1 ms or
 more; it is told nothing by a plant without delay, nor by a simulator that speaks PX4's interface. A delay can be told
 instead: `--delay MS` of `colibri fly` and `autopilot`, `delay_s` in a profile, parameter `SYS_CMD_DELAY` in flight; 0
-compensates none. What is compensated is column `delay_us` of `autopilot.csv`, and in telemetry NAMED_VALUE_FLOAT
+compensates none. What is compensated is `delay_us` of topic `colibri_decision`, and in telemetry NAMED_VALUE_FLOAT
 `delay_us`.
 
 By how much the delay differs from the one compensated, a law must bear by itself: `whole-lpv-mpc` bears 12 ms,
@@ -156,23 +156,21 @@ def merit(recording: Recording, case: Case) -> Merit | None:
 def fly(flight: Flight) -> Merit | None:
     """Fly in simulated time; return how it went."""
     law, case, round_trip_ms, told = flight
-    with TemporaryDirectory() as folder:
-        spec = FlightSpec.of(
-            case.track,
-            controller=law,
-            link="direct",
-            latency=0.5 * round_trip_ms,
-            delay=told,
-            start=case.start,
-            duration=case.duration_s,
-            out=Path(folder),
-        )
-        plan = FlightPlan.of(spec)
-        try:
-            fly_locally(plan)
-            return merit(read_recording(plan), case)
-        except InFlightError:
-            return None
+    spec = FlightSpec.of(
+        case.track,
+        controller=law,
+        link="direct",
+        latency=0.5 * round_trip_ms,
+        delay=told,
+        start=case.start,
+        duration=case.duration_s,
+    )
+    plan, log = FlightPlan.of(spec), MemoryLog()
+    try:
+        fly_locally(plan, topics=log)
+        return merit(read_recording(plan, log), case)
+    except InFlightError:
+        return None
 
 
 def sweep(round_trips_ms: Sequence[float]) -> list[Point]:

@@ -16,6 +16,7 @@ from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.links.startup import COMPILING
+from colibri.mavlink.ulog.reader import FILE
 
 if TYPE_CHECKING:
     from colibri.analysis.report import Report
@@ -61,7 +62,7 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
 
 def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
     """Write what there is of a flight that did not end well; that of one that never began is nothing."""
-    if not (plan.out / "autopilot.csv").exists():
+    if not (plan.out / FILE).exists():
         return
     from colibri.analysis.outcome import keep_what_there_is
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.analysis.logs import read_blocks, read_columns, read_series
-from colibri.analysis.recording import Lags, RecordingError, path_times
+from colibri.analysis.logs import RecordingError, read_blocks, read_series
+from colibri.analysis.recording import Lags, path_times
 from colibri.analysis.series.reduction import Extremes
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES
 from colibri.autopilot.guidance.trajectories.tracks import position
@@ -15,6 +15,9 @@ from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.ulog.flight_topics import DECISION, ESTIMATE, TRUTH, Topic
+from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import Vehicle
 from colibri.view.geometry import thinned
 from colibri.view.recorded.horizons import Horizons
@@ -58,10 +61,11 @@ class RecordedFlight:
         """
         try:
             self.plan = plan_of(folder)
-            self._truth = _read(folder / "plant.csv", _ROW_S)
-            self._decisions = _read(folder / "autopilot.csv", 0.0)
-            estimate = folder / "estimate.csv"
-            self._estimate = _read(estimate, _ROW_S) if estimate.exists() else None
+            log = FlightFile(folder / FILE)
+            self._truth = _read(log, TRUTH, _ROW_S)
+            self._decisions = _read(log, DECISION, 0.0)
+            on_sensors = self.plan.spec.feedback is Feedback.SENSORS
+            self._estimate = _read(log, ESTIMATE, _ROW_S) if on_sensors else None
         except OSError as error:
             raise ViewError(f"{error.filename or folder}: {error.strerror}") from error
         except Error as error:
@@ -185,17 +189,17 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     return Airframe(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
 
 
-def _read(path: Path, apart_s: float) -> Columns:
-    """Return a log's columns, of rows at least `apart_s` apart, and no more of them than `MAX_ROWS`."""
-    (times_s,) = read_series(path, 0)
+def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
+    """Return the columns of a topic, of rows at least `apart_s` apart, and no more of them than `MAX_ROWS`."""
+    (times_s,) = read_series(log, topic, "t")
     if not len(times_s):
-        raise RecordingError(f"{path} is empty: the flight ended before it began")
+        raise RecordingError(f"no {topic.name}: the flight ended before it began")
     interval_s = float(times_s[-1] - times_s[0]) / max(len(times_s) - 1, 1)
     step = max(1, round(apart_s / interval_s) if interval_s else 1, -(-len(times_s) // MAX_ROWS))
     wanted = np.zeros(len(times_s), dtype=np.bool_)
     wanted[::step] = wanted[-1] = True
-    rows = np.vstack(list(read_blocks(path, wanted)))
-    return Columns(rows[:, 0], dict(zip(read_columns(path), rows.T, strict=True)))
+    rows = np.vstack(list(read_blocks(log, topic, wanted)))
+    return Columns(rows[:, 0], dict(zip(topic.names, rows.T, strict=True)))
 
 
 def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:

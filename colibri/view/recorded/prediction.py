@@ -10,7 +10,7 @@ from colibri.autopilot.ground.forecast import Forecaster
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
-from colibri.flights.replay import TLOG, answers_of
+from colibri.flights.replay import answers_of
 
 EVERY = 5
 """Control samples between two horizons that are kept: 25 a second at 125 Hz."""
@@ -26,7 +26,7 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
     loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
     forecaster = _forecaster(plan, loop)
     decisions = 0
-    for answer in answers_of(folder / TLOG):
+    for answer in answers_of(folder):
         if answer.step.decision is None or answer.known is None:
             continue
         decisions += 1

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from colibri.analysis import logs
 from colibri.analysis.estimation import read_estimation, rms
-from colibri.analysis.logs import Rows, at_times, read_blocks, read_series
+from colibri.analysis.logs import Rows, at_times, log_of, read_blocks, read_series
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.recording import COLUMNS, FlightReader, Recording, read_recording
 from colibri.analysis.series import figure_series
@@ -21,8 +20,12 @@ from colibri.analysis.series.flight_series import read_flight
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan, Summary
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.ulog import reader
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, TRUTH
+from colibri.mavlink.ulog.log import MemoryLog
 
-ONE_ROW, SOME_ROWS, ALL_ROWS = 50, 10_000, 1 << 30
+A_BLOCK, SOME_ROWS, ALL_ROWS = 1, 200, 1 << 30
 SUMMARY = Summary(1.0, 1, 0)
 MAX_BYTES_A_SAMPLE = 100
 """A row of the table alone has 216, and its text 500."""
@@ -36,8 +39,8 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> FlightPlan:
     return plan
 
 
-def in_blocks(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
-    monkeypatch.setattr(logs, "BLOCK_BYTES", size)
+def in_blocks(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
+    monkeypatch.setattr(reader, "ROWS_AT_ONCE", rows)
 
 
 def kept(plan: FlightPlan) -> tuple[Any, str]:
@@ -46,22 +49,19 @@ def kept(plan: FlightPlan) -> tuple[Any, str]:
     return report, sha256((plan.out / "flight.csv").read_bytes()).hexdigest()
 
 
-def test_blocks_hold_the_complete_rows_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also numbers that are none; not a row that was cut off, nor one with another number of columns."""
-    path, rows = tmp_path / "log.csv", [[0.1, -1e-300, 3.0], [np.nan, np.inf, -np.inf], [1e22, 5e-324, -0.0]]
-    text = "".join(",".join(map(repr, row)) + "\n" for row in rows)
-    path.write_text(f"a,b,c\n{text}1,2\n{text}1,2,3", encoding="utf-8")
-    for size in (1, 7, ALL_ROWS):
-        in_blocks(monkeypatch, size)
-        assert np.concatenate(list(read_blocks(path))).tobytes() == np.array(rows + rows).tobytes()
-        third, first = read_series(path, 2, 0)
-        assert np.stack([third, first]).tobytes() == np.array(rows + rows)[:, [2, 0]].T.tobytes()
-        wanted = np.array([False, False, True, True, False])
-        chosen = Rows(path, wanted)
-        assert chosen.take(1).tolist() + chosen.take(5).tolist() == [rows[2], rows[0]]
-    path.write_text("a,b,c\n", encoding="utf-8")
-    assert list(read_blocks(path)) == []
-    assert [series.shape for series in read_series(path, 0, 1)] == [(0,), (0,)]
+def test_rows_are_taken_in_their_order() -> None:
+    log = MemoryLog()
+    rows = np.arange(6.0 * 10).reshape(10, 6)
+    for row in rows.tolist():
+        log.add(COMMAND, row)
+    assert np.array_equal(np.concatenate(list(read_blocks(log, COMMAND))), rows)
+    times, armed = read_series(log, COMMAND, "t", "armed")
+    assert (times.tolist(), armed.tolist()) == (rows[:, 0].tolist(), rows[:, 5].tolist())
+    wanted = np.array([False, False, True, True, False])
+    chosen = Rows(log, COMMAND, wanted)
+    assert np.array_equal(np.vstack([chosen.take(1), chosen.take(5)]), rows[2:4])
+    assert list(read_blocks(log, TRUTH)) == []
+    assert [series.shape for series in read_series(log, TRUTH, "t", "x")] == [(0,), (0,)]
 
 
 def test_instants_are_the_same_to_the_microsecond() -> None:
@@ -82,9 +82,9 @@ def test_parts_joined_are_the_flight_to_the_bit(plan: FlightPlan, monkeypatch: p
     whole, (as_one,) = read_recording(plan), FlightReader(plan)
     assert np.array_equal(as_one.table, whole.table)
     assert len(whole.table) == len(whole.slack) + 1 == FlightReader(plan).samples
-    for size in (ONE_ROW, SOME_ROWS):
+    for size in (A_BLOCK, SOME_ROWS):
         in_blocks(monkeypatch, size)
-        assert len(list(FlightReader(plan))) > (30 if size == SOME_ROWS else 480)
+        assert len(list(FlightReader(plan))) > (4 if size == SOME_ROWS else 15)
         again = read_recording(plan)
         for name in (each.name for each in fields(Recording)):
             assert np.array_equal(getattr(again, name), getattr(whole, name)), name
@@ -94,7 +94,7 @@ def test_parts_joined_are_the_flight_to_the_bit(plan: FlightPlan, monkeypatch: p
 def test_report_and_table_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks(monkeypatch, ALL_ROWS)
     whole = kept(plan)
-    for size in (ONE_ROW, SOME_ROWS):
+    for size in (A_BLOCK, SOME_ROWS):
         in_blocks(monkeypatch, size)
         assert kept(plan) == whole
 
@@ -133,17 +133,17 @@ def test_the_report_is_that_of_the_whole_table(plan: FlightPlan, monkeypatch: py
 
 
 def test_estimation_does_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = read_estimation(plan, 2.0)
+    whole = read_estimation(plan, log_of(plan.out), 2.0)
     in_blocks(monkeypatch, SOME_ROWS)
-    again = read_estimation(plan, 2.0)
+    again = read_estimation(plan, log_of(plan.out), 2.0)
     for name in whole._fields:
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
-    assert read_estimation(plan, 0.0).figures()["nees_mean"] != whole.figures()["nees_mean"]
+    assert read_estimation(plan, log_of(plan.out), 0.0).figures()["nees_mean"] != whole.figures()["nees_mean"]
 
 
 def test_figures_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = []
-    for size in (ALL_ROWS, SOME_ROWS, ONE_ROW):
+    for size in (ALL_ROWS, SOME_ROWS, A_BLOCK):
         in_blocks(monkeypatch, size)
         flown = FigureSeries(plan)
         for part in FlightReader(plan):
@@ -161,15 +161,15 @@ def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
     lasts_s = plan.spec.duration
     longer = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", duration=rounds * lasts_s, out=out))
     out.mkdir()
-    for name in ("plant.csv", "autopilot.csv"):
-        header, *lines = (plan.out / name).read_text(encoding="utf-8").splitlines()
-        rows = [(float(time), rest) for time, _, rest in (line.partition(",") for line in lines)]
-        with (out / name).open("w", encoding="utf-8") as log:
-            print(header, file=log)
+    log = log_of(plan.out)
+    with (out / "flight.ulg").open("wb") as file:
+        file.write(beginning("Test", {}))
+        for topic in (TRUTH, DECISION):
+            rows = np.concatenate(list(log.blocks(topic)))
+            rows = rows[rows[:, 0] < lasts_s]  # the last is the first of the next
             for began_s in np.arange(rounds) * lasts_s:
-                for time_s, rest in rows:
-                    if time_s < lasts_s:  # the last is the first of the next
-                        print(f"{round(began_s + time_s, 6)},{rest}", file=log)
+                for block in np.array_split(rows + began_s * (np.arange(rows.shape[1]) == 0), 20):
+                    file.write(topic.encode(block))
     return longer
 
 
@@ -187,7 +187,7 @@ def peak_bytes(plan: FlightPlan) -> int:
 
 @pytest.mark.long
 def test_memory_hardly_grows_with_the_flight(plan: FlightPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_blocks(monkeypatch, 1 << 14)
+    in_blocks(monkeypatch, 64)
     monkeypatch.setattr(figure_series, "MAX_POINTS", 1 << 10)
     monkeypatch.setattr(figure_series, "MAX_PATH_POINTS", 1 << 10)
     flights = [lengthened(plan, tmp_path / str(rounds), rounds) for rounds in (4, 20)]

@@ -87,7 +87,7 @@ def test_a_lost_flight_says_why_and_keeps_its_logs() -> None:
     (row,) = flown(fly=fly, logs="lost")
     assert row.verdict is Verdict.LOST
     assert "on the ground" in row.why
-    kept = {"flight.csv", "plant.csv", "report.json", "provenance.json"}
+    kept = {"flight.csv", "flight.ulg", "report.json", "provenance.json"}
     assert {f"flights/000000/{name}" for name in kept} <= row.files.keys()
     (unkept,) = flown(fly=fly)
     assert unkept == row._replace(files={})

@@ -43,7 +43,7 @@ def test_each_level_sets_what_it_names_and_nothing_else(tmp_path: Path) -> None:
     hover = {"track": "hover"}
     assert settings == [hover | mpc, hover | mpc | heavy, hover | baseline, hover | baseline | heavy]
     assert campaign.metrics == usual(sensors=True)
-    plan = plan_point(common_of(campaign), points[1], tmp_path / "flight")
+    plan = plan_point(common_of(campaign), points[1])
     nominal = load_vehicle("hummingbird")
     assert (plan.profile.name, plan.profile.controller, plan.vehicle) == ("flight", "lpv-mpc", nominal)
     assert plan.plant_vehicle.body.mass_kg == 1.2 * nominal.body.mass_kg

@@ -248,5 +248,5 @@ def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
     assert report["real_time_factor"] == pytest.approx(21.0 / report["wall_time_s"])
     assert 0.0 < report["rmse_after_20s_m"] <= report["rmse_m"] <= report["max_error_m"]
     assert len(report["trajectory_sha256"]) == 64
-    assert {"flight.csv", "flight.tlog"} <= {path.name for path in tmp_path.iterdir()}
+    assert {"flight.csv", "flight.ulg"} <= {path.name for path in tmp_path.iterdir()}
     assert len(list(tmp_path.glob("*.png"))) == 6

@@ -42,8 +42,8 @@ def fly_slowly(out: Path) -> "subprocess.Popen[str]":
 
 
 def has_flown(out: Path) -> bool:
-    log = out / "plant.csv"
-    return log.exists() and log.stat().st_size > 10_000
+    log = out / "flight.ulg"
+    return log.exists() and log.stat().st_size > 30_000
 
 
 def alive(process: psutil.Process) -> bool:

@@ -36,7 +36,7 @@ def test_a_view_beside_needs_a_link_to_call(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_a_folder_that_is_no_flight_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("provenance.json", "plant.csv", "autopilot.csv"):
+    for name in ("provenance.json", "flight.ulg"):
         (tmp_path / name).touch()
     with pytest.raises(SystemExit) as ended:
         main(["view", str(tmp_path), "--no-browser"])

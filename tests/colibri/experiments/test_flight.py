@@ -1,6 +1,5 @@
 """Flights from Python: the command's options as keywords, objects in place of names, and what a flight shows."""
 
-import gc
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +11,8 @@ import pytest
 import colibri
 from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
+from colibri.flights.provenance import plan_of
+from colibri.flights.replay import replay_flight
 
 HOVER = {"duration": 0.4, "start": {"x": 0.1, "z": 2.0}}
 
@@ -74,16 +75,16 @@ def test_without_pandas_one_line_says_so(hover: colibri.Flight, monkeypatch: pyt
         hover.samples.to_pandas()
 
 
-def test_nothing_stays_unless_it_is_saved(tmp_path: Path) -> None:
+def test_nothing_stays_unless_it_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     flight = colibri.fly("hover", duration=0.1)
-    folder = flight.plan.out
+    assert not list(tmp_path.iterdir())
     saved = flight.save(tmp_path / "kept")
-    assert {"flight.csv", "report.json", "flight.tlog", "provenance.json"} <= {path.name for path in saved.iterdir()}
+    assert {"flight.csv", "report.json", "flight.ulg", "provenance.json"} <= {path.name for path in saved.iterdir()}
     with pytest.raises(colibri.Error, match="is not empty: choose another folder"):
         flight.save(saved)
-    del flight
-    gc.collect()
-    assert not folder.exists()
+    assert replay_flight(saved) == (25, 96_000, None)
+    assert colibri.read_recording(plan_of(saved)).trajectory_sha256 == flight.sha256
 
 
 def test_profile_and_vehicles_are_changed_by_their_keys(hover: colibri.Flight) -> None:
@@ -116,12 +117,12 @@ def test_a_frame_interval_must_still_divide_the_control_interval() -> None:
         colibri.load_profile("flight").replace("simulation.frame_interval_s", 0.003)
 
 
-def test_a_class_flies_without_an_entry_point() -> None:
+def test_a_class_flies_without_an_entry_point(tmp_path: Path) -> None:
     profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 0.5})
     flight = colibri.fly("hover", profile=profile, controller=Hovers, **HOVER)
     assert flight.report["controller"] == "Hovers"
     assert flight.samples["omega1"][-1] == pytest.approx(0.5 * flight.plan.vehicle.hover_speed, rel=0.01)
-    kept = (flight.plan.out / "provenance.json").read_text(encoding="utf-8")
+    kept = (flight.save(tmp_path / "kept") / "provenance.json").read_text(encoding="utf-8")
     assert f'"{__name__}:Hovers"' in kept
 
 

@@ -16,7 +16,7 @@ def test_every_flight_is_the_same_twice(
     assert main(["verify", "--link", "memory", "--duration", "1.6", "--out", str(tmp_path)]) == 0
     table = capsys.readouterr().out
     assert table.count(" yes ") == len(verify.CASES)
-    assert all((tmp_path / case.name / "first" / "flight.tlog").exists() for case in verify.CASES)
+    assert all((tmp_path / case.name / "first" / "flight.ulg").exists() for case in verify.CASES)
 
 
 def test_what_is_not_the_same_is_named(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from colibri.experiments.flight import Flight, fly
+from colibri.mavlink.ulog.beginning import beginning
 from colibri.view.recorded.flight import RecordedFlight
 from colibri.view.recorded.horizons import Horizons
 from colibri.view.recorded.prediction import predicted
@@ -70,10 +71,10 @@ def test_a_folder_without_a_flight_is_refused_in_one_line(tmp_path: Path, flight
     with pytest.raises(ViewError, match="no folder of a flight"):
         RecordedFlight(tmp_path)
     copied = flight.save(tmp_path / "copy")
-    (copied / "plant.csv").write_text("t\n", encoding="utf-8")
+    (copied / "flight.ulg").write_bytes(beginning("Test", {}))
     with pytest.raises(ViewError, match="before it began"):
         RecordedFlight(copied)
-    (copied / "plant.csv").unlink()
+    (copied / "flight.ulg").unlink()
     with pytest.raises(ViewError, match="No such file"):
         RecordedFlight(copied)
 

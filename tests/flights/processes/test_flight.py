@@ -8,8 +8,9 @@ import pytest
 
 from colibri import plant
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
+from colibri.mavlink.ulog.flight_topics import DECISION
 from tests.support.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, Flown, fly_family
-from tools.harness.processes import fly, rows
+from tools.harness.processes import fly, rows, topic_rows
 
 HUMMINGBIRD = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"
 IDLE, MAX_SPEED = 83.8, 838.0
@@ -49,7 +50,7 @@ def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, rea
     assert figures["rmse_after_20s_m"] < reach_m
     assert figures["qp_failures"] == 0
     assert not any(figures["fallbacks"].values())
-    truth = rows(tmp_path / "plant.csv")
+    truth = topic_rows(tmp_path)
     speeds = np.array([truth[f"omega{number}"] for number in range(1, 5)])
     assert speeds.min() >= IDLE
     assert speeds.max() <= MAX_SPEED
@@ -122,7 +123,7 @@ def test_with_tight_limits_constraints_bind_and_it_still_flies(tmp_path: Path) -
     """600 rad/s at most, hover at 497: take the spiral up from 2 m away, never ask for more."""
     vehicle = ("--vehicle", vehicle_file(tmp_path, rotors__max_speed="600.0", rotors__idle_speed="60.0"))
     figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "25", *vehicle)
-    truth = rows(tmp_path / "out" / "plant.csv")
+    truth = topic_rows(tmp_path / "out")
     assert max(truth[f"omega{number}"].max() for number in range(1, 5)) <= 600.0
     assert figures["constrained_samples"]["rotors"] > 10
     assert figures["qp_failures"] == 0
@@ -148,7 +149,7 @@ def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
     assert flown["z"].min() > 17.0
     assert max_error_m(flown, 8.0) < 0.01
     if "170" in start:
-        fallback = rows(tmp_path / "autopilot.csv")["fallback"]
+        fallback = topic_rows(tmp_path, DECISION)["fallback"]
         recovering = fallback == FALLBACK_CODES[Fallback.RECOVERY]
         assert recovering[0]
         assert not recovering[flown["t"][1:] > 1.0].any()

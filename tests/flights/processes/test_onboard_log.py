@@ -13,7 +13,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from tests.flights.processes.log_client import downloaded
 from tools.harness.observer import Observer
-from tools.harness.processes import rows
+from tools.harness.processes import topic_rows
 from tools.harness.sitl_process import Vehicle, vehicle
 
 HEIGHT_M = 2.0
@@ -74,7 +74,7 @@ def test_its_numbers_are_those_of_the_flight(flown: Flown) -> None:
     """On sensors the state is the estimate, and off the truth as its sensors are."""
     on_sensors = "sensor_combined" in {topic.name for topic in flown.log.data_list}
     near = 1.0 if on_sensors else 2e-6
-    position, truth = flown["vehicle_local_position"], rows(flown.out / "plant.csv")
+    position, truth = flown["vehicle_local_position"], topic_rows(flown.out)
     places = np.searchsorted(np.rint(1e6 * truth["t"]), position["timestamp"])
     assert np.array_equal(np.rint(1e6 * truth["t"])[places], position["timestamp"])
     assert set(np.diff(position["timestamp"])) == {40_000}

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from colibri.mavlink.ulog.flight_topics import DECISION
 from tools.harness.processes import (
     THESIS_PLANT,
     Process,
@@ -15,6 +16,7 @@ from tools.harness.processes import (
     start_autopilot,
     start_plant,
     states,
+    topic_rows,
     wait_for,
 )
 from tools.harness.relay import BadLink
@@ -140,6 +142,6 @@ def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path
         assert (plant.wait(), autopilot.wait()) == (130, 130)
     ended = plant.wait_for("ended")
     assert len(states(out)) == ended["frames"] + 1
-    decisions = (out / "autopilot.csv").read_text(encoding="utf-8").splitlines()
-    assert len(decisions) - 1 in (ended["frames"], ended["frames"] + 1)
+    decisions = topic_rows(out, DECISION)["t"]
+    assert len(decisions) in (ended["frames"], ended["frames"] + 1)
     assert plant.errors() + autopilot.errors() == ""

@@ -9,7 +9,7 @@ import pytest
 
 from colibri.common.process.status import Status
 from colibri.plant.process.reports import Silence
-from tools.harness.processes import Process, running, wait_for
+from tools.harness.processes import Process, running, topic_rows, wait_for
 
 HIGH = ("--start", "z=500,psi=0,rotors=4740")
 
@@ -57,9 +57,9 @@ def test_rotors_stop_with_a_dead_autopilot_until_the_next(tmp_path: Path) -> Non
             wait_for(flown_on(plant, 0.5), "half a second without another silence")
             plant.process.send_signal(signal.SIGINT)
             assert plant.wait() == 130
-    truth = np.genfromtxt(out / "plant.csv", delimiter=",", skip_header=1)
-    assert np.diff(truth[:, 0]) == pytest.approx(0.004)
-    rotors = truth[:, 14:18].max(axis=1)
+    truth = topic_rows(out)
+    assert np.diff(truth["t"]) == pytest.approx(0.004)
+    rotors = np.max([truth[f"omega{number}"] for number in range(1, 5)], axis=0)
     assert rotors.min() < 0.2 * rotors[0]
     assert rotors[np.argmin(rotors) :].max() > 0.5 * rotors[0]
 

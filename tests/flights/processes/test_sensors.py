@@ -8,7 +8,7 @@ import pytest
 
 from colibri.common.process.lifecycle import nudge_m
 from colibri.mavlink.wire.dialect import Codec
-from tools.harness.processes import Process, fly, rows, running, start_autopilot, start_plant, states
+from tools.harness.processes import Process, fly, running, start_autopilot, start_plant, states, topic_rows
 from tools.harness.relay import BadLink
 
 ON_SENSORS = ("spiral", "--feedback", "sensors")
@@ -49,7 +49,7 @@ def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_two_processes_fly_the_same_flight_as_one(tmp_path: Path) -> None:
     figures = [
-        fly(tmp_path / link, *ON_SENSORS, "--link", link, "--seed", "1", "--duration", "8")
+        fly(tmp_path / link, *ON_SENSORS, "--tlog", "--link", link, "--seed", "1", "--duration", "8")
         for link in ("udp", "memory")
     ]
     assert figures[0]["trajectory_sha256"] == figures[1]["trajectory_sha256"]
@@ -72,7 +72,7 @@ def test_seeds_are_flights(tmp_path: Path) -> None:
 def test_the_track_begins_once_the_estimate_is_aligned(tmp_path: Path) -> None:
     options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "30", "--seed", "1")
     figures = fly(tmp_path, *ON_SENSORS, *options)
-    truth = rows(tmp_path / "plant.csv")
+    truth = topic_rows(tmp_path)
     assert figures["start"]["z"] == figures["start"]["rotors"] == 0.0
     first_second = truth["t"] < 1.0
     assert np.abs(truth["z"][first_second]).max() < 1e-3

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.harness.processes import Process, rows, running, wait_for
+from tools.harness.processes import Process, running, topic_rows, wait_for
 
 
 @pytest.mark.long
@@ -22,7 +22,7 @@ def test_it_hovers_on_sensors_in_a_simulator_of_px4(tmp_path: Path, vehicle: str
         )
         with running(autopilot):
             assert plant.wait() == 0
-    flown = rows(out / "plant.csv")
+    flown = topic_rows(out)
     settled = flown["t"] > 12.0
     assert np.abs(flown["z"][settled] - 3.0).max() < 1.5
     assert np.hypot(flown["x"], flown["y"])[settled].max() < 1.5

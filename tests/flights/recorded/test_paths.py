@@ -39,7 +39,7 @@ def test_a_floor_reaches_the_autopilot_and_its_replay(tmp_path: Path) -> None:
     same = [(tmp_path / link / "flight.csv").read_bytes() for link in ("udp", "memory")]
     assert same[0] == same[1]
     assert rows(tmp_path / "udp" / "flight.csv")["z_ref"].min() >= 1.0
-    assert main(["replay", str(tmp_path / "memory" / "flight.tlog"), "--quiet"]) == 0
+    assert main(["replay", str(tmp_path / "memory"), "--quiet"]) == 0
 
 
 def test_a_path_that_may_not_be_changed_ends_before_it_begins(

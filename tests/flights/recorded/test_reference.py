@@ -53,7 +53,7 @@ def test_the_reference_columns_are_of_the_same_instant(tmp_path: Path) -> None:
 
 
 def test_the_tlog_opens_in_mavlogdump(tmp_path: Path) -> None:
-    fly_thesis(tmp_path, "spiral", "--link", "memory", "--duration", "2")
+    fly_thesis(tmp_path, "spiral", "--link", "memory", "--tlog", "--duration", "2")
     mavlogdump = shutil.which("mavlogdump.py", path=str(Path(sys.executable).parent))
     assert mavlogdump is not None
     command = [sys.executable, mavlogdump, str(tmp_path / "flight.tlog")]

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from colibri.common.process.lifecycle import nudge_m
-from colibri.plant.process.logs import TRUTH_COLUMNS
 from colibri.plant.spec import PARTS
 from colibri.plant.vehicle.description import load_vehicle
-from tools.harness.processes import fly, fly_thesis, rows
+from tools.harness.processes import fly, fly_thesis, rows, states, topic_rows
 
 REALISTIC = ("spiral", "--profile", "thesis", "--vehicle", "hummingbird", "--integrator", "rk4", "--duration")
 TUMBLING = "x=1,y=2,z=20,phi=170,theta=-10,psi=123.4,vx=3,vy=-2,vz=1,p=10,q=-1,r=0.5,rotors=4000"
@@ -21,7 +20,7 @@ def test_udp_and_memory_are_in_the_same_world(tmp_path: Path) -> None:
     options = (*REALISTIC, "4", "--wind", "3.3@123.4", "--without", "drag", "--without", "battery", "--start", TUMBLING)
     udp, memory = (fly(tmp_path / link, *options, "--link", link, lost=True) for link in ("udp", "memory"))
     assert udp["trajectory_sha256"] == memory["trajectory_sha256"]
-    assert (tmp_path / "udp" / "plant.csv").read_bytes() == (tmp_path / "memory" / "plant.csv").read_bytes()
+    assert (states(tmp_path / "udp") == states(tmp_path / "memory")).all()
 
 
 def test_a_flight_begins_as_it_is_told(tmp_path: Path) -> None:
@@ -55,8 +54,7 @@ def test_a_velocity_is_in_the_earth_frame(tmp_path: Path) -> None:
 def test_every_part_makes_a_difference(tmp_path: Path, part: str) -> None:
     for name, options in {"with": (), "without": ("--without", part)}.items():
         fly(tmp_path / name, *REALISTIC, "3", "--link", "direct", *options)
-    flown, ideal = ((tmp_path / name / "plant.csv").read_text(encoding="utf-8") for name in ("with", "without"))
-    assert flown != ideal
+    assert not np.array_equal(states(tmp_path / "with"), states(tmp_path / "without"))
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -100,15 +98,14 @@ def test_the_same_seed_is_the_same_weather_over_every_link(tmp_path: Path) -> No
     }
     assert reports["udp"]["trajectory_sha256"] == reports["memory"]["trajectory_sha256"]
     assert reports["other"]["trajectory_sha256"] != reports["memory"]["trajectory_sha256"]
-    assert (tmp_path / "udp" / "plant.csv").read_bytes() == (tmp_path / "memory" / "plant.csv").read_bytes()
+    assert (states(tmp_path / "udp") == states(tmp_path / "memory")).all()
     reported = [reports["udp"][key] for key in ("wind", "gusts", "turbulence")]
     assert reported == ["8.0@270.0", ["6.0@0.0:start=1.0,duration=1.0"], "moderate"]
 
 
 def test_the_log_of_the_plant_ends_with_battery_and_wind(tmp_path: Path) -> None:
     fly(tmp_path, *REALISTIC, "3", "--link", "memory", "--wind", "4@270")
-    flown = rows(tmp_path / "plant.csv")
-    assert tuple(flown) == TRUTH_COLUMNS
+    flown = topic_rows(tmp_path)
     assert tuple(flown)[-5:] == ("voltage_v", "charge_ah", "wind_east", "wind_north", "wind_up")
     assert np.isnan(flown["voltage_v"][0])
     assert (flown["voltage_v"][1:] < 12.6).all()

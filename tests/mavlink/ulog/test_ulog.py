@@ -1,5 +1,6 @@
 """ULog files as PX4's own reader has them: every topic, every field, and whatever is left of one that was cut off."""
 
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from math import isnan, nan, pi
 from typing import Any
@@ -16,7 +17,10 @@ from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
 from colibri.mavlink.telemetry.snapshot import BatteryState, EstimatorState, Setpoint, Snapshot, SolverState
 from colibri.mavlink.ulog import messages, samples, sensing, topics, truth
 from colibri.mavlink.ulog.beginning import beginning
-from colibri.mavlink.ulog.blocks import BLOCK_ROWS
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Thinning
+from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, TRUTH
+from colibri.mavlink.ulog.inputs import INPUT
+from colibri.mavlink.ulog.log import RowEncoder, TopicLog
 from colibri.mavlink.ulog.recorder import Recorder
 from colibri.mavlink.ulog.status import Status, nav_state, status_message
 
@@ -42,6 +46,29 @@ def sample(time_us: int) -> dict[str, float]:
     }
 
 
+class Appended(TopicLog):
+    """A log whose messages are kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.content = b""
+
+    def begin(self, beginning: Callable[[], bytes]) -> None:
+        self.content += beginning()
+
+    def append(self, encoded: bytes) -> None:
+        self.content += encoded
+
+
+def encoded(encoder: RowEncoder, *rows: Sequence[float]) -> bytes:
+    """Return what a log appends of rows."""
+    log = Appended()
+    for row in rows:
+        log.add(encoder, row)
+    log.flush()
+    return log.content
+
+
 def single(*numbers: float) -> list[float]:
     return np.array(numbers, dtype=np.float32).tolist()  # type: ignore[no-any-return]
 
@@ -54,15 +81,18 @@ def test_a_file_begins_with_facts_parameters_and_all_formats() -> None:
     log = read(b"")
     assert {"sys_name": "Colibri", "ver_hw": "Test"}.items() <= log.msg_info_dict.items()
     assert log.initial_parameters == {"AN_INT": 3, "A_FLOAT": 0.5}
-    assert log.message_formats.keys() == {*topics.TOPICS, *topics.PARTS}
+    assert log.message_formats.keys() == {
+        *topics.TOPICS,
+        *topics.PARTS,
+        *(topic.name for topic in FLIGHT_TOPICS),
+        INPUT,
+    }
     assert log.data_list == []
 
 
 def test_a_control_sample_is_in_ned_and_frd() -> None:
-    blocks = samples.SampleBlocks()
     rows = [sample(8000 * number) for number in range(BLOCK_ROWS + 2)]
-    content = b"".join(blocks.add(list(row.values())) for row in rows) + blocks.take()
-    log = read(content)
+    log = read(encoded(samples.SampleBlocks(), *(list(row.values()) for row in rows)))
     for number in (0, 1, BLOCK_ROWS - 1, BLOCK_ROWS + 1):
         r = rows[number]
         for topic in samples._TOPICS:  # noqa: SLF001
@@ -93,46 +123,50 @@ def test_attitudes_keep_their_angles(phi: float, theta: float, psi: float) -> No
     """Roll stays, pitch changes its sign, yaw is counted from north."""
     row = dict.fromkeys(samples.COLUMNS, 0.0) | {"phi_ref": phi, "theta_ref": theta, "psi_ref": psi}
     row |= dict(zip(("qw", "qx", "qy", "qz"), quaternion_from_euler(phi, theta, psi), strict=True))
-    blocks = samples.SampleBlocks()
-    blocks.add(list(row.values()))
-    log = read(blocks.take())
+    log = read(encoded(samples.SampleBlocks(), list(row.values())))
     expected = quaternion_from_euler(phi, -theta, pi / 2 - psi)
     held, wanted = data(log, topics.ATTITUDE), data(log, topics.ATTITUDE_SETPOINT)
     for found in ([held[f"q[{i}]"][0] for i in range(4)], [wanted[f"q_d[{i}]"][0] for i in range(4)]):
         assert abs(np.dot(found, expected)) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_the_truth_is_logged_at_125_hz_at_most() -> None:
+def test_samples_are_thinned_alike_in_every_log() -> None:
+    """Whenever a log begins: at a multiple of the interval, or the first sample after one."""
+    every_8_ms, late, uneven = Thinning(), Thinning(), Thinning()
+    picked = [8 * count for count in range(20) if every_8_ms.is_due(8000 * count)]
+    assert picked == [0, 40, 80, 120]
+    assert [8 * count for count in range(3, 20) if late.is_due(8000 * count)] == picked[1:]
+    assert [30 * count for count in range(6) if uneven.is_due(30_000 * count)] == [0, 60, 90, 120]
+
+
+def test_the_truth_is_in_ned_and_frd() -> None:
     blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0))
-    east = dict.fromkeys(truth.COLUMNS, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
+    east = dict.fromkeys(TRUTH.names, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
     east |= {"x": 1.0, "y": 2.0, "z": 3.0, "omega2": 5000.0, "voltage_v": 12.0}
     rows = [east | {"t": 0.004 * number, "charge_ah": 0.001 * number} for number in range(2 * BLOCK_ROWS + 3)]
-    log = read(b"".join(blocks.add(list(row.values())) for row in rows) + blocks.take())
+    log = read(encoded(blocks, *(list(row.values()) for row in rows)))
     position = data(log, topics.POSITION_TRUTH)
-    assert position["timestamp"].tolist() == [8000 * number for number in range(BLOCK_ROWS + 2)]
+    assert position["timestamp"].tolist() == [4000 * number for number in range(len(rows))]
     assert fields(position, "x y z vx vy vz") == pytest.approx([2.0, 1.0, -3.0, 3.0, 0.0, 1.0], abs=1e-6)
     assert fields(data(log, topics.RATES_TRUTH), "xyz[1]") == [-0.25]
     escs = data(log, topics.ESCS)
     assert fields(escs, "esc_count esc_online_flags esc[0].esc_rpm esc[1].esc_rpm", -1) == [4, 15, 0, 5000]
     battery = data(log, topics.BATTERY)
-    assert battery["current_a"].tolist() == pytest.approx([-1.0, 0.001 / 0.004 * 3600.0])
-    assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 130.0, 0.935])
+    assert battery["current_a"].tolist() == pytest.approx([-1.0, *[0.001 / 0.004 * 3600.0] * 2])
+    assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 31.0, 0.9845])
 
 
 def test_extreme_numbers_and_a_missing_battery_are_written() -> None:
     blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=1.0, capacity_ah=0.0))
-    blocks.add([0.0, *[1e300] * (len(truth.COLUMNS) - 1)])
-    log = read(blocks.take())
+    log = read(encoded(blocks, [0.0, *[1e300] * (len(TRUTH.names) - 1)]))
     assert [found.name for found in log.data_list if found.name == topics.BATTERY] == []
     assert data(log, topics.POSITION_TRUTH)["z"].tolist() == [-np.inf]
 
 
 def test_sensors_and_their_estimate() -> None:
-    blocks = sensing.SensingBlocks()
     frame = SensorFrame(0, 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.0), 1e5, 20.0)
     state = EstimatorState(831, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6), 0.75, 1.5, 0, 0)
-    blocks.add(sensing.sensing_numbers(7000, frame, state))
-    log = read(blocks.take())
+    log = read(encoded(sensing.SensingBlocks(), sensing.sensing_numbers(7000, frame, state)))
     measured = data(log, topics.SENSORS)
     axes = "accelerometer_m_s2[0] accelerometer_m_s2[1] accelerometer_m_s2[2] gyro_rad[0] gyro_rad[1] gyro_rad[2]"
     assert fields(measured, axes) == [1.0, -2.0, -3.0, 4.0, -5.0, -6.0]
@@ -169,15 +203,17 @@ def snapshot(time_us: int, **changes: Any) -> Snapshot:
 
 def test_a_vehicle_of_ground_stations_is_recorded() -> None:
     parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
-    recorder = Recorder("Test", 1, parameters, with_battery=True)
-    content = recorder.begin()
+    recorded = Appended()
+    recorder = Recorder(recorded, "Test", 1, parameters, with_battery=True)
+    recorded.begin(recorder.begin)
     for number in range(300):
         solver = SolverState(status=0, iterations=7, step_time_s=1e-4, active=(1, 2, 3, 4))
-        content += recorder.update(snapshot(8000 * number, failsafe=number >= 200, solver=solver, setpoint=Setpoint()))
+        recorder.update(snapshot(8000 * number, failsafe=number >= 200, solver=solver, setpoint=Setpoint()))
         if number == 99:
             assert parameters.set("A", 2.0) is None
-            content += recorder.say(8000 * number, 4, "low battery")
-    log = ULog(BytesIO(content + recorder.take()))
+            recorder.say(8000 * number, 4, "low battery")
+    recorded.flush()
+    log = ULog(BytesIO(recorded.content))
     assert not log.file_corruption
     assert (log.initial_parameters, [change[1:] for change in log.changed_parameters]) == ({"A": 1.0}, [("A", 2.0)])
     assert [(said.timestamp, said.log_level_str(), said.message) for said in log.logged_messages] == [
@@ -191,8 +227,8 @@ def test_a_vehicle_of_ground_stations_is_recorded() -> None:
         0.75,
         1,
     ]
-    assert len(data(log, topics.POSITION)["x"]) == 300
-    assert fields(data(log, topics.MPC), "iterations active_rates qp_status fallback", 299) == [7, 4, 0, -1]
+    assert len(data(log, topics.POSITION)["x"]) == 60
+    assert fields(data(log, topics.MPC), "iterations active_rates qp_status fallback", 59) == [7, 4, 0, -1]
 
 
 def whole_messages(content: bytes) -> int:
@@ -205,10 +241,8 @@ def whole_messages(content: bytes) -> int:
 
 
 def test_a_truncated_file_has_all_messages_before_the_cut() -> None:
-    blocks = samples.SampleBlocks()
-    for number in range(2):
-        blocks.add(list(sample(8000 * number).values()))
-    content = blocks.take() + messages.logged_string(5, 6, "end")
+    two = (list(sample(8000 * number).values()) for number in range(2))
+    content = encoded(samples.SampleBlocks(), *two) + messages.logged_string(5, 6, "end")
     for end in range(len(content) + 1):
         log = ULog(BytesIO(BEGINNING + content[:end]))
         rows = sum(len(found.data["timestamp"]) for found in log.data_list)
@@ -218,8 +252,8 @@ def test_a_truncated_file_has_all_messages_before_the_cut() -> None:
 
 
 def test_a_reader_resynchronises_at_the_next_block() -> None:
-    blocks = samples.SampleBlocks()
-    content = b"".join(blocks.add(list(sample(8000 * number).values())) for number in range(3 * BLOCK_ROWS))
+    rows = (list(sample(8000 * number).values()) for number in range(3 * BLOCK_ROWS))
+    content = encoded(samples.SampleBlocks(), *rows)
     block = len(content) // 3
     log = ULog(BytesIO(BEGINNING + content[: block - 20] + content[block:]))
     assert log.file_corruption
@@ -231,7 +265,5 @@ def test_what_is_no_number_stays_none() -> None:
     row |= dict.fromkeys(("qp_status", "fallback"), -1) | {
         f"active_{kind}": 0 for kind in ("rotors", "increments", "angles", "rates")
     }
-    blocks = samples.SampleBlocks()
-    blocks.add(list(row.values()))
-    found = data(read(blocks.take()), topics.TRAJECTORY)
+    found = data(read(encoded(samples.SampleBlocks(), list(row.values()))), topics.TRAJECTORY)
     assert all(isnan(found[name][0]) for name in ("position[0]", "yaw", "yawspeed"))

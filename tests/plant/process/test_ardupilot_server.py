@@ -19,7 +19,7 @@ from colibri.plant.process.ardupilot_server import ArduPilotServer
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.vehicle.description import load_vehicle
 from tests.plant.process.ardupilot import request
-from tools.harness.processes import rows
+from tools.harness.processes import topic_rows
 
 SENDER = ("127.0.0.1", 50000)
 VEHICLE = load_vehicle("hummingbird")
@@ -74,7 +74,7 @@ def served(
     link, stop, logs = (
         cast(UdpLink, script),
         cast(Stop, script),
-        PlantLogs(out, load_vehicle("hummingbird"), speaks_mavlink=False),
+        PlantLogs(out, load_vehicle("hummingbird")),
     )
     ArduPilotServer(end, link, Status("plant", as_json=True), stop, logs).serve(duration_s=100.0)
     logs.close()
@@ -110,7 +110,7 @@ def test_each_ardupilot_has_a_file_of_its_own(
 ) -> None:
     requests = flight(110.0, 20, 0.0025) + flight(120.0, 30, 0.0025) + flight(130.0, 40, 0.0025)
     served(requests, out, monkeypatch, capsys)
-    topics = ["flight-1.ulg", "flight-2.ulg", "flight.ulg"]
-    assert sorted(path.name for path in out.iterdir()) == [*topics, "plant-1.csv", "plant-2.csv", "plant.csv"]
-    for name, steps in {"plant-1.csv": 20, "plant-2.csv": 30, "plant.csv": 40}.items():
-        assert rows(out / name)["t"] == pytest.approx(0.0025 * np.arange(1, steps + 1))
+    logs = {"flight-1.ulg": 20, "flight-2.ulg": 30, "flight.ulg": 40}
+    assert sorted(path.name for path in out.iterdir()) == list(logs)
+    for name, steps in logs.items():
+        assert topic_rows(out / name)["t"] == pytest.approx(0.0025 * np.arange(1, steps + 1))

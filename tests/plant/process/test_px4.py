@@ -23,7 +23,7 @@ from colibri.plant.physics.world import Physics, starting_world, state_frame
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
 from tests.plant.process.px4 import Px4, serve
-from tools.harness.processes import GIVE_UP_AFTER_S, Process, rows, running, wait_for
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows, wait_for
 
 PX4, OTHER = ("127.0.0.1", 4561), ("127.0.0.1", 4562)
 STOPPED = Motors((0.0,) * 4, armed=False)
@@ -241,8 +241,8 @@ def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
         assert process.events("gone")[1]["text"].endswith(f"; waiting for PX4 on {url.replace('tcp', 'tcpin')}")
         process.process.terminate()
         assert process.wait() == 130
-    for name in ("plant-1.csv", "plant.csv"):  # a flight has a file of its own
-        flown_s = rows(tmp_path / "out" / name)["t"]
+    for name in ("flight-1.ulg", "flight.ulg"):  # a flight has a file of its own
+        flown_s = topic_rows(tmp_path / "out" / name)["t"]
         assert (flown_s[0], flown_s[-1]) == (0.004, pytest.approx(15.0, abs=0.1))
         assert set(np.diff(np.round(flown_s * 1e6))) == {FRAME_US}
     for name in ("flight-1.tlog", "flight.tlog"):
@@ -251,7 +251,7 @@ def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
         names = [message.name for each in logged for message in Codec(1, 1).decode(each.frame)]
         assert {"COMMAND_LONG", "HEARTBEAT"} <= set(names[: len(Px4().hello())])
         assert names.count("HIL_SENSOR") == pytest.approx(15 * 250, abs=25)
-    assert len(list((tmp_path / "out").iterdir())) == 6
+    assert len(list((tmp_path / "out").iterdir())) == 4
 
 
 def test_a_px4_that_waits_to_be_called_is_called_over_udp(tmp_path: Path) -> None:

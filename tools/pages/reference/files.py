@@ -1,9 +1,9 @@
-"""The tables of `files.md`: columns of each log, and keys of `report.json`, as the code that writes them has them."""
+"""The tables of `files.md`: columns of `flight.csv` and of each topic, and keys of `report.json`."""
 
 import ast
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from inspect import getsource
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,51 +11,22 @@ from colibri.analysis.estimation import FIGURES
 from colibri.analysis.recording import COLUMNS
 from colibri.analysis.report import report
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES
-from colibri.autopilot.estimation.measurements.table import kinds_of
-from colibri.autopilot.process.logs import DECISION_COLUMNS, ESTIMATE_COLUMNS, check_columns
-from colibri.plant.process.logs import TRUTH_COLUMNS
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Columns
 from tools.pages.tables import renew_tables
 
 _MANY = 6
-_AXIS = r"([xyz])"
-_MEANINGS: tuple[tuple[str, str, str], ...] = (
-    ("t", "s", "simulated time"),
-    (r"[uvw]", "m/s", "velocity in the body's axes, FLU"),
-    (r"[pqr]", "rad/s", "body rates, FLU"),
-    (_AXIS, "m", "position, ENU"),
-    (r"v([xyz])", "m/s", "velocity, ENU"),
-    (r"q([wxyz])", "", "attitude as a quaternion, wxyz, FLU to ENU"),
-    (r"(phi|theta|psi)", "rad", "attitude, angles Z-Y'-X''; yaw unwrapped"),
-    (r"U1", "N", "thrust of all rotors"),
-    (r"U[234]", "N m", "moments about the body's axes, FLU"),
-    (r"(phi|theta|psi)_ref", "rad", "attitude that is steered to"),
-    (r"([xyz])_ref", "m", "reference of the same instant, ENU"),
-    (r"omega\d", "the vehicle's", "speed of each rotor, in the unit of the vehicle file"),
-    (r"voltage_v", "V", "of the battery under load; `nan` without one"),
-    (r"charge_ah", "Ah", "taken from the battery"),
-    (r"wind_(east|north|up)", "m/s", "wind at the vehicle, turbulence and gusts in it"),
-    (r"solve_time_us", "µs", "of the QP, by the clock: not the same again"),
-    (r"control_step_us", "µs", "from frame to command, by the clock: not the same again"),
-    (r"cost", "", "of the plan"),
-    (r"slack", "parts", "by how much soft limits were planned to be exceeded, in parts of each"),
-    (r"active_(rotors|increments|angles|rates)", "", "constraints of the kind that the plan touches"),
-    (r"delay_us", "µs", "from frame to effect of its command, as compensated"),
-    (r"mass_kg", "kg", "that the control law estimates; `nan` for one that estimates none"),
-    (r"path_lag_s", "s", "by which path time lags behind the clock; `nan` for a law that keeps to the clock"),
-    (r"qp_iterations", "", "of the QP's solver; `nan` where it does not say"),
-    (r"sd_[xyz]", "m", "standard deviation of the position"),
-    (r"sd_v[xyz]", "m/s", "standard deviation of the velocity"),
-    (r"sd_(east|north|up)", "rad", "standard deviation of the attitude, about each axis of ENU"),
-    (r"gyro_bias_[xyz]", "rad/s", "estimated bias of the gyroscope, FLU"),
-    (r"accel_bias_[xyz]", "m/s²", "estimated bias of the accelerometer, FLU"),
-    (r"flags", "", "bits of ESTIMATOR_STATUS_FLAGS: what is known well enough"),
-    (r"rejected", "", "measurements rejected so far"),
-    (r"resets", "", "times that part of the state was taken anew"),
-    (r"P\d\d", "", "covariance of the error of position, velocity and attitude: its upper triangle, row by row"),
-    (r"nis_\w+", "", "normalised innovations squared since the start, summed, of each kind of measurement"),
-    (r"believed_\w+", "", "how many measurements were accepted since the start"),
+_FLIGHT = (
+    Columns("u v w", "m/s", "velocity in the body's axes, FLU"),
+    Columns("p q r", "rad/s", "body rates, FLU"),
+    Columns("x y z", "m", "position, ENU"),
+    Columns("phi theta psi", "rad", "attitude, angles Z-Y'-X''; yaw unwrapped"),
+    Columns("U1", "N", "thrust of all rotors"),
+    Columns("U2 U3 U4", "N m", "moments about the body's axes, FLU"),
+    Columns("phi_ref theta_ref psi_ref", "rad", "attitude setpoint"),
+    Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed, in the unit of the vehicle file"),
+    Columns("x_ref y_ref z_ref", "m", "reference of the same instant, ENU"),
 )
+_CODES: dict[str, Mapping[Any, int]] = {"qp_status": STATUS_CODES, "fallback": FALLBACK_CODES}
 _REPORT: dict[str, str] = {
     "track": "as it was asked for",
     "track_note": "what was done to a path through waypoints before it was flown",
@@ -107,15 +78,8 @@ _REPORT: dict[str, str] = {
 
 def tables() -> list[str]:
     """Return the tables of the page, in their order."""
-    sensors = load_vehicle("hummingbird").sensors
-    assert sensors is not None
-    logs = {
-        "flight.csv": COLUMNS,
-        "plant.csv": TRUTH_COLUMNS,
-        "autopilot.csv": DECISION_COLUMNS,
-        "estimate.csv": ESTIMATE_COLUMNS,
-        "filter.csv": check_columns(kinds_of(sensors)),
-    }
+    assert ("t", *chain.from_iterable(each.names.split() for each in _FLIGHT)) == COLUMNS
+    logs = {"flight.csv": _FLIGHT, **{topic.name: topic.columns for topic in FLIGHT_TOPICS}}
     return [
         *(
             "\n".join([f"| of `{name}` | unit | what it is |", "|---|---|---|", *_rows(of)])
@@ -125,27 +89,13 @@ def tables() -> list[str]:
     ]
 
 
-def _rows(columns: Iterable[str]) -> Iterator[str]:
-    """Yield a row for each run of columns that mean the same."""
-    runs: list[tuple[list[str], str, str]] = []
-    for column in columns:
-        unit, meaning = _meaning(column)
-        if runs and runs[-1][2] == meaning:
-            runs[-1][0].append(column)
-        else:
-            runs.append(([column], unit, meaning))
-    for names, unit, meaning in runs:
+def _rows(columns: Iterable[Columns]) -> Iterator[str]:
+    yield "| `t` | s | simulated time |"
+    for each in columns:
+        names = each.names.split()
         shown = names if len(names) <= _MANY else [names[0], "…", names[-1]]
-        yield f"| {', '.join(name if name == '…' else f'`{name}`' for name in shown)} | {unit} | {meaning} |"
-
-
-def _meaning(column: str) -> tuple[str, str]:
-    if column == "qp_status":
-        return "", "how the QP ended: " + _codes(STATUS_CODES)
-    if column == "fallback":
-        return "", "what decided in its place: " + _codes(FALLBACK_CODES)
-    ((unit, meaning),) = [(unit, what) for pattern, unit, what in _MEANINGS if re.fullmatch(pattern, column)]
-    return unit, meaning
+        meaning = each.help + (f": {_codes(_CODES[each.names])}" if each.names in _CODES else "")
+        yield f"| {', '.join(name if name == '…' else f'`{name}`' for name in shown)} | {each.unit} | {meaning} |"
 
 
 def _codes(codes: Mapping[Any, int]) -> str:

@@ -1,0 +1,212 @@
+"""The topics of a flight that are Colibri's own: tables in SI, ENU and FLU, every bit of which is kept.
+
+The format in the file, packing, reading, CSV columns and `docs/files.md` are derived from these tables.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, groupby
+from struct import Struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.common.types import Array
+from colibri.mavlink.ulog.topics import head, message_layout
+
+_US_PER_S = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Columns of one meaning.
+
+    Attributes:
+        names: Separated by spaces.
+        unit: Empty for none.
+        help: What they are.
+        kind: Type in the file; integers and single floats are used only where a column holds no more.
+    """
+
+    names: str
+    unit: str
+    help: str
+    kind: str = "double"
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """A topic as a table: one row an instant, `t` (s) first.
+
+    Attributes:
+        name: In the file.
+        number: In the file; the same for all processes that write to it.
+        table: Name of the CSV table.
+        rows: What a row is.
+        columns: All but the time.
+        block_rows: Rows that are written at once.
+    """
+
+    name: str
+    number: int
+    table: str
+    rows: str
+    columns: tuple[Columns, ...]
+    block_rows: int = 64
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, the time first."""
+        return ("t", *chain.from_iterable(each.names.split() for each in self.columns))
+
+    @cached_property
+    def pack(self) -> Struct:
+        """Packs a row as doubles."""
+        return Struct(f"<{len(self.names)}d")
+
+    @cached_property
+    def fields(self) -> str:
+        """The format of its messages in the file."""
+        fields = (f"{each.kind} {name};" for each in self.columns for name in each.names.split())
+        return "uint64_t timestamp;" + "".join(fields)
+
+    @cached_property
+    def layout(self) -> np.dtype[np.void]:
+        """Its messages, with their heads."""
+        return message_layout(self.fields)
+
+    def encode(self, rows: Array) -> bytes:
+        """Return the messages of rows (n, columns)."""
+        encoded = np.zeros(len(rows), self.layout)
+        encoded["size"], encoded["kind"], encoded["number"] = head(self.layout, self.number)
+        encoded["timestamp"] = np.rint(rows[:, :1] * _US_PER_S)
+        for name, place in self._runs:
+            encoded[name] = rows[:, place]
+        return encoded.tobytes()
+
+    def decode(self, encoded: NDArray[np.void]) -> Array:
+        """Return the rows of messages (n,), (n, columns)."""
+        rows = np.empty((len(encoded), len(self.names)))
+        rows[:, :1] = encoded["timestamp"] / _US_PER_S
+        for name, place in self._runs:
+            rows[:, place] = encoded[name]
+        return rows
+
+    @cached_property
+    def _runs(self) -> list[tuple[str, slice]]:
+        """Columns of one type that follow each other, by the name of the first."""
+        return list(self._found_runs())
+
+    def _found_runs(self) -> Iterator[tuple[str, slice]]:
+        kinds = [(each.kind, name) for each in self.columns for name in each.names.split()]
+        begin = 1
+        for _, run in groupby(kinds, key=lambda each: each[0]):
+            names = [name for _, name in run]
+            yield names[0], slice(begin, begin + len(names))
+            begin += len(names)
+
+
+_STATE = (
+    Columns("u v w", "m/s", "velocity in the body's axes, FLU"),
+    Columns("p q r", "rad/s", "body rates, FLU"),
+    Columns("x y z", "m", "position, ENU"),
+    Columns("qw qx qy qz", "", "attitude as a quaternion, wxyz, FLU to ENU"),
+)
+_ROTORS = Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed, in the unit of the vehicle file")
+_POSITION = Columns("x y z", "m", "position, ENU")
+_VELOCITY = Columns("vx vy vz", "m/s", "velocity, ENU")
+_RATES, _ATTITUDE = _STATE[1], _STATE[3]
+
+TRUTH = Topic(
+    "colibri_truth",
+    101,
+    "plant.csv",
+    "a frame: the truth",
+    (
+        *_STATE,
+        _ROTORS,
+        Columns("voltage_v", "V", "battery voltage under load; `nan` without a battery"),
+        Columns("charge_ah", "Ah", "charge taken from the battery"),
+        Columns("wind_east wind_north wind_up", "m/s", "wind at the vehicle, with turbulence and gusts"),
+    ),
+)
+DECISION = Topic(
+    "colibri_decision",
+    102,
+    "autopilot.csv",
+    "a control sample: the decision",
+    (
+        Columns("phi_ref theta_ref psi_ref", "rad", "attitude setpoint"),
+        Columns("qp_status", "", "how the QP ended", "int8_t"),
+        Columns("fallback", "", "fallback that decided in its place", "int8_t"),
+        Columns("solve_time_us", "µs", "solve time of the QP, by the wall clock", "float"),
+        Columns("control_step_us", "µs", "time from frame to command, by the wall clock", "float"),
+        Columns("cost", "", "cost of the plan"),
+        Columns("slack", "parts", "largest planned excess of a soft limit, in parts of each"),
+        Columns(
+            "active_rotors active_increments active_angles active_rates",
+            "",
+            "number of active constraints of the kind",
+            "uint16_t",
+        ),
+        Columns("delay_us", "µs", "compensated delay from frame to effect of its command", "float"),
+        Columns("mass_kg", "kg", "mass estimated by the control law; `nan` for a law that estimates none"),
+        Columns("path_lag_s", "s", "lag of the path time behind the clock; `nan` for a law that keeps to the clock"),
+        Columns("qp_iterations", "", "iterations of the QP solver; `nan` where it reports none", "float"),
+    ),
+)
+MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")
+"""Kinds of measurements that an estimator may fuse, in the order of the columns of `FILTER`."""
+ESTIMATE = Topic(
+    "colibri_estimate",
+    103,
+    "estimate.csv",
+    "a control sample on sensors: the estimate",
+    (
+        *(_POSITION, _VELOCITY, _ATTITUDE, _RATES),
+        Columns("sd_x sd_y sd_z", "m", "standard deviation of the position"),
+        Columns("sd_vx sd_vy sd_vz", "m/s", "standard deviation of the velocity"),
+        Columns("sd_east sd_north sd_up", "rad", "standard deviation of the attitude, about each axis of ENU"),
+        Columns("gyro_bias_x gyro_bias_y gyro_bias_z", "rad/s", "estimated gyroscope bias, FLU"),
+        Columns("accel_bias_x accel_bias_y accel_bias_z", "m/s²", "estimated accelerometer bias, FLU"),
+        Columns("flags", "", "bits of ESTIMATOR_STATUS_FLAGS", "uint32_t"),
+        Columns("rejected", "", "measurements rejected so far", "uint32_t"),
+        Columns("resets", "", "resets of a part of the state so far", "uint32_t"),
+    ),
+)
+FILTER = Topic(
+    "colibri_filter",
+    104,
+    "filter.csv",
+    "a tenth of a second on sensors: state and covariance of the filter",
+    (
+        *(_POSITION, _VELOCITY, _ATTITUDE),
+        Columns(
+            " ".join(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
+            "",
+            "covariance of the error of position, velocity and attitude: its upper triangle, row by row",
+        ),
+        Columns(
+            " ".join(f"nis_{kind}" for kind in MEASURED),
+            "",
+            "sum of the normalised innovations squared since the start, for each kind of measurement",
+        ),
+        Columns(
+            " ".join(f"believed_{kind}" for kind in MEASURED),
+            "",
+            "measurements accepted since the start, for each kind of measurement",
+        ),
+    ),
+)
+COMMAND = Topic(
+    "colibri_command",
+    105,
+    "command.csv",
+    "a frame that was answered: the command",
+    (
+        Columns("control1 control2 control3 control4", "", "rotor speeds in parts of the largest", "float"),
+        Columns("armed", "", "whether the rotors are armed", "uint8_t"),
+    ),
+)
+FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND)

@@ -1,0 +1,56 @@
+"""What an autopilot receives, as a topic: records of any length in chunks of one size."""
+
+from collections.abc import Iterator
+from enum import IntEnum
+from struct import Struct
+from typing import NamedTuple
+
+from colibri.mavlink.ulog import messages
+
+INPUT, INPUT_NUMBER = "colibri_input", 106
+CHUNK_BYTES = 88
+"""A frame of state or sensor feedback fits into one chunk."""
+INPUT_FIELDS = f"uint64_t timestamp;uint8_t what;bool goes_on;uint8_t size;uint8_t[{CHUNK_BYTES}] data;"
+_CHUNK = Struct(f"<HQB?B{CHUNK_BYTES}s")
+CONTENT_BYTES = _CHUNK.size
+"""Of a message without its head."""
+
+
+class Kind(IntEnum):
+    """What a record is."""
+
+    SETUP = 1
+    """How the autopilot began, as JSON."""
+    DATAGRAM = 2
+    """A datagram of a ground station, as JSON."""
+    FRAME = 3
+    """A datagram of the plant."""
+
+
+class InputRecord(NamedTuple):
+    """A record, and the simulated time of its frame."""
+
+    time_us: int
+    kind: int
+    content: bytes
+
+
+def encode_input(time_us: int, kind: Kind, content: bytes) -> bytes:
+    """Return the messages of a record."""
+    encoded = b""
+    for begin in range(0, max(len(content), 1), CHUNK_BYTES):
+        chunk = content[begin : begin + CHUNK_BYTES]
+        goes_on = begin + CHUNK_BYTES < len(content)
+        encoded += messages.message("D", _CHUNK.pack(INPUT_NUMBER, time_us, kind, goes_on, len(chunk), chunk))
+    return encoded
+
+
+def decode_inputs(chunks: Iterator[bytes]) -> Iterator[InputRecord]:
+    """Yield the records of data messages, each without its head; one that is cut off is left out."""
+    content = b""
+    for chunk in chunks:
+        _, time_us, kind, goes_on, size, data = _CHUNK.unpack(chunk)
+        content += data[:size]
+        if not goes_on:
+            yield InputRecord(time_us, kind, content)
+            content = b""
