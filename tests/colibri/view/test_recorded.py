@@ -21,8 +21,13 @@ def flight() -> Flight:
 
 
 @pytest.fixture(scope="module")
-def recorded(flight: Flight) -> RecordedFlight:
-    return RecordedFlight(flight.plan.out, "one")
+def folder(flight: Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flight.save(tmp_path_factory.mktemp("flight"))
+
+
+@pytest.fixture(scope="module")
+def recorded(folder: Path) -> RecordedFlight:
+    return RecordedFlight(folder, "one")
 
 
 def test_a_snapshot_is_what_the_logs_say(flight: Flight, recorded: RecordedFlight) -> None:
@@ -53,9 +58,9 @@ def test_charts_have_all_that_is_judged(recorded: RecordedFlight) -> None:
         assert (np.diff(chart.times_s) >= 0.0).all()
 
 
-def test_horizons_begin_at_the_vehicle_and_lead_ahead(flight: Flight, recorded: RecordedFlight) -> None:
+def test_horizons_begin_at_the_vehicle_and_lead_ahead(folder: Path, recorded: RecordedFlight) -> None:
     horizons = Horizons()
-    for time_s, points in predicted(flight.plan.out):
+    for time_s, points in predicted(folder):
         horizons.add(time_s, points)
     recorded.use_horizons(horizons)
     now = recorded.at(1.5)
@@ -142,20 +147,20 @@ def test_a_browser_without_layout_is_not_waited_for(recorded: RecordedFlight) ->
     assert page.revealed
 
 
-def test_an_export_needs_nothing_else(flight: Flight, tmp_path: Path) -> None:
+def test_an_export_needs_nothing_else(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "flight.html"
-    export([flight.plan.out], path)
+    export([folder], path)
     text = path.read_text(encoding="utf-8")
     assert "__VISER_EMBED_DATA__" in text
     assert 'src="http' not in text
     with pytest.raises(ViewError, match="cannot write"):
-        export([flight.plan.out], tmp_path / "missing" / "flight.html")
+        export([folder], tmp_path / "missing" / "flight.html")
 
 
-def test_a_flight_is_not_laid_over_itself(flight: Flight, tmp_path: Path) -> None:
+def test_a_flight_is_not_laid_over_itself(flight: Flight, folder: Path, tmp_path: Path) -> None:
     with pytest.raises(ViewError, match="given twice"), ExitStack() as held:
-        read_flights([flight.plan.out, flight.plan.out], held)
-    copied = flight.save(tmp_path / flight.plan.out.name)
+        read_flights([folder, folder], held)
+    copied = flight.save(tmp_path / folder.name)
     with ExitStack() as held:
-        names = [each.name for each in read_flights([flight.plan.out, copied], held)]
+        names = [each.name for each in read_flights([folder, copied], held)]
     assert len(set(names)) == 2

@@ -53,7 +53,8 @@ def recorded(path: Path) -> None:
     """Show a flight on sensors in wind, with its horizon."""
     flight = fly("lemniscate:lap=5", duration=15.0, feedback="sensors", wind="5@270", turbulence="light", link="memory")
     with ExitStack() as held:
-        flights = read_flights([flight.plan.out], held, wait=True)
+        folder = held.enter_context(TemporaryDirectory())
+        flights = read_flights([flight.save(folder)], held, wait=True)
         flights[0].name = "lemniscate"
         keep(path, flights, 12.5)
 
@@ -63,7 +64,9 @@ def compared(path: Path) -> None:
     begun = partial(fly, "lemniscate:lap=5", duration=6.0, wind="8@270", turbulence="moderate", link="memory")
     both = [begun(), begun(controller="geometric-se3")]
     with ExitStack() as held:
-        flights = read_flights([flight.plan.out for flight in both], held, wait=True)
+        folder = Path(held.enter_context(TemporaryDirectory()))
+        saved = [flight.save(folder / str(number)) for number, flight in enumerate(both)]
+        flights = read_flights(saved, held, wait=True)
         for flight, name in zip(flights, ("whole-lpv-mpc", "geometric-se3"), strict=True):
             flight.name = name
         keep(path, flights, 4.2)

@@ -19,10 +19,9 @@ BLUE_OVER_RED = 60
 
 
 @pytest.fixture(scope="module")
-def recorded() -> Iterator[RecordedFlight]:
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> RecordedFlight:
     flight = fly("spiral", duration=6.0, profile="flight", link="memory")
-    yield RecordedFlight(flight.plan.out, "spiral flight")
-    assert flight.plan.out.exists()
+    return RecordedFlight(flight.save(tmp_path_factory.mktemp("flight")), "spiral flight")
 
 
 @pytest.fixture
