@@ -64,54 +64,39 @@ class Sight(NamedTuple):
 
 
 class Observer(OnPort):
-    """Records what a vehicle sends to a port of this computer; its methods are the vocabulary of tests."""
+    """Records what a vehicle sends to a port of this computer; its methods are the vocabulary of tests.
+
+    Attributes:
+        sights: About 20 in a simulated second.
+        texts: The STATUSTEXT lines.
+        counts: How many messages of each name have come, from any component.
+    """
 
     def __init__(self) -> None:
         """Listen on any free port."""
         super().__init__(self)
         own = mav.MAV_COMP_ID_MISSIONPLANNER
         self._client = Client(_SYSTEM_ID, own, heartbeat_every_us=None, all_components=True)
+        self.sights: list[Sight] = []
+        self.texts: list[str] = []
+        self.counts: Counter[str] = Counter()
         self._latest: dict[str, Any] = {}
-        self._sights: list[Sight] = []
-        self._texts: list[str] = []
         self._modes: list[Mode] = []
-        self._counts: Counter[str] = Counter()
         self._news = Condition()
 
     @property
-    def sights(self) -> list[Sight]:
-        """What was seen so far, about 20 times a simulated second."""
-        with self._news:
-            return list(self._sights)
-
-    @property
-    def texts(self) -> list[str]:
-        """The STATUSTEXT lines so far."""
-        with self._news:
-            return list(self._texts)
-
-    @property
     def now(self) -> Sight:
-        """The vehicle as it was seen last."""
-        with self._news:
-            return self._sights[-1]
-
-    @property
-    def counts(self) -> Counter[str]:
-        """How many messages of each name came so far, from whomever."""
-        with self._news:
-            return self._counts.copy()
+        """The latest sight."""
+        return self.sights[-1]
 
     @property
     def fix(self) -> int:
         """GPS_FIX_TYPE of the last GPS_RAW_INT."""
-        with self._news:
-            return int(self._latest["GPS_RAW_INT"].fix_type)
+        return int(self._latest["GPS_RAW_INT"].fix_type)
 
     def modes(self) -> list[Mode]:
         """Return the modes of armed heartbeats, each once in a row: one is sent whenever the mode changes."""
-        with self._news:
-            return list(self._modes)
+        return list(self._modes)
 
     def in_mode(self, mode: Mode) -> list[Sight]:
         """Return what was seen in a mode, in flight."""
@@ -120,16 +105,16 @@ class Observer(OnPort):
     def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
         """Return the first sight from now on that meets `condition`, `what` in words; `within_s` bounds what hangs."""
         with self._news:
-            seen = len(self._sights) - 1
+            seen = len(self.sights) - 1
             give_up_s = monotonic() + within_s
             while True:
-                for sight in self._sights[max(seen, 0) :]:
+                for sight in self.sights[max(seen, 0) :]:
                     if condition(sight):
                         return sight
-                seen = len(self._sights)
+                seen = len(self.sights)
                 left_s = give_up_s - monotonic()
-                last = self._sights[-1] if self._sights else None
-                assert left_s > 0.0, f"waited in vain for {what}; {last}; {self._texts}"
+                last = self.sights[-1] if self.sights else None
+                assert left_s > 0.0, f"waited in vain for {what}; {last}; {self.texts}"
                 self._news.wait(left_s)
 
     def wait_until_disarmed(self) -> Sight:
@@ -137,9 +122,7 @@ class Observer(OnPort):
 
         On a busy machine what is seen lags behind what a client has received already.
         """
-        return self.wait(
-            lambda sight: not sight.armed and any(it.armed for it in self._sights), "the end of the flight"
-        )
+        return self.wait(lambda sight: not sight.armed and any(it.armed for it in self.sights), "the end of the flight")
 
     @property
     def _vehicle(self) -> tuple[int, int]:
@@ -152,9 +135,9 @@ class Observer(OnPort):
         `fields` are those behind target system and component, which are filled in; `within_s` bounds what hangs.
         """
         with self._news:
-            before = self._counts[answer]
+            before = self.counts[answer]
             self.send(self._client.encode(name, *self._vehicle, *fields))
-            assert self._news.wait_for(lambda: self._counts[answer] > before, within_s), f"no {answer}"
+            assert self._news.wait_for(lambda: self.counts[answer] > before, within_s), f"no {answer}"
             return self._latest[answer]
 
     def command(self, number: int, *params: float) -> int | None:
@@ -199,16 +182,16 @@ class Observer(OnPort):
 
     def _take(self, message: Message) -> None:
         name, fields = message.name, message.fields
-        self._counts[name] += 1
+        self.counts[name] += 1
         if name == "STATUSTEXT":
-            self._texts.append(fields.text)
+            self.texts.append(fields.text)
         if message.source[1] != AUTOPILOT_COMPONENT:
             return
         self._latest[name] = fields
         if name == "HEARTBEAT":
             self._note_mode(fields)
         elif name == "LOCAL_POSITION_NED" and self._latest.keys() >= _NEEDED:
-            self._sights.append(self._sight())
+            self.sights.append(self._sight())
 
     def _note_mode(self, heartbeat: Any) -> None:
         mode = mode_of_custom(heartbeat.custom_mode)
