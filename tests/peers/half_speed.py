@@ -12,14 +12,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from subprocess import STDOUT, Popen, run
 from time import perf_counter
-from typing import Any
 
 from colibri.common.types import Address
 from colibri.companion.guide import Companion
 from colibri.companion.supervision.limits import FlightLimits
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.commands import Command
+from colibri.mavlink.client.parameters import SetParameter
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.links.open import open_ground_link
-from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from colibri.mavlink.wire.dialect import mav
 from tests.peers.on_the_plant import px4_command, px4_settings
 
 SPEED = 0.5
@@ -58,7 +60,7 @@ class Bench:
     pilot: GroundLink
     companion: Companion | None = None
     began_s: float = field(default_factory=perf_counter)
-    codec: Codec = field(default_factory=lambda: Codec(255, 190))
+    client: Client = field(default_factory=lambda: Client(255, 190, heartbeat_every_us=None))
     stopped_until_us: int = 0
     sent_us: int = 0
     _address: Address | None = None
@@ -75,8 +77,11 @@ class Bench:
         for datagram, sender in self.link.receive_now():
             self._address = sender
             self.companion.receive(datagram, self.now_us)
-        for _, sender in self.pilot.receive_now():
+        for datagram, sender in self.pilot.receive_now():
             self._pilot_address = sender
+            self.client.receive(datagram, self.now_us)
+        for frame in self.client.poll(self.now_us) if self._pilot_address is not None else ():
+            self.pilot.send(frame, self._pilot_address)
         frames = self.companion.poll(self.now_us)
         for frame in frames:
             if self._address is not None:
@@ -90,18 +95,16 @@ class Bench:
 
     def order(self, number: int, *parameters: float) -> None:
         """Have the pilot give a command."""
-        padded = [*parameters, *[0.0] * 7][:7]
-        self._say("COMMAND_LONG", number, 0, *padded)
+        self.client.begin(Command(self._target, number, *parameters))
 
     def set(self, name: str, value: int) -> None:
         """Have the pilot set an integer parameter, bytewise."""
-        self._say("PARAM_SET", name, Bits(value), mav.MAV_PARAM_TYPE_INT32)
+        self.client.begin(SetParameter(self._target, name, value, kind=mav.MAV_PARAM_TYPE_INT32))
 
-    def _say(self, name: str, *fields: Any) -> None:
-        assert self._pilot_address is not None, "PX4 calls its ground station"
+    @property
+    def _target(self) -> tuple[int, int]:
         assert self.companion is not None, "somebody flies"
-        system = self.companion.peer.system
-        self.pilot.send(self.codec.encode(name, system, 1, *fields), self._pilot_address)
+        return self.companion.peer.target
 
     def freeze(self, for_s: float) -> None:
         """Have PX4 stand still."""

@@ -14,9 +14,12 @@ from pathlib import Path
 from subprocess import STDOUT, Popen, run
 from time import monotonic
 
-from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.commands import Command, set_message_interval
+from colibri.mavlink.client.conversation import Repeat
+from colibri.mavlink.client.modes import COPTER_MODES
 from colibri.mavlink.links.open import open_ground_link
-from colibri.mavlink.wire.dialect import Codec, Message, mav
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, mav
 
 VEHICLES = {"px4": "iris", "ardupilot": "hummingbird"}
 SPEED = 5
@@ -25,9 +28,9 @@ HOVER_S = 15.0
 NEARLY_THERE_M = 1.7
 TAKE_OFF_M = 2.0
 """Of ArduPilot; PX4 has MIS_TAKEOFF_ALT, 2.5 m."""
-_GUIDED = 4
 _GIVE_UP_AFTER_S = 120.0
-_ASK_EVERY_S = 0.2
+_ASK_EVERY_US = 200_000
+_VEHICLE = (1, AUTOPILOT_COMPONENT)
 _COLIBRI = (sys.executable, "-m", "colibri")
 
 
@@ -101,57 +104,44 @@ def killed_after(command: list[str], folder: Path, environment: dict[str, str]) 
 def hover(whom: str) -> None:
     """Have it take off, and wait until it has hovered for `HOVER_S` by its own clock."""
     url = "udpin:127.0.0.1:14540" if whom == "px4" else "tcp:127.0.0.1:5760"
-    asking_s, up_since_ms, armed, peer = 0.0, None, False, None
-    codec, give_up_s = Codec(255, 190), monotonic() + _GIVE_UP_AFTER_S
+    kind = mav.MAV_TYPE_ONBOARD_CONTROLLER if whom == "px4" else mav.MAV_TYPE_GCS
+    client, orders = Client(255, 190, kind=kind, heartbeat_every_us=_ASK_EVERY_US), list[Command]()
+    up_since_ms, armed, peer, give_up_s = None, False, None, monotonic() + _GIVE_UP_AFTER_S
     with closing(open_ground_link(url)) as link:
         while monotonic() < give_up_s:
             link.wait(0.05)
+            now_us = round(monotonic() * 1e6)
             for datagram, sender in link.receive_now():
                 peer = sender
-                for message in codec.decode(datagram):
-                    armed = is_armed(message, armed)
-                    if message.name == "LOCAL_POSITION_NED":
+                for message in client.receive(datagram, now_us):
+                    if message.name == "HEARTBEAT":
+                        armed = bool(message.fields.base_mode & MODE_ARMED)
+                    elif message.name == "LOCAL_POSITION_NED":
                         now_ms, is_up = message.fields.time_boot_ms, message.fields.z < -NEARLY_THERE_M
                         up_since_ms = (up_since_ms or now_ms) if is_up else None
                         if up_since_ms is not None and now_ms - up_since_ms > 1e3 * HOVER_S:
                             return
-            if peer is not None and monotonic() >= asking_s:
-                asking_s = monotonic() + _ASK_EVERY_S
-                ask(whom, codec, link, armed=armed, up=up_since_ms is not None)
+            if peer is not None:
+                if all(order.result is not None for order in orders):
+                    orders = [client.begin(order) for order in wanted(whom, armed=armed, up=up_since_ms is not None)]
+                for frame in client.poll(now_us):
+                    link.send(frame, link.target or peer)
     raise SystemExit(f"{whom} did not hover within {_GIVE_UP_AFTER_S:.0f} s")
 
 
-def is_armed(message: Message, before: bool) -> bool:
-    """Return whether the vehicle is armed, by a message or as it was before."""
-    if message.name != "HEARTBEAT" or message.source[1] != mav.MAV_COMP_ID_AUTOPILOT1:
-        return before
-    return bool(message.fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
-
-
-def ask(whom: str, codec: Codec, link: GroundLink, *, armed: bool, up: bool) -> None:
-    """Send what brings it one step further: telemetry, mode, arming, take-off."""
-    kind = mav.MAV_TYPE_ONBOARD_CONTROLLER if whom == "px4" else mav.MAV_TYPE_GCS
-    frames = [codec.encode("HEARTBEAT", kind, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)]
-
-    def command(number: int, *parameters: float) -> None:
-        padded = [*parameters, *[0.0] * 7][:7]
-        frames.append(codec.encode("COMMAND_LONG", 1, mav.MAV_COMP_ID_AUTOPILOT1, number, 0, *padded))
-
-    command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 1e5)
+def wanted(whom: str, *, armed: bool, up: bool) -> Iterator[Command]:
+    """Yield the commands that bring it one step further: telemetry, mode, arming, take-off."""
+    repeat = Repeat(_ASK_EVERY_US, 1)
+    yield set_message_interval(_VEHICLE, "LOCAL_POSITION_NED", 1e5, repeat=repeat)
     if not armed:
         if whom == "px4":
-            command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan)
+            yield Command(_VEHICLE, mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan, repeat=repeat)
         else:
-            command(mav.MAV_CMD_DO_SET_MODE, mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, _GUIDED)
-        command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            yield Command(_VEHICLE, mav.MAV_CMD_DO_SET_MODE, *COPTER_MODES["Guided"].command, repeat=repeat)
+        yield Command(_VEHICLE, mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, repeat=repeat)
     elif not up and whom == "ardupilot":
-        command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, TAKE_OFF_M)
-    for frame in frames:
-        link.send(frame, link.target or PX4_SDK)
-
-
-PX4_SDK = ("127.0.0.1", 14580)
-"""Where PX4's first vehicle listens for those whom it sends to 14540."""
+        height = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, TAKE_OFF_M)
+        yield Command(_VEHICLE, mav.MAV_CMD_NAV_TAKEOFF, *height, repeat=repeat)
 
 
 if __name__ == "__main__":
