@@ -23,7 +23,7 @@ from colibri.plant.vehicle.description import Vehicle
 from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
-from tests.colibri.campaigns.support import Here
+from tests.support.campaigns import Here
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
 INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc"

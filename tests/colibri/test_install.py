@@ -8,7 +8,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from tests.colibri.installs import ROOT, build, environment
+from tests.support.installs import ROOT, build, environment
 
 PACKAGES = ("analysis", "autopilot", "bench", "cli", "common", "flights", "mavlink", "plant", "sitl", "studies")
 EVERY_MODULE = """

@@ -19,7 +19,7 @@ from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
 from colibri.studies.seeds import METRICS
-from tests.colibri.campaigns.support import Here
+from tests.support.campaigns import Here
 
 _SENSORS = load_vehicle("hummingbird").sensors
 assert _SENSORS is not None

@@ -19,7 +19,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Settings, Study, campaign, table, write
 from colibri.studies.study_flights import Flown, fly
-from tests.colibri.campaigns.support import Here
+from tests.support.campaigns import Here
 
 SHORT: Settings = {"track": "hover:height=20", "start": {"z": 20.0, "phi": 170.0}, "duration": 0.8}
 NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]

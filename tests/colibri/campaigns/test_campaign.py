@@ -1,9 +1,6 @@
 """Whole campaigns: the same table by any number of processes, and after any interruption."""
 
-import subprocess
-import sys
 from pathlib import Path
-from time import monotonic, sleep
 from typing import Any
 
 import psutil
@@ -13,15 +10,9 @@ import colibri
 from colibri.campaigns.definition import CampaignTables, tables_of
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.flights import Flown
-from colibri.campaigns.journal import JOURNAL
 from colibri.campaigns.run import fly_campaign
 from colibri.cli.main import main
-from tests.colibri.campaigns.support import MASS, SHORT, Here, planned, tables_in
-from tests.colibri.experiments.test_flight import Hovers
-
-PATIENCE_S = 120.0
-SEEDS = "0-39"
-OPTIONS = ["--track", "hover", "--seeds", SEEDS, "--draw", f"{MASS}=uniform:0.68:0.74", "--duration", "0.6", "--quiet"]
+from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, SHORT, Here, Hovers, begin, planned, rows, tables_in
 
 
 @pytest.fixture(scope="module")
@@ -31,21 +22,6 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     campaign = planned(fly={"duration": 0.6}, seeds=SEEDS, draw={MASS: {"uniform": [0.68, 0.74]}})
     fly_campaign(campaign, Here(), folder)
     return tables_in(folder)
-
-
-def begin(out: Path, *options: str) -> subprocess.Popen[str]:
-    words = [sys.executable, "-m", "colibri", "campaign", *OPTIONS, *options, "--out", str(out)]
-    return subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-
-
-def rows(out: Path, least: int) -> int:
-    """Return how many rows are kept, when there are at least so many."""
-    until_s = monotonic() + PATIENCE_S
-    journal = out / JOURNAL
-    while (count := journal.read_bytes().count(b"\n") if journal.exists() else 0) < least:
-        assert monotonic() < until_s
-        sleep(0.005)
-    return count
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ import pytest
 import colibri
 from colibri.campaigns.definition import CampaignTables, campaign_of, read_seeds, tables_of
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import DRAWN, MASS, planned
+from tests.support.campaigns import DRAWN, MASS, planned
 
 FILE = """
 name = "mass"

@@ -11,8 +11,7 @@ import colibri
 from colibri.autopilot.control.profile import profile_text
 from colibri.campaigns.flights import Verdict, check, common_of, fly_point
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, SHORT, flown, planned
-from tests.colibri.experiments.test_flight import Hovers
+from tests.support.campaigns import MASS, SHORT, Hovers, flown, planned
 
 
 class Falls(Hovers):

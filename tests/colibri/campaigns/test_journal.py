@@ -9,7 +9,7 @@ import colibri
 from colibri.campaigns.flights import common_of
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, SHORT, flown, planned
+from tests.support.campaigns import MASS, SHORT, flown, planned
 
 GRID: dict[str, Any] = {"track": ["hover"], MASS: [0.7, 0.71]}
 

@@ -12,7 +12,7 @@ from colibri.campaigns.metrics import usual
 from colibri.campaigns.values import CampaignError
 from colibri.common.errors import Error
 from colibri.plant.vehicle.description import load_vehicle
-from tests.colibri.campaigns.support import MASS, planned, results
+from tests.support.campaigns import MASS, planned, results
 
 FILE = """
 [fly]

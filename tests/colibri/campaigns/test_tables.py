@@ -16,7 +16,7 @@ from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import fly_campaign
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, Here, planned, results, tables_in
+from tests.support.campaigns import MASS, Here, planned, results, tables_in
 
 LATENCY, FLOOR = "latency", "floor"
 

@@ -11,7 +11,7 @@ import pytest
 from colibri.cli.main import main
 from colibri.common.process.folder_lock import FolderLock
 from colibri.mavlink.links.open import open_link
-from tests.colibri.cli.commands import FLIGHT, PROFILE, VEHICLE, edited, exit_code
+from tests.support.commands import FLIGHT, PROFILE, VEHICLE, edited, exit_code
 
 
 def recoded(source: Path) -> Callable[[Path], str]:

@@ -21,7 +21,7 @@ from colibri.cli.shared.commands import COMMANDS
 from colibri.cli.shared.parser import parser_of, subcommand
 from colibri.cli.shared.processes import PROCESSES
 from colibri.flights.provenance import plan_of
-from tests.colibri.cli.commands import FLIGHT, VEHICLE, edited, exit_code
+from tests.support.commands import FLIGHT, VEHICLE, edited, exit_code
 
 FIGURES = ("trajectory", "position", "attitude", "inputs", "rotors", "error")
 MAX_HELP_S = 0.2

@@ -14,8 +14,8 @@ from colibri.conformance.check import CHECKS, Conformance
 from colibri.conformance.rows import Result
 from colibri.conformance.step_records import FlownStep
 from colibri.plant.vehicle.description import Vehicle
-from tests.colibri.cli.commands import exit_code
 from tests.colibri.conformance import laws
+from tests.support.commands import exit_code
 
 SHORT_S = 2.0
 WITHOUT_FLIGHTS = [area for area in CHECKS if area != "flights"]

@@ -15,7 +15,7 @@ from colibri.doctor.ground_station import called, ground_station
 from colibri.flights.fleet import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav
-from tests.colibri.cli.commands import exit_code
+from tests.support.commands import exit_code
 
 FINE, FAILED = Finding("one", Verdict.FINE, "there"), Finding("other", Verdict.FAILED, "not there", "put it there")
 ROUTES = (

@@ -13,24 +13,9 @@ from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
 from colibri.flights.provenance import plan_of
 from colibri.flights.replay import replay_flight
+from tests.support.campaigns import Hovers
 
 HOVER = {"duration": 0.4, "start": {"x": 0.1, "z": 2.0}}
-
-
-class Hovers:
-    """A law that does nothing but carry the vehicle, `part` of it."""
-
-    control_interval_us = 10_000
-    preview = colibri.Preview(interval_us=10_000, samples=1)
-
-    def __init__(self, table: dict[str, float], vehicle: colibri.Vehicle, _clock: object) -> None:
-        self._speeds = np.full(4, vehicle.hover_speed * table.get("part", 1.0))
-
-    def initial(self, _rotor_speed: float) -> None:
-        return None
-
-    def step(self, _memory: None, _time_us: int, state: colibri.VehicleState, _references: object) -> Any:
-        return None, colibri.Decision(self._speeds, state.euler)
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +108,7 @@ def test_a_class_flies_without_an_entry_point(tmp_path: Path) -> None:
     assert flight.report["controller"] == "Hovers"
     assert flight.samples["omega1"][-1] == pytest.approx(0.5 * flight.plan.vehicle.hover_speed, rel=0.01)
     kept = (flight.save(tmp_path / "kept") / "provenance.json").read_text(encoding="utf-8")
-    assert f'"{__name__}:Hovers"' in kept
+    assert f'"{Hovers.__module__}:Hovers"' in kept
 
 
 def test_what_it_raises_in_flight_is_raised_here() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
-from tests.colibri.installs import ROOT, build, keep_compiled
+from tests.support.installs import ROOT, build, keep_compiled
 
 pytest_plugins = ["pytester"]
 

@@ -8,7 +8,7 @@ import pytest
 import colibri
 from colibri.campaigns.definition import tables_of
 from colibri.tuning.definition import TuningTables
-from tests.colibri.tuning.support import POSITION, RATE, TABLES, WEIGHTS, planned
+from tests.support.tuning import POSITION, RATE, TABLES, WEIGHTS, planned
 
 TRACKS = {"grid": {"track": ["hover", "spiral"]}}
 

@@ -9,7 +9,7 @@ from colibri.campaigns.flights import Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
 from colibri.tuning.space import TuningError
-from tests.colibri.tuning.support import flown
+from tests.support.tuning import flown
 
 METRICS = (Metric("effort_n_m"), Metric("rmse_m"))
 RMSE = Objective("rmse_m")

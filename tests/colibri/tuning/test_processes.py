@@ -10,8 +10,8 @@ import pytest
 
 from colibri.tuning.run import Watcher, fly_tuning
 from colibri.tuning.trials import JOURNAL
-from tests.colibri.campaigns.support import Here
-from tests.colibri.tuning.support import WEIGHTS, files_in, planned, tuned
+from tests.support.campaigns import Here
+from tests.support.tuning import WEIGHTS, files_in, planned, tuned
 
 PATIENCE_S = 120.0
 TRIALS = 12

@@ -7,7 +7,7 @@ import pytest
 import colibri
 from colibri.autopilot.control.profile import profile_names, profile_text
 from colibri.tuning.profile_file import profile_file, tuned_name
-from tests.colibri.tuning.support import POSITION, WEIGHTS
+from tests.support.tuning import POSITION, WEIGHTS
 
 BLOCK = "profile.controllers.whole-lpv-mpc.plan.blocks.0"
 POLES = "profile.controllers.whole-lpv-mpc.guidance.poles"

@@ -12,8 +12,8 @@ from colibri.cli.main import main
 from colibri.tuning.flying import Flights
 from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
-from tests.colibri.campaigns.support import Here, tables_in
-from tests.colibri.tuning.support import POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned
+from tests.support.campaigns import Here, tables_in
+from tests.support.tuning import POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned
 
 TABLE = "\n".join(
     [

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from colibri.tuning.trials import JOURNAL, Begun, Ended, Trials
-from tests.colibri.tuning.support import POSITION, RATE, planned
+from tests.support.tuning import POSITION, RATE, planned
 
 
 def end(trials: Trials, begun: Begun) -> None:

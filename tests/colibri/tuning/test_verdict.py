@@ -9,7 +9,7 @@ import colibri
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Flown, Verdict
 from colibri.tuning.verdict import Compared, better, check_campaign, compare
-from tests.colibri.tuning.support import WEIGHTS, planned
+from tests.support.tuning import WEIGHTS, planned
 
 SEEDS = 40
 TRACKS = {"grid": {"track": ["hover", "spiral"]}}

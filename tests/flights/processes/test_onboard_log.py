@@ -11,7 +11,7 @@ from pyulog import ULog
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
-from tests.flights.processes.log_client import downloaded
+from tests.support.log_client import downloaded
 from tools.harness.observer import Observer
 from tools.harness.processes import topic_rows
 from tools.harness.sitl_process import Vehicle, vehicle

@@ -9,7 +9,7 @@ from hypothesis import given
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.setpoints.follow_target import GOES_ON_US, Follow
 from colibri.mavlink.setpoints.setpoints import TargetState
-from tests.mavlink.setpoints.streamed import FIRST, message, messages
+from tests.support.streamed import FIRST, message, messages
 
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
 UNKNOWN = [nan, nan, nan]

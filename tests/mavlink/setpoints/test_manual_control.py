@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.setpoints.manual_control import UNCHANGED, UNUSED, Manual
 from colibri.mavlink.setpoints.setpoints import Sticks
-from tests.mavlink.setpoints.streamed import FIRST, message, messages
+from tests.support.streamed import FIRST, message, messages
 
 SYSTEM = 7
 

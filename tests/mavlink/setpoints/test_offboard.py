@@ -13,7 +13,7 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoi
 from colibri.mavlink.telemetry.snapshot import Home
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
-from tests.mavlink.setpoints.streamed import FIRST, SECOND, message, messages
+from tests.support.streamed import FIRST, SECOND, message, messages
 
 INF = float("inf")
 LOCAL, GLOBAL, ATTITUDE = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET"

@@ -16,7 +16,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.vehicle.description import Rotors, VehicleError, load_vehicle
-from tests.plant.process.ardupilot import pulses, read, request
+from tests.support.ardupilot import pulses, read, request
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, begins_as_recorded, running, topic_rows
 
 VEHICLE = load_vehicle("hummingbird")

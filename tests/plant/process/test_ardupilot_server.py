@@ -18,7 +18,7 @@ from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.ardupilot_server import ArduPilotServer
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.vehicle.description import load_vehicle
-from tests.plant.process.ardupilot import request
+from tests.support.ardupilot import request
 from tools.harness.processes import topic_rows
 
 SENDER = ("127.0.0.1", 50000)

@@ -22,7 +22,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world, state_frame
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
-from tests.plant.process.px4 import Px4, serve
+from tests.support.px4 import Px4, serve
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows, wait_for
 
 PX4, OTHER = ("127.0.0.1", 4561), ("127.0.0.1", 4562)

@@ -14,8 +14,7 @@ import pytest
 from colibri.campaigns.engines.cluster import Cluster
 from colibri.campaigns.run import fly_campaign
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, Here, planned, tables_in
-from tests.colibri.campaigns.test_campaign import PATIENCE_S, SEEDS, begin, rows
+from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, Here, begin, planned, rows, tables_in
 
 DASK = [sys.executable, "-m", "dask"]
 ALONE = ["--no-dashboard", "--host", "127.0.0.1"]

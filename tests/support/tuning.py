@@ -8,7 +8,7 @@ from colibri.campaigns.flights import Flown, Verdict
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
-from tests.colibri.campaigns.support import Here
+from tests.support.campaigns import Here
 
 WEIGHTS = "controllers.whole-lpv-mpc.weights"
 POSITION, RATE = f"profile.{WEIGHTS}.position", f"profile.{WEIGHTS}.rate"

@@ -9,7 +9,7 @@ import numpy as np
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of
 from colibri.mavlink.links.link import GroundLink, receive_soon
 from colibri.mavlink.wire.dialect import Codec, Message, mav
-from tests.plant.process.strangers import Airframe, Known, Point, hovering
+from tests.support.strangers import Airframe, Known, Point, hovering
 from tools.harness.processes import GIVE_UP_AFTER_S
 
 STARTING_FRAMES = 5

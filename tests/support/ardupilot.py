@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.plant.process.strangers import Airframe, Known, Point, hovering
+from tests.support.strangers import Airframe, Known, Point, hovering
 
 MAGIC, MAGIC_32 = 18458, 29569
 TOP_RAD_S = 838.0

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from colibri.cli.main import main
 
-VEHICLE = Path(__file__).parents[3] / "plant" / "vehicle" / "models" / "hummingbird.toml"
-PROFILE = Path(__file__).parents[3] / "autopilot" / "profiles" / "thesis.toml"
+VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
+PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
 FLIGHT = PROFILE.with_name("flight.toml")
 
 
