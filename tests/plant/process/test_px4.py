@@ -222,7 +222,7 @@ def flown(px4: Px4, link: GroundLink) -> None:
 
 
 def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
-    with plant(tmp_path, "tcpin:127.0.0.1:0") as process:
+    with plant(tmp_path, "tcpin:127.0.0.1:0", "--tlog") as process:
         url = process.wait_for("listening")["url"].replace("tcpin", "tcp")
         sensors = process.wait_for("sensors")
         assert sensors["gps_delay_ms"] == 200
