@@ -53,6 +53,8 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     cockpit.fly_for(8.0)
     assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
     assert cockpit.said("mission says return: return")
+    assert cockpit.missions.take_reached() == [0, 1]
+    assert cockpit.missions.progress().state == COMPLETE
     cockpit.fly_for(60.0)
     assert cockpit.pilot.state == FIRST
 

@@ -204,6 +204,7 @@ def told(service: CommandService, until_us: int, step_us: int = 4_000) -> list[S
 def test_progress_is_told_once_a_second_until_the_end(calibrating: CommandService) -> None:
     sends = told(calibrating, 2_000_000)
     assert [send.fields[1:3] for send in sends] == [(IN_PROGRESS, PROGRESS_UNKNOWN)] * 2
+    assert calibrating.finish(CALIBRATE, OTHER, None) == []
     assert acks(calibrating.finish(CALIBRATE, GROUND, None)) == [(1, CALIBRATE, ACCEPTED)]
     assert list(calibrating.poll(9_000_000)) == []
     assert calibrating.finish(CALIBRATE, GROUND, None) == []

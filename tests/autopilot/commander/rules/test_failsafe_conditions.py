@@ -14,6 +14,7 @@ from colibri.autopilot.commander.rules.failsafe_conditions import (
     FailsafeInputs,
     battery_below,
     needs_position,
+    position_known,
     resting_place,
     stopping_m,
 )
@@ -21,14 +22,17 @@ from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
+from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Kind, Reference, lead, still_target
 from colibri.common.types import Vector
+from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
 from tests.support.failsafe_inputs import FULL, LOST, WELL
 
 LIMITS = {number.name: float(number.default) for number in NUMBERS}
 NOW_US = 10_000_000
+NOTHING = (0.0, 0.0, 0.0)
 
 
 def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleState:
@@ -113,6 +117,17 @@ def test_voltage_is_looked_at_where_it_has_a_limit() -> None:
     assert not battery_below(FULL, 0.15, 0.0)
     assert battery_below(FULL, 0.15, 12.1)
     assert battery_below(FULL, 0.95, 0.0)
+
+
+@pytest.mark.parametrize(("position_m", "velocity_m_s"), [(1e3, 0.1), (0.1, 1e3)])
+def test_position_is_known_if_both_deviations_are_small(position_m: float, velocity_m_s: float) -> None:
+    small, frame = (0.1, 0.1, 1e3), StateFrame(0, NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING)
+    health = Health(*(True,) * 6, False, None, False, *(True,) * 4, ())
+    sure = Estimate(frame, small, small, NOTHING, NOTHING, NOTHING, health, {}, {}, 0, NOTHING, None)
+    assert position_known(sure, LIMITS)
+    unsure = sure._replace(position_std_m=(0.1, position_m, 0.1), velocity_std_m_s=(velocity_m_s, 0.1, 0.1))
+    assert not position_known(unsure, LIMITS)
+    assert Conditions().look(WELL._replace(estimate=unsure), LIMITS, ())[Condition.POSITION_LOST] == NOW_US
 
 
 def test_who_is_steered_by_attitude_needs_no_position() -> None:
