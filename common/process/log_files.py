@@ -1,22 +1,12 @@
-"""Log files: rows of numbers, lines of JSON, frames; to the disk as they come, or block by block."""
+"""Log files: records that are written whole, as they come or block by block."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from contextlib import suppress
 from itertools import accumulate
-from math import inf
 from pathlib import Path
-from typing import Generic, Literal, TypeVar
-
-import msgspec
+from typing import Literal
 
 from colibri.common.errors import InFlightError
 from colibri.common.process.lifecycle import fail
-
-_NUMBERS = msgspec.json.Encoder(enc_hook=float)
-"""The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
-_NULL = b"null"
-"""What nan and inf are encoded as, which have no word there."""
 
 
 class LogError(InFlightError):
@@ -24,7 +14,7 @@ class LogError(InFlightError):
 
 
 def set_aside(*paths: Path) -> None:
-    """Give logs that are over a name of their own, so that others can begin: plant.csv becomes plant-1.csv.
+    """Give logs that are over a name of their own, so that others can begin: flight.ulg becomes flight-1.ulg.
 
     All get the same number, the first that none of them has had; what is not there is passed over.
 
@@ -80,14 +70,8 @@ class LogFile:
         self._file.close()
 
 
-_Record = TypeVar("_Record")
-
-
-class BlockLog(LogFile, ABC, Generic[_Record]):
-    """A file whose records are written `BLOCK` at a time: a process that is killed loses those since the last block.
-
-    Each is formatted as it comes: of a whole block that would take longer than the other process computes.
-    """
+class BlockLog(LogFile):
+    """A file whose records are written `BLOCK` at a time: a process that is killed loses those since the last block."""
 
     BLOCK = 64
 
@@ -96,13 +80,13 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         super().__init__(path)
         self._waiting: list[bytes] = []
 
-    def add(self, record: _Record) -> None:
+    def add(self, record: bytes) -> None:
         """Append a record, and write all that wait once they are a block.
 
         Raises:
             LogError: They cannot be written.
         """
-        self._waiting.append(self.encode(record))
+        self._waiting.append(record)
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 
@@ -121,28 +105,3 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         with suppress(LogError):
             self.flush()
         super().close()
-
-    @abstractmethod
-    def encode(self, record: _Record) -> bytes:
-        """Return the bytes of a record."""
-
-
-class CsvLog(BlockLog[Sequence[float]]):
-    """A CSV file written block by block; numbers keep every bit."""
-
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Create the file and its header, or end the process with one line."""
-        super().__init__(path)
-        try:
-            self.append((",".join(columns) + "\n").encode())
-        except LogError as error:
-            fail(str(error))
-
-    def encode(self, record: Sequence[float]) -> bytes:
-        """Return the line of a row."""
-        line = _NUMBERS.encode(record)[1:-1]
-        if _NULL[:1] not in line:  # no number has that letter
-            return line + b"\n"
-        if inf in record or -inf in record:
-            return ",".join(map(str, record)).encode() + b"\n"
-        return line.replace(_NULL, b"nan") + b"\n"

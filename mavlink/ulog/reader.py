@@ -77,7 +77,7 @@ class FlightFile:
             head = log[at : at + messages.HEAD_BYTES + 2]
             size = int.from_bytes(head[:2], "little") + messages.HEAD_BYTES
             if head[2] not in _KINDS or at + size > end:
-                at = self._next_mark(at + 1) if head[2] not in _KINDS else end
+                at = self._next_mark(at + 1)
                 continue
             count = 1
             if head[2] == messages.DATA:

@@ -40,7 +40,7 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter(BlockLog[tuple[int, list[bytes]]]):
+class TlogWriter(BlockLog):
     """A telemetry log that is written block by block."""
 
     def write(self, time_us: int, frames: list[bytes]) -> None:
@@ -50,10 +50,5 @@ class TlogWriter(BlockLog[tuple[int, list[bytes]]]):
             LogError: They cannot be written.
         """
         if frames:
-            self.add((time_us, frames))
-
-    def encode(self, record: tuple[int, list[bytes]]) -> bytes:
-        """Return each frame behind its time."""
-        time_us, frames = record
-        stamp = STAMP.pack(time_us)
-        return stamp + stamp.join(frames)
+            stamp = STAMP.pack(time_us)
+            self.add(stamp + stamp.join(frames))

@@ -204,7 +204,7 @@ def plant(folder: Path, url: str, *options: str) -> Iterator[Process]:
     process = Process(
         folder,
         "plant",
-        *("--serve", "px4", "--link", url, "--vehicle", "jmavsim", "--out", str(folder / "out")),
+        *("--serve", "px4", "--link", url, "--vehicle", "jmavsim", "--tlog", "--out", str(folder / "out")),
         *options,
     )
     with running(process):
