@@ -1,6 +1,6 @@
 """The log that ground stations list and download: a ULog of each flight, from arming to disarming."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from colibri.mavlink.files.flight_log import FlightLog
 from colibri.mavlink.files.tree import Files
@@ -19,9 +19,6 @@ class _Topics(TopicLog):
     def __init__(self, log: FlightLog) -> None:
         super().__init__()
         self._log = log
-
-    def begin(self, beginning: Callable[[], bytes]) -> None:
-        """Pass it over: the recorder begins each log."""
 
     def append(self, encoded: bytes) -> None:
         """Append messages to it, if there is one."""

@@ -177,7 +177,7 @@ class AutopilotLog:
         if self._begins:
             self._begins = False
             setup = msgspec.structs.replace(self._setup, first_us=time_us)
-            self.topics.begin(self.beginning)
+            self.topics.begin(self.beginning())
             self.topics.append(encode_input(time_us, Kind.SETUP, encoded(setup)))
         if datagram is None:
             return

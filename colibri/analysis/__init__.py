@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from colibri.analysis.recording import FlightReader as FlightReader
     from colibri.analysis.recording import Recording as Recording
     from colibri.analysis.recording import read_recording as read_recording
-    from colibri.analysis.recording import write_recording as write_recording
     from colibri.analysis.report import print_report as print_report
     from colibri.analysis.report import write_report as write_report
     from colibri.analysis.series.figure_series import FigureSeries as FigureSeries

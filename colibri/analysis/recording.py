@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from hashlib import sha256
 from math import isnan
-from pathlib import Path
 from typing import NamedTuple, TextIO
 
 import numpy as np
@@ -216,12 +215,6 @@ class TableWriter:
     def add(self, part: Samples) -> None:
         """Append the rows of a part."""
         self._file.writelines(",".join(map(repr, row)) + "\n" for row in part.table.tolist())
-
-
-def write_recording(recording: Recording, path: Path) -> None:
-    """Write the table as CSV; numbers keep every bit."""
-    with path.open("w", encoding="utf-8") as file:
-        TableWriter(file).add(recording)
 
 
 def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:

@@ -3,37 +3,22 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from struct import Struct
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from colibri.common.process.log_files import LogError, LogFile
 from colibri.common.types import Array
 from colibri.mavlink.ulog import messages
+from colibri.mavlink.ulog.blocks import Blocks
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
 
 ROWS_AT_ONCE = 4096
 """Rows that are read at once: some seconds of a flight."""
 _QUEUED = 64
 
-
-class RowEncoder(Protocol):
-    """Packs rows, and encodes a block of them: a topic, or several of PX4's."""
-
-    @property
-    def block_rows(self) -> int:
-        """Rows of a block."""
-        ...
-
-    @property
-    def pack(self) -> Struct:
-        """Packs a row as doubles."""
-        ...
-
-    def encode(self, table: Array, /) -> bytes:
-        """Return the messages of at most `block_rows` rows, (rows, columns)."""
-        ...
+RowEncoder: TypeAlias = Topic | Blocks
+"""Encodes rows of a topic, or of several of PX4's."""
 
 
 class TopicReader(Protocol):
@@ -60,10 +45,11 @@ class TopicLog(ABC):
     def __init__(self) -> None:
         self._waiting: dict[RowEncoder, list[bytes]] = {}
         self._queued: list[bytes] = []
+        self._beginning = b""
 
-    @abstractmethod
-    def begin(self, beginning: Callable[[], bytes]) -> None:
+    def begin(self, beginning: bytes) -> None:
         """Note the beginning of a file, where one may be written of this later."""
+        self._beginning = beginning
 
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
         """Add a row.
@@ -134,24 +120,11 @@ class FileLog(TopicLog):
         self._opened = opened
         self._file: LogFile | None = None
 
-    def open(self) -> None:
-        """Begin the file now.
-
-        Raises:
-            LogError: It cannot be written.
-        """
-        if self._file is None:
-            self._file = self._opened()
-
-    def begin(self, beginning: Callable[[], bytes]) -> None:
-        """Pass it over: the file has begun."""
-
     def append(self, encoded: bytes) -> None:
         """Append messages."""
-        if encoded:
-            self.open()
-            assert self._file is not None
-            self._file.append(encoded)
+        if self._file is None:
+            self._file = self._opened()
+        self._file.append(encoded)
 
     def close(self) -> None:
         """Write what waits, if that can be done, and close; the next message opens the file again."""
@@ -169,11 +142,6 @@ class MemoryLog(TopicLog):
         self.for_viewers = for_viewers
         self._rows: dict[Topic, bytearray] = {topic: bytearray() for topic in FLIGHT_TOPICS}
         self._messages = bytearray()
-        self._beginning = b""
-
-    def begin(self, beginning: Callable[[], bytes]) -> None:
-        """Note the beginning of a file."""
-        self._beginning = beginning()
 
     def append(self, encoded: bytes) -> None:
         """Append messages."""

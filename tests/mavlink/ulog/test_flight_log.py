@@ -50,7 +50,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_a_file_and_memory_have_the_same_rows(path: Path, tmp_path: Path) -> None:
     memory = MemoryLog()
-    memory.begin(lambda: BEGINNING)
+    memory.begin(BEGINNING)
     fill(memory)
     saved = tmp_path / "saved.ulg"
     saved.write_bytes(b"".join(memory.encoded()))

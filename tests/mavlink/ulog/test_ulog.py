@@ -1,6 +1,6 @@
 """ULog files as PX4's own reader has them: every topic, every field, and whatever is left of one that was cut off."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from math import isnan, nan, pi
 from typing import Any
@@ -52,9 +52,6 @@ class Appended(TopicLog):
     def __init__(self) -> None:
         super().__init__()
         self.content = b""
-
-    def begin(self, beginning: Callable[[], bytes]) -> None:
-        self.content += beginning()
 
     def append(self, encoded: bytes) -> None:
         self.content += encoded
@@ -205,7 +202,7 @@ def test_a_vehicle_of_ground_stations_is_recorded() -> None:
     parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
     recorded = Appended()
     recorder = Recorder(recorded, "Test", 1, parameters, with_battery=True)
-    recorded.begin(recorder.begin)
+    recorded.append(recorder.begin())
     for number in range(300):
         solver = SolverState(status=0, iterations=7, step_time_s=1e-4, active=(1, 2, 3, 4))
         recorder.update(snapshot(8000 * number, failsafe=number >= 200, solver=solver, setpoint=Setpoint()))
