@@ -14,7 +14,6 @@ from colibri.autopilot.control import loop
 from colibri.autopilot.control.interface import Decision, Preview
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
-from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS
 from colibri.campaigns.definition import Point
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.engines.pool import Pool
@@ -73,13 +72,6 @@ def test_only_what_is_asked_for_is_drawn(tmp_path: Path) -> None:
     assert width >= 900
     assert height >= 600
     assert (tmp_path / "flights" / "spiral" / "flight.csv").exists()
-
-
-def test_an_unknown_figure_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["figures", "--only", "5.1", "--out", str(tmp_path)])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == "colibri: error: there is no figure 5.1: choose 4.1 to 4.11 or A.1 to A.24\n"
 
 
 @pytest.mark.long
@@ -221,23 +213,3 @@ def test_a_law_that_cannot_be_built_is_found_first(
     assert ended.value.code == 2
     assert capsys.readouterr().err == "colibri: error: controller geometric-se3 cannot be built: KeyError: 'gain'\n"
     assert not (tmp_path / "out" / "flights").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        (
-            ["--profile", "fast"],
-            'unknown profile "fast" (choose flight, path, se3, thesis, thesis-euler, a .toml file)',
-        ),
-        (["--profile", "thesis:pid"], f'unknown controller "pid" (choose {INSTALLED})'),
-        (["--track", "loop"], f'unknown track "loop" (choose {", ".join([*THESIS_TRACKS, *OPTIONS])})'),
-    ],
-)
-def test_bad_contenders_are_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], line: str
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", *options, "--out", str(tmp_path)])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == f"colibri: error: {line}\n"

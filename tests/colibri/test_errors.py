@@ -124,26 +124,6 @@ def exit_code(*command: str) -> int | str | None:
         return ended.code
 
 
-@pytest.mark.parametrize(
-    ("command", "line"),
-    [
-        (["replay", "nowhere.ulg"], "cannot read nowhere.ulg: No such file or directory"),
-        (["compare", "--profile", "fast"], 'unknown profile "fast" (choose'),
-        (["compare", "--seeds", "1-2", "--track", "loop"], 'unknown track "loop" (choose'),
-        (["sitl", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly" (choose'),
-    ],
-)
-def test_what_cannot_begin_is_one_line_and_exit_code_2(
-    command: list[str], line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert exit_code(*command) == 2
-    said = capsys.readouterr().err
-    assert line in said
-    assert said.startswith("colibri: error: ")
-    assert said.count("\n") == 1
-
-
 def test_a_process_that_cannot_begin_exits_with_2() -> None:
     command = [sys.executable, "-m", "colibri", "autopilot", "--profile", "fast"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -33,44 +33,6 @@ SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCE
 NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
 
 
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
-        (("--home", "0,181,0,0"), "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180"),
-        (("--identity", "ardupilot"), 'argument --identity: unknown value "ardupilot" (choose '),
-        (("--profile", "fast"), 'unknown profile "fast" (choose flight'),
-        (("--vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
-        (("--plant-vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
-        (("--profile", "thesis"), "vehicle hummingbird-thesis has no ground to stand on"),
-        (
-            ("--profile", "thesis", "--feedback", "sensors"),
-            "--feedback sensors: vehicle AscTec Hummingbird (thesis) has",
-        ),
-        (("--gcs", "14550"), "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT"),
-        (("--gcs", "udpin:0.0.0.0:14550"), f"udpin:0.0.0.0:14550 {NOT_BEYOND}"),
-        (("--gcs", "udpout:192.0.2.1:14550"), f"udpout:192.0.2.1:14550 {NOT_BEYOND}"),
-        (("--count", "2", "--gcs", "udpin:127.0.0.1:16210"), "--gcs: several vehicles cannot have one port"),
-        (("--count", "2", "--gcs", "tcpin:127.0.0.1:16210"), "--gcs: several vehicles cannot have one port"),
-        (("--count", "2", "--gcs", "serial:/dev/ttyACM0:57600"), "--gcs: several vehicles cannot have one port"),
-        (("--count", "0"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
-        (("--instance", "100"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
-        (("--instance", "-1"), "argument --instance: must be a whole number of at least 0, not -1"),
-        (("--speed", "0"), "argument --speed: must be a number above 0, or max, not 0"),
-    ],
-)
-def test_bad_input_gets_one_line_and_exit_code_2(
-    capfd: pytest.CaptureFixture[str], options: tuple[str, ...], line: str
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["sitl", "--plant-port", "0", *options])
-    assert ended.value.code == 2
-    said = capfd.readouterr()
-    assert said.out == ""
-    assert said.err.startswith(f"colibri: error: {line}")
-    assert said.err.count("\n") == 1
-
-
 def test_a_plant_port_that_is_taken(capfd: pytest.CaptureFixture[str]) -> None:
     taken = open_link("udpin:127.0.0.1:0")
     with pytest.raises(SystemExit) as ended:

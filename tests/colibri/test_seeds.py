@@ -117,16 +117,6 @@ def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
     assert "off its track" in flight["why"]
 
 
-@pytest.mark.parametrize("seeds", ["5-1", "one", "1-two", ""])
-def test_bad_seeds_are_one_line(seeds: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", f"--seeds={seeds}"])
-    assert ended.value.code == 2
-    said = capsys.readouterr().err
-    assert f"argument --seeds: expected FIRST-LAST, 1-50 say, not {seeds}" in said
-    assert said.count("\n") == 1
-
-
 @pytest.mark.parametrize("estimated", [True, False])
 def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []

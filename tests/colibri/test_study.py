@@ -175,13 +175,6 @@ def test_what_is_lost_says_so(short: Flown) -> None:
     assert {cell for row in rows for cell in row[1:]} == {"lost"}
 
 
-def test_an_unknown_study_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["study", "speed", "flips", "--out", str(tmp_path)])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == f"colibri: error: there is no study flips: choose {', '.join(NAMES)}\n"
-
-
 _LEVEL: Settings = {
     "track": "hover:height=20",
     "start": {"x": 0.0, "y": 0.0, "z": 20.0, "r": 10.0},

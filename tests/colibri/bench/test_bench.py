@@ -128,27 +128,6 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
     assert len(told) == run.parts(["flights"], 2, beside=True)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("--only", "nothing"),
-        ("--runs", "0"),
-        ("--duration", "0"),
-        ("--duration", "0.01"),
-        ("--duration", "1000000"),
-        ("--out", "/nowhere/figures.json"),
-        ("--against", "/nowhere"),
-    ],
-)
-def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["bench", *options])
-    assert ended.value.code == 2
-    said = capsys.readouterr().err
-    assert said.startswith("colibri: error: ")
-    assert said.count("\n") == 1
-
-
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
     blocks = load_profile(run.PROFILE).table("whole-lpv-mpc")["plan"]["blocks"]
     assert tuple(msgspec.convert(blocks, list[int])) == stages.BLOCKS[stages.PROFILE_HORIZON]

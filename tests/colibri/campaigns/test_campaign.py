@@ -11,7 +11,6 @@ from colibri.campaigns.definition import CampaignTables, tables_of
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.flights import Flown
 from colibri.campaigns.run import fly_campaign
-from colibri.cli.main import main
 from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, SHORT, Here, Hovers, begin, planned, rows, tables_in
 
 
@@ -99,38 +98,6 @@ def test_logs_are_kept_and_a_killed_flight_is_a_row(tmp_path: Path) -> None:
     assert not (tmp_path / "out/flights/000001").exists()
     last = tables_in(tmp_path / "out")[0].splitlines()[-1]
     assert ',killed,"the process that flew it was killed, and again when it flew this alone",' in last
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--track", "hover", "--set", "duration"], "expected KEY=VALUES, body.mass_kg=0.6:0.8:5 say, not duration"),
-        (
-            ["--track", "hover", "--set", "latency=1", "--set", "latency=2"],
-            "latency is said twice: give all of its values",
-        ),
-        (["--track", "hover", "--set", "mass=3"], 'unknown factor "mass" '),
-        (["--track", "hover", "--draw", f"{MASS}=uniform:3"], f"{MASS}: uniform: expected [lowest, highest], not [3]"),
-        (["--track", "hover", "--draw", f"{MASS}=gauss:3"], f"{MASS}: expected one of uniform, log-uniform, normal,"),
-        (["--track", "hover", "--metrics", "rmse"], 'unknown metric "rmse" (did you mean "rmse_m"?)'),
-        (["--track", "hover", "--seeds", "3-1"], "seeds: expected 1-20, a seed, or several different ones, not 3-1"),
-        (["--track", "hover", "--workers", "0"], "workers: must be at least 1, not 0"),
-        (["--track", "hover", "--workers", "2", "--dask", "tcp://127.0.0.1:1"], "workers: a cluster has its own"),
-        (["--track", "hover", "--seeds", "1-1000001"], "1000001 flights are many: say --yes if you mean it"),
-        (["--track", "hovr"], "hovr"),
-        (["--profile", "flight"], "no track: say which is flown"),
-        (["there-is-none.toml"], "there-is-none.toml: No such file or directory"),
-    ],
-)
-def test_bad_input_is_refused_in_one_line(
-    options: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["campaign", *options, "--out", str(tmp_path / "out")])
-    assert ended.value.code == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert said in line
-    assert not (tmp_path / "out").exists()
 
 
 def test_unknown_keywords_are_refused() -> None:

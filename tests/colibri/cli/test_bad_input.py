@@ -190,12 +190,6 @@ def test_a_taken_port() -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_an_unknown_option_points_to_the_help_of_its_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["compare", "--tracks", "hover"]) == 2
-    said = "colibri: error: unrecognized arguments: --tracks hover (see colibri compare --help)\n"
-    assert capsys.readouterr().err == said
-
-
 def test_a_flight_shorter_than_a_control_sample_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code(["fly", "hover", "--duration", "0.001", "--link", "memory", "--out", str(tmp_path)]) == 1
     said = "colibri: error: the flight ended before its first control sample: give it a longer --duration\n"

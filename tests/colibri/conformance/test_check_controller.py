@@ -196,25 +196,6 @@ def test_the_command_prints_the_table_and_the_failures(
     assert shlex.split(see)[:3] == ["see", "python", "-c"]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["lpv-mcp"], 'unknown controller "lpv-mcp" (did you mean "lpv-mpc"?)'),
-        (["pid"], 'unknown controller "pid" (choose cascade'),
-        (["lpv-mpc", "--profile", "thesis"], "profile thesis has no numbers for controller lpv-mpc"),
-        (["lpv-mpc", "--profile", "fligt"], 'unknown profile "fligt"'),
-        (["lpv-mpc", "--vehicle", "dragonfly"], 'unknown vehicle "dragonfly"'),
-        (["lpv-mpc", "--only", "memories"], 'unknown area "memories" (did you mean "memory"?)'),
-        (["lpv-mpc", "--duration", "0"], "argument --duration: must be above zero"),
-    ],
-)
-def test_bad_input_is_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["check-controller", *words]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith(f"colibri: error: {said}")
-    assert err.count("\n") == 1
-
-
 def test_a_law_that_cannot_be_built_is_no_verdict() -> None:
     def broken(*_: Any) -> Any:
         raise ZeroDivisionError("by zero")

@@ -215,11 +215,6 @@ def test_bad_input_is_refused_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_file_is_refused_in_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    said = refused(["none.toml", "--out", str(tmp_path / "out")], capfd)
-    assert said == "colibri: error: none.toml: No such file or directory\n"
-
-
 def test_without_optuna_the_extra_is_named(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.cli.main import main
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tools.harness.ports import OnPort
@@ -80,22 +79,3 @@ def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
     flown = states(tmp_path)
     assert report["max_error_m"] > 1.0
     assert abs(flown[-1, 1:4]).max() < 1e-3  # it holds still
-
-
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        (("--link", "memory", "--gcs", "udpin:127.0.0.1:0"), "--gcs needs --link udp: over memory there is no"),
-        (("--gcs", "udpin:0.0.0.0:0"), "udpin:0.0.0.0:0 reaches beyond this computer: give --signing-key FILE"),
-        (("--gcs", "radio:1"), "radio:1: expected udpin:HOST:PORT or udpout:HOST:PORT"),
-    ],
-)
-def test_an_invitation_that_cannot_be_is_one_line(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], options: tuple[str, ...], line: str
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["fly", "spiral", *options, "--quiet", "--out", str(tmp_path)])
-    assert ended.value.code == 2
-    said = capfd.readouterr().err
-    assert said.startswith(f"colibri: error: {line}")
-    assert said.count("\n") == 1

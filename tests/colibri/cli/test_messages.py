@@ -1,0 +1,132 @@
+"""What the commands answer to input that they refuse: one line each, exit code 2, and no folder of a flight."""
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from tests.colibri.cli.commands import exit_code
+
+MESSAGES = [
+    ("bench --only nothing", ""),
+    ("bench --runs 0", ""),
+    ("bench --duration 0", ""),
+    ("bench --duration 0.01", ""),
+    ("bench --duration 1000000", ""),
+    ("bench --out /nowhere/figures.json", ""),
+    ("bench --against /nowhere", ""),
+    (
+        "campaign --track hover --set duration --out out",
+        "expected KEY=VALUES, body.mass_kg=0.6:0.8:5 say, not duration",
+    ),
+    (
+        "campaign --track hover --set latency=1 --set latency=2 --out out",
+        "latency is said twice: give all of its values",
+    ),
+    ("campaign --track hover --set mass=3 --out out", 'unknown factor "mass" '),
+    (
+        "campaign --track hover --draw plant-vehicle.body.mass_kg=uniform:3 --out out",
+        "plant-vehicle.body.mass_kg: uniform: expected [lowest, highest], not [3]",
+    ),
+    (
+        "campaign --track hover --draw plant-vehicle.body.mass_kg=gauss:3 --out out",
+        "plant-vehicle.body.mass_kg: expected one of uniform, log-uniform, normal,",
+    ),
+    ("campaign --track hover --metrics rmse --out out", 'unknown metric "rmse" (did you mean "rmse_m"?)'),
+    (
+        "campaign --track hover --seeds 3-1 --out out",
+        "seeds: expected 1-20, a seed, or several different ones, not 3-1",
+    ),
+    ("campaign --track hover --workers 0 --out out", "workers: must be at least 1, not 0"),
+    ("campaign --track hover --workers 2 --dask tcp://127.0.0.1:1 --out out", "workers: a cluster has its own"),
+    ("campaign --track hover --seeds 1-1000001 --out out", "1000001 flights are many: say --yes if you mean it"),
+    ("campaign --track hovr --out out", "hovr"),
+    ("campaign --profile flight --out out", "no track: say which is flown"),
+    ("campaign there-is-none.toml --out out", "there-is-none.toml: No such file or directory"),
+    ("check-controller lpv-mcp", 'unknown controller "lpv-mcp" (did you mean "lpv-mpc"?)'),
+    ("check-controller pid", 'unknown controller "pid" (choose cascade'),
+    ("check-controller lpv-mpc --profile thesis", "profile thesis has no numbers for controller lpv-mpc"),
+    ("check-controller lpv-mpc --profile fligt", 'unknown profile "fligt"'),
+    ("check-controller lpv-mpc --vehicle dragonfly", 'unknown vehicle "dragonfly"'),
+    ("check-controller lpv-mpc --only memories", 'unknown area "memories" (did you mean "memory"?)'),
+    ("check-controller lpv-mpc --duration 0", "argument --duration: must be above zero"),
+    ("compare --profile fast", 'unknown profile "fast" (choose'),
+    ("compare --seeds 1-2 --track loop", 'unknown track "loop" (choose'),
+    (
+        "compare --profile fast --out out",
+        'unknown profile "fast" (choose flight, path, se3, thesis, thesis-euler, a .toml file)',
+    ),
+    (
+        "compare --profile thesis:pid --out out",
+        'unknown controller "pid" (choose cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc)',
+    ),
+    ("compare --track loop --out out", 'unknown track "loop" (choose spiral'),
+    ("compare --seeds=5-1", "argument --seeds: expected FIRST-LAST, 1-50 say, not 5-1"),
+    ("compare --seeds=one", "argument --seeds: expected FIRST-LAST, 1-50 say, not one"),
+    ("compare --seeds=1-two", "argument --seeds: expected FIRST-LAST, 1-50 say, not 1-two"),
+    ("compare --seeds=", "argument --seeds: expected FIRST-LAST, 1-50 say, not "),
+    ("compare --tracks hover", "unrecognized arguments: --tracks hover (see colibri compare --help)"),
+    ("doctor --gcs nonsense", "nonsense"),
+    ("figures --only 5.1 --out out", "there is no figure 5.1: choose 4.1 to 4.11 or A.1 to A.24"),
+    ("fly spiral --view --link memory", "--view needs --link udp"),
+    (
+        "fly spiral --link memory --gcs udpin:127.0.0.1:0 --quiet --out out",
+        "--gcs needs --link udp: over memory there is no",
+    ),
+    (
+        "fly spiral --gcs udpin:0.0.0.0:0 --quiet --out out",
+        "udpin:0.0.0.0:0 reaches beyond this computer: give --signing-key FILE",
+    ),
+    ("fly spiral --gcs radio:1 --quiet --out out", "radio:1: expected udpin:HOST:PORT or udpout:HOST:PORT"),
+    ("replay nowhere.ulg", "cannot read nowhere.ulg: No such file or directory"),
+    ("sitl --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose'),
+    ("sitl --plant-port 0 --home 47,8", "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
+    (
+        "sitl --plant-port 0 --home 0,181,0,0",
+        "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180",
+    ),
+    ("sitl --plant-port 0 --identity ardupilot", 'argument --identity: unknown value "ardupilot" (choose '),
+    ("sitl --plant-port 0 --profile fast", 'unknown profile "fast" (choose flight'),
+    ("sitl --plant-port 0 --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),
+    ("sitl --plant-port 0 --plant-vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),
+    ("sitl --plant-port 0 --profile thesis", "vehicle hummingbird-thesis has no ground to stand on"),
+    (
+        "sitl --plant-port 0 --profile thesis --feedback sensors",
+        "--feedback sensors: vehicle AscTec Hummingbird (thesis) has",
+    ),
+    ("sitl --plant-port 0 --gcs 14550", "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT"),
+    (
+        "sitl --plant-port 0 --gcs udpin:0.0.0.0:14550",
+        "udpin:0.0.0.0:14550 reaches beyond this computer: give --signing-key FILE, or --insecure",
+    ),
+    (
+        "sitl --plant-port 0 --gcs udpout:192.0.2.1:14550",
+        "udpout:192.0.2.1:14550 reaches beyond this computer: give --signing-key FILE, or --insecure",
+    ),
+    ("sitl --plant-port 0 --count 2 --gcs udpin:127.0.0.1:16210", "--gcs: several vehicles cannot have one port"),
+    ("sitl --plant-port 0 --count 2 --gcs tcpin:127.0.0.1:16210", "--gcs: several vehicles cannot have one port"),
+    ("sitl --plant-port 0 --count 2 --gcs serial:/dev/ttyACM0:57600", "--gcs: several vehicles cannot have one port"),
+    ("sitl --plant-port 0 --count 0", "--instance and --count: at least one vehicle, instances from 0 to 99"),
+    ("sitl --plant-port 0 --instance 100", "--instance and --count: at least one vehicle, instances from 0 to 99"),
+    ("sitl --plant-port 0 --instance -1", "argument --instance: must be a whole number of at least 0, not -1"),
+    ("sitl --plant-port 0 --speed 0", "argument --speed: must be a number above 0, or max, not 0"),
+    ("study speed flips --out out", "there is no study flips: choose "),
+    ("tune none.toml --out out", "none.toml: No such file or directory"),
+    ("view nowhere --no-browser", "no folder of a flight"),
+    ("view udpin:127.0.0.1:0 out/spiral --no-browser", "one link, or folders of flights"),
+    ("view udpin:127.0.0.1 --no-browser", "expected"),
+    ("view udpin:127.0.0.1:0 --export x.html --no-browser", "give their folders"),
+    ("view out --port 70000 --no-browser", "from 0 to 65535"),
+]
+
+
+@pytest.mark.parametrize(("command", "message"), MESSAGES, ids=[command for command, _ in MESSAGES])
+def test_a_refusal_is_one_line(
+    command: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert exit_code(shlex.split(command)) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("colibri: error: ")
+    assert message in line
+    assert command.startswith("compare") or not list(tmp_path.iterdir())
