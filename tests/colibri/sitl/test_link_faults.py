@@ -16,6 +16,7 @@ from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher, one_co
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import Setting
+from colibri.sitl.errors import SitlError
 from colibri.sitl.fleet import Fleet
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
@@ -84,6 +85,14 @@ def test_each_worker_keeps_to_one_core() -> None:
     assert cores_of(0, 0) == [set(cores)] * 2
     if last:
         assert cores_of(0, len(cores) + 1) == [set(cores)] * 2
+
+
+def test_another_process_cannot_be_seen_inside(forked: Launcher) -> None:
+    with (
+        Flights(Setting(airborne=3.0), forked) as flights,
+        pytest.raises(SitlError, match="fly with --sitl-link memory"),
+    ):
+        assert flights.begin().inside
 
 
 @pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
