@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.colibri.cli.commands import exit_code
+from tests.support.commands import exit_code
 
 MESSAGES = [
     ("bench --only nothing", ""),
