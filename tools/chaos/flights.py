@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import cos, hypot, radians
+from math import hypot
 from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.failsafe_table import Action
@@ -22,7 +22,6 @@ _WATCH_S, _LAND_WITHIN_S = 2.5, 30.0
 _NEAR_GROUND_M = 0.15
 _LOST_M = 60.0
 _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
-_EAST_DEGE7_M = 1e7 / (111_320.0 * cos(radians(47.4)))
 
 
 class Verdict(NamedTuple):

@@ -1,6 +1,6 @@
 """The autopilot's process with ground stations: what it refuses to start with, and how it says so."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, SOCK_STREAM, socket
 
@@ -13,8 +13,6 @@ from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
 from colibri.common.spec import from_namespace
 from colibri.mavlink.links.open import open_link
-
-Prepare = Callable[[Path], str]
 
 PARAMETERS = "whole-lpv-mpc-asctec-hummingbird.params"
 

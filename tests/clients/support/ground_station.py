@@ -117,15 +117,6 @@ class GroundStation:
             self.pump(0.02)
         return sight
 
-    def hear_for(self, messages: int) -> list[Message]:
-        """Return the next messages, that many at least."""
-        came: list[Message] = []
-        give_up_s = monotonic() + GIVE_UP_AFTER_S
-        while len(came) < messages:
-            assert monotonic() < give_up_s, f"only {len(came)} messages came"
-            came += self.pump()
-        return came
-
     def command(self, number: int, *values: float, system: int = 1, component: int = 1) -> int:
         """Send COMMAND_LONG, what is not given as NaN; return the result of its acknowledgement."""
         parameters = (*values, *(nan for _ in range(7 - len(values))))

@@ -1,7 +1,7 @@
 """What can be seen of a vehicle: conditions that hold or do not, with words for who reads that they do not."""
 
 from collections.abc import Callable
-from math import degrees, dist, hypot, remainder, tau
+from math import degrees, dist, hypot
 from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Mode
@@ -79,15 +79,6 @@ def tilted_less(deg: float) -> Condition:
 def turns_slower(deg_s: float) -> Condition:
     """It yaws slower than that."""
     return Condition(f"yaw rate below {deg_s:g}°/s", lambda sitl: abs(degrees(sitl.rates[2])) < deg_s)
-
-
-def heads(yaw_deg: float, within_deg: float) -> Condition:
-    """Its nose points so, counter-clockwise from east."""
-
-    def holds(sitl: Sitl) -> bool:
-        return abs(degrees(remainder(sitl.euler[2] - yaw_deg * tau / 360.0, tau))) <= within_deg
-
-    return Condition(f"yaw {yaw_deg:g} ± {within_deg:g}°", holds)
 
 
 def mode(name: Mode) -> Condition:
