@@ -1,7 +1,7 @@
 """Reader of flight logs: the own topics of a ULog, block by block, and its inputs."""
 
 from collections.abc import Iterator
-from mmap import ACCESS_READ, mmap
+from mmap import ACCESS_READ, MADV_DONTNEED, mmap
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,8 @@ FILE = "flight.ulg"
 """In the folder of a flight."""
 ROWS_AT_ONCE = 4096
 _BLOCK_ROWS = 128
+_MAPPED_BYTES = 1 << 23
+"""So much of a file is in memory at once, however long the flight was."""
 _KINDS = frozenset(b"BFIMPASDLCORQ")
 
 
@@ -51,6 +53,7 @@ class FlightFile:
             if sum(map(len, waiting)) >= ROWS_AT_ONCE:
                 yield np.concatenate(waiting)
                 waiting = []
+                self._release()
         if waiting:
             yield np.concatenate(waiting)
 
@@ -72,7 +75,7 @@ class FlightFile:
         log, end = self._log, self._size
         if log[: len(messages.MAGIC)] != messages.MAGIC:
             raise LogFormatError(f"{self._path}: not a ULog")
-        at = messages.HEADER_BYTES
+        at = released = messages.HEADER_BYTES
         while at + messages.HEAD_BYTES <= end:
             head = log[at : at + messages.HEAD_BYTES + 2]
             size = int.from_bytes(head[:2], "little") + messages.HEAD_BYTES
@@ -85,6 +88,9 @@ class FlightFile:
             elif head[2] == messages.FORMAT:
                 self._formats.add(log[at : at + size])
             at += count * size
+            if at - released > _MAPPED_BYTES:
+                self._release()
+                released = at
         for topic in FLIGHT_TOPICS:
             if messages.format_of(topic.name, topic.fields) not in self._formats:
                 raise LogFormatError(f"{self._path}: no log of a flight of this version")
@@ -103,6 +109,11 @@ class FlightFile:
             count = most if same.all() else int(np.argmin(same))
         runs.append((at, count))
         return count
+
+    def _release(self) -> None:
+        """Let the system have the memory of what was read."""
+        if isinstance(self._log, mmap):
+            self._log.madvise(MADV_DONTNEED)
 
     def _next_mark(self, at: int) -> int:
         found = self._log.find(messages.SYNC, at)
