@@ -111,6 +111,12 @@ class Flight:
         return [type(order).__name__ for order in self.orders]
 
 
+def begun(*items: MissionItem, flying: bool = True) -> Flight:
+    flight = Flight(*items, flying=flying)
+    assert flight.mission.start() is None
+    return flight
+
+
 def from_home(flight: Flight) -> Vector:
     x, y, z = (a - b for a, b in zip(flight.position, HOME, strict=True))
     return (x, y, z)

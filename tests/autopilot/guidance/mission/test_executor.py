@@ -21,7 +21,7 @@ from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Return, 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.refusal import Refusal
-from tests.support.mission_flight import HOME, ITEMS, STEP_US, Flight, from_home, item
+from tests.support.mission_flight import HOME, ITEMS, STEP_US, Flight, begun, from_home, item
 
 MINUTE_S = 60.0
 
@@ -54,15 +54,13 @@ def test_a_whole_mission_from_the_ground_and_back() -> None:
 
 
 def test_a_mission_that_begins_with_a_waypoint_takes_off_first() -> None:
-    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 6.0)), item("NAV_WAYPOINT", (9.0, 9.0, 1.0)), flying=False)
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (9.0, 0.0, 6.0)), item("NAV_WAYPOINT", (9.0, 9.0, 1.0)), flying=False)
     flight.fly(MINUTE_S)
     assert flight.kinds() == ["TakeOff", "GoTo", "GoTo"]
     assert isinstance(flight.orders[0], TakeOff)
     assert flight.orders[0].height_enu_m == pytest.approx(HOME[2] + 6.0)
     assert flight.reached == [0, 1]
-    low = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 1.0)), flying=False)
-    low.mission.start()
+    low = begun(item("NAV_WAYPOINT", (9.0, 0.0, 1.0)), flying=False)
     low.step()
     assert isinstance(low.orders[0], TakeOff)
     assert low.orders[0].height_enu_m == pytest.approx(HOME[2] + 2.5)
@@ -71,8 +69,7 @@ def test_a_mission_that_begins_with_a_waypoint_takes_off_first() -> None:
 def test_altitudes_above_sea_and_above_home() -> None:
     heights = []
     for frame, z in ((0, 500.0), (5, 500.0), (3, 12.0), (6, 12.0), (10, 12.0), (11, 12.0)):
-        flight = Flight(item("NAV_WAYPOINT", (5.0, 0.0, z))._replace(frame=frame))
-        flight.mission.start()
+        flight = begun(item("NAV_WAYPOINT", (5.0, 0.0, z))._replace(frame=frame))
         flight.step()
         (order,) = flight.orders
         assert isinstance(order, GoTo)
@@ -81,8 +78,7 @@ def test_altitudes_above_sea_and_above_home() -> None:
 
 
 def test_waypoints_without_hold_are_flown_through() -> None:
-    through = Flight(item("NAV_WAYPOINT", (20.0, 0.0, 5.0), p2=4.0), item("NAV_WAYPOINT", (20.0, 20.0, 5.0)))
-    through.mission.start()
+    through = begun(item("NAV_WAYPOINT", (20.0, 0.0, 5.0), p2=4.0), item("NAV_WAYPOINT", (20.0, 20.0, 5.0)))
     while not through.reached:
         through.step()
     assert dist(from_home(through), (20.0, 0.0, 5.0)) == pytest.approx(4.0, abs=0.2)
@@ -100,8 +96,7 @@ def test_waypoints_without_hold_are_flown_through() -> None:
     ],
 )
 def test_waiting(waits: MissionItem) -> None:
-    flight = Flight(item("NAV_WAYPOINT", (5.0, 0.0, 5.0)), waits, item("NAV_WAYPOINT", (5.0, 5.0, 5.0)))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (5.0, 0.0, 5.0)), waits, item("NAV_WAYPOINT", (5.0, 5.0, 5.0)))
     while 0 not in flight.reached:
         flight.step()
     began_us = flight.now_us
@@ -112,8 +107,7 @@ def test_waiting(waits: MissionItem) -> None:
 
 
 def test_loitering_for_ever() -> None:
-    flight = Flight(item("NAV_LOITER_UNLIM", (5.0, 0.0, 8.0), p4=180.0), item("NAV_LAND"))
-    flight.mission.start()
+    flight = begun(item("NAV_LOITER_UNLIM", (5.0, 0.0, 8.0), p4=180.0), item("NAV_LAND"))
     flight.fly(3600.0)
     assert (flight.mission.progress.seq, flight.mission.progress.state, flight.reached) == (0, ACTIVE, [0])
     assert flight.yaw == pytest.approx(-0.5 * pi)
@@ -124,8 +118,7 @@ def test_loitering_for_ever() -> None:
 
 @pytest.mark.parametrize(("radius", "flown"), [(6.0, 6.0), (-6.0, -6.0), (nan, 10.0), (0.0, 10.0), (-0.25, -1.0)])
 def test_circling(radius: float, flown: float) -> None:
-    flight = Flight(item("NAV_LOITER_TURNS", (20.0, 0.0, 8.0), p1=2.0, p3=radius), item("NAV_RETURN_TO_LAUNCH"))
-    flight.mission.start()
+    flight = begun(item("NAV_LOITER_TURNS", (20.0, 0.0, 8.0), p1=2.0, p3=radius), item("NAV_RETURN_TO_LAUNCH"))
     flight.step()
     (order,) = flight.orders
     assert isinstance(order, Circle)
@@ -140,12 +133,11 @@ def test_circling(radius: float, flown: float) -> None:
 
 def test_a_stale_judgement_ends_nothing() -> None:
     """`arrived` and `turns` of the step in which an order is given are those of the order before."""
-    flight = Flight(
+    flight = begun(
         item("NAV_LOITER_TURNS", (0.0, 0.0, 5.0), p1=1.0, p3=2.0),
         item("NAV_LOITER_TURNS", (50.0, 0.0, 5.0), p1=1.0, p3=2.0),
         item("NAV_WAYPOINT", (90.0, 0.0, 5.0)),
     )
-    flight.mission.start()
     flight.arrived = True
     flight.turns = 7.0
     flight.fly(MINUTE_S)
@@ -154,8 +146,7 @@ def test_a_stale_judgement_ends_nothing() -> None:
 
 
 def test_what_the_navigator_calls_arrived_is_reached() -> None:
-    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 5.0), p2=1e-9))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (9.0, 0.0, 5.0), p2=1e-9))
     flight.fly(MINUTE_S)
     assert flight.reached == [0]
 
@@ -165,8 +156,7 @@ def test_what_the_navigator_calls_arrived_is_reached() -> None:
     [(90.0, 0.0, 0.0, 0.0), (0.0, nan, nan, 0.5 * pi), (45.0, 1.0, 1.0, -0.25 * pi), (45.0, -1.0, 1.0, 0.25 * pi)],
 )
 def test_turning_on_the_spot(p1: float, p3: float, p4: float, yaw: float) -> None:
-    flight = Flight(item("CONDITION_YAW", p1=p1, p3=p3, p4=p4), item("NAV_WAYPOINT", (20.0, 0.0, 5.0)))
-    flight.mission.start()
+    flight = begun(item("CONDITION_YAW", p1=p1, p3=p3, p4=p4), item("NAV_WAYPOINT", (20.0, 0.0, 5.0)))
     while flight.mission.progress.seq == 0:
         flight.step()
     assert flight.yaw == pytest.approx(yaw)
@@ -175,13 +165,12 @@ def test_turning_on_the_spot(p1: float, p3: float, p4: float, yaw: float) -> Non
 
 
 def test_jumps_are_counted() -> None:
-    flight = Flight(
+    flight = begun(
         item("NAV_WAYPOINT", (5.0, 0.0, 5.0)),
         item("NAV_WAYPOINT", (0.0, 0.0, 5.0)),
         item("DO_JUMP", p1=0.0, p2=2.0),
         item("NAV_LAND"),
     )
-    flight.mission.start()
     flight.fly(MINUTE_S)
     assert flight.mission.progress.state == COMPLETE
     assert flight.reached == [0, 1, 2, 0, 1, 2, 0, 1, 2, 3]
@@ -198,8 +187,7 @@ def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
         [item("NAV_DELAY", p1=0.0), item("DO_JUMP", p1=0.0, p2=60000.0)],
         [item("DO_JUMP", p1=1.0, p2=-1.0), item("DO_JUMP", p1=0.0, p2=-1.0)],
     ):
-        flight = Flight(*items)
-        flight.mission.start()
+        flight = begun(*items)
         flight.fly(10.0)
         assert flight.mission.progress.state == ACTIVE
         assert 0 < len(flight.reached) < 15 * len(items)
@@ -209,16 +197,14 @@ def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
 
 
 def test_many_items_that_take_no_time_are_done_soon() -> None:
-    flight = Flight(*[item("IMAGE_START_CAPTURE")] * 900, item("NAV_WAYPOINT", (5.0, 0.0, 5.0)))
-    flight.mission.start()
+    flight = begun(*[item("IMAGE_START_CAPTURE")] * 900, item("NAV_WAYPOINT", (5.0, 0.0, 5.0)))
     while flight.mission.progress.seq < 900:
         flight.step()
     assert flight.now_us < 60 * STEP_US
 
 
 def test_pausing_goes_on_with_the_current_item() -> None:
-    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 5.0)), item("NAV_WAYPOINT", (9.0, 30.0, 5.0)))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (9.0, 0.0, 5.0)), item("NAV_WAYPOINT", (9.0, 30.0, 5.0)))
     while flight.mission.progress.seq == 0:
         flight.step()
     assert flight.mission.pause() == ()
@@ -234,21 +220,18 @@ def test_pausing_goes_on_with_the_current_item() -> None:
 
 def test_an_item_that_another_mode_flies_to_its_end() -> None:
     """Return is a mode of its own: the mission is over when it is handed the vehicle."""
-    flight = Flight(item("NAV_WAYPOINT", (1.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (1.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
     while flight.orders[-1:] != [Return()]:
         flight.step()
     assert flight.mission.pause(item_flown=True) == (Reached(1),)
     assert flight.mission.progress == (1, COMPLETE, 2)
-    early = Flight(item("NAV_WAYPOINT", (50.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
-    early.mission.start()
+    early = begun(item("NAV_WAYPOINT", (50.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
     early.step()
     assert (
         early.mission.pause(item_flown=True) == ()
     )  # who chooses to return while a waypoint is flown has not flown it
     assert early.mission.progress == (0, PAUSED, 2)
-    longer = Flight(item("NAV_RETURN_TO_LAUNCH"), item("NAV_LAND"))
-    longer.mission.start()
+    longer = begun(item("NAV_RETURN_TO_LAUNCH"), item("NAV_LAND"))
     longer.step()
     assert longer.mission.pause(item_flown=True) == (Reached(0),)
     assert longer.mission.progress == (1, PAUSED, 2)
@@ -281,8 +264,7 @@ def test_no_mission() -> None:
 
 
 def test_a_mission_that_is_replaced_in_flight() -> None:
-    flight = Flight(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
     flight.fly(1.0)
     flight.mission.load([item("NAV_WAYPOINT", (0.0, 10.0, 5.0)), item("NAV_WAYPOINT", (0.0, 20.0, 5.0))])
     assert flight.mission.progress == (0, ACTIVE, 1)
@@ -296,14 +278,13 @@ def test_a_mission_that_is_replaced_in_flight() -> None:
 
 
 def test_setting_home() -> None:
-    flight = Flight(item("DO_SET_HOME", p1=1.0), item("DO_SET_HOME", (4.0, 0.0, 0.0)), item("NAV_LAND"))
-    flight.mission.start()
+    flight = begun(item("DO_SET_HOME", p1=1.0), item("DO_SET_HOME", (4.0, 0.0, 0.0)), item("NAV_LAND"))
     flight.step()
     assert flight.homes == [None, pytest.approx((HOME[0] + 4.0, HOME[1], HOME[2]), abs=0.02)]
 
 
 def test_speeds_last_until_they_are_changed() -> None:
-    flight = Flight(
+    flight = begun(
         item("DO_CHANGE_SPEED", p1=1.0, p2=3.0),
         item("NAV_WAYPOINT", (10.0, 0.0, 5.0)),
         item("DO_CHANGE_SPEED", p1=2.0, p2=9.0),
@@ -312,14 +293,12 @@ def test_speeds_last_until_they_are_changed() -> None:
         item("DO_CHANGE_SPEED", p2=-2.0),
         item("NAV_WAYPOINT", (30.0, 0.0, 5.0)),
     )
-    flight.mission.start()
     flight.fly(MINUTE_S)
     assert [order.speed_m_s for order in flight.orders if isinstance(order, GoTo)] == [3.0, 3.0, None]
 
 
 def test_progress_is_one_object_while_nothing_changes() -> None:
-    flight = Flight(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
-    flight.mission.start()
+    flight = begun(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
     flight.step()
     before, order = flight.mission.progress, flight.orders[-1]
     flight.step()
