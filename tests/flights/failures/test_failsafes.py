@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 from math import hypot
-from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.profile import load_profile
 from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import in_mode, latest, refused, restart, stream
 
-PROFILE = Path(__file__).parents[3] / "autopilot" / "profiles" / "flight.toml"
 RETURN, LAND = 2, 3
 EASTWARD: Vector = (1.0, 0.0, 0.0)
 ON_STATION_LOSS = pytest.mark.sitl(airborne=10.0, params={"NAV_DLL_ACT": RETURN, "COM_DL_LOSS_T": 2.0})
@@ -229,11 +229,11 @@ def test_missed_frames_lead_to_what_is_set(sitl: Sitl) -> None:
     assert sitl.said("telemetry missed: cleared")
 
 
-def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[Sitl]], tmp_path: Path) -> None:
-    before, table, after = PROFILE.read_text().partition("[controllers.lpv-mpc.qp]")
-    hopeless = tmp_path / "hopeless.toml"
-    hopeless.write_text(before + table + after.replace("max_iterations = 500", "max_iterations = 1", 1))
-    (sitl,) = sitl_fleet(1, airborne=20.0, profile=str(hopeless), controller="lpv-mpc")
+def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[Sitl]]) -> None:
+    flight = load_profile("flight")
+    law = flight.table("lpv-mpc")
+    hopeless = {**flight.controllers, "lpv-mpc": {**law, "qp": {**law["qp"], "max_iterations": 1}}}
+    (sitl,) = sitl_fleet(1, airborne=20.0, profile=replace(flight, controller="lpv-mpc", controllers=hopeless))
     sitl.select(Mode.TRACK)
     assert sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=1.0) == pytest.approx(0.5, abs=0.05)
     sitl.step()
