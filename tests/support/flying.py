@@ -6,8 +6,10 @@ from math import nan
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.process.state_folder import StateFolder
 from colibri.common.earth.geodesy import geodetic_of
@@ -22,6 +24,9 @@ UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 SYSTEM, COMPONENT = 1, 1
 RELATIVE: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 EVERY_S = 0.1
+_FLIGHT = load_profile("flight")
+QUICK = pytest.mark.sitl(profile=replace(_FLIGHT, simulation=replace(_FLIGHT.simulation, frame_interval_s=None)))
+"""Flown with a frame for each control sample and none between: a fifth less to compute."""
 
 
 def refused(sitl: Sitl, reason: str, order: Callable[..., object], *args: Any, **options: Any) -> None:

@@ -12,7 +12,9 @@ from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import in_mode, latest, refused, restart, stream
+from tests.support.flying import QUICK, in_mode, latest, refused, restart, stream
+
+pytestmark = QUICK
 
 RETURN, LAND = 2, 3
 EASTWARD: Vector = (1.0, 0.0, 0.0)
@@ -157,7 +159,7 @@ def test_a_low_voltage_counts_as_a_low_charge(sitl: Sitl) -> None:
 @pytest.mark.sitl(airborne=3.0)
 def test_by_default_an_empty_battery_is_only_reported(sitl: Sitl) -> None:
     drain(sitl, 0.97)
-    sitl.run(1.7)
+    sitl.run(3.0)
     assert sitl.mode is Mode.HOLD
     assert sitl.said("battery nearly empty")
 
@@ -221,7 +223,7 @@ def test_missed_frames_lead_to_what_is_set(sitl: Sitl) -> None:
     assert sitl.position == pytest.approx((0.0, 0.0, 5.0), abs=0.2)
     sitl.select(Mode.RETURN)
     sitl.run(0.5)
-    sitl.inside.skip(50)
+    sitl.inside.skip(25)
     sitl.run(0.1)
     assert sitl.said("telemetry missed: return goes on")
     sitl.select(Mode.HOLD)
@@ -243,8 +245,7 @@ def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[S
 @pytest.mark.sitl(airborne=8.0, params={"COM_LOW_BAT_ACT": 2, "BAT_LOW_T": 0.1})
 def test_a_failsafe_outlives_the_autopilot(sitl: Sitl) -> None:
     drain(sitl, 0.95)
-    sitl.run(1.0)
-    assert sitl.mode is Mode.LAND
+    sitl.wait_until(lambda: sitl.mode is Mode.LAND, within=2.0)
     restart(sitl)
     sitl.run(1.5)
     assert sitl.mode is Mode.LAND

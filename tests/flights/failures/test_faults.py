@@ -10,7 +10,9 @@ from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, DENIED, UNSUPPORTED, restart
+from tests.support.flying import ACCEPTED, DENIED, QUICK, UNSUPPORTED, restart
+
+pytestmark = QUICK
 
 INJECT = mav.MAV_CMD_INJECT_FAILURE
 NOMINAL_KG, PAYLOAD_KG = 0.698, 0.15
@@ -106,7 +108,7 @@ def test_a_payload_is_estimated_and_kept_over_a_restart(sitl: Sitl) -> None:
     assert learned_kg == pytest.approx(NOMINAL_KG + PAYLOAD_KG, rel=0.03)
     told = {message.name: message.value for message in sitl.heard("NAMED_VALUE_FLOAT")}
     assert told["mass_kg"] == pytest.approx(learned_kg, rel=0.01)
-    sitl.inside.skip(60)
+    sitl.inside.skip(30)
     restart(sitl)
     sitl.run(0.02)
     assert mass_kg(sitl) == pytest.approx(learned_kg, rel=0.01)
@@ -125,7 +127,7 @@ def test_the_ground_is_no_payload(sitl: Sitl) -> None:
     ground = sitl.inside.copter.pilot.ground
     sitl.wait_until(lambda: flown_kg.append(mass_kg(sitl)) or ground.standing, within=10.0)  # type: ignore[func-returns-value]
     assert flown_kg[1] > 1.08 * NOMINAL_KG > flown_kg[-2] > NOMINAL_KG
-    assert flown_kg[-2] == flown_kg[-120]
+    assert flown_kg[-2] == flown_kg[-60]
     sitl.run(0.05)
     sitl.takeoff(1.5)
     sitl.run(1.0)

@@ -15,8 +15,10 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import FORCE, Sitl
-from tests.support.flying import ACCEPTED, DENIED, refused, restart
+from tests.support.flying import ACCEPTED, DENIED, QUICK, refused, restart
 from tools.chaos.places import Thrower
+
+pytestmark = QUICK
 
 REPLACED = pytest.mark.sitl(airborne=5.0, strict=False)
 

@@ -11,7 +11,9 @@ from colibri.autopilot.core.checkpoint import FOLLOWS_US, History
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, EVERY_KIND, in_mode, orbit, reached, restart
+from tests.support.flying import ACCEPTED, EVERY_KIND, QUICK, in_mode, orbit, reached, restart
+
+pytestmark = QUICK
 
 HOLDING = State(Mode.HOLD, armed=True)
 IN_THE_AIR = pytest.mark.sitl(airborne=3.0)
@@ -88,7 +90,7 @@ def test_every_mode_goes_on(sitl_fleet: Callable[..., list[Sitl]], mode: Mode) -
     assert np.linalg.norm(sitl.path - wanted.path, axis=1).max() < 0.01
 
 
-@pytest.mark.parametrize("missed", [60, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("missed", [30, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("feedback", ["state", "sensors"])
 def test_a_restart_is_not_felt_in_hover_and_in_a_turn(
     sitl_fleet: Callable[..., list[Sitl]], feedback: str, missed: int
@@ -143,7 +145,7 @@ def test_a_caught_vehicle_goes_on_with_its_mission(sitl: Sitl) -> None:
     assert sitl.is_at((0.0, 5.0, 12.0), 3.0, slow_m_s=1.0)
 
 
-@IN_THE_AIR
+@pytest.mark.sitl(airborne=3.0, profile="flight")
 def test_between_control_samples_rotors_keep_their_speed(sitl: Sitl) -> None:
     sitl.run(1.0)
     for _ in range(2):

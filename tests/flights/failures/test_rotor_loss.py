@@ -10,7 +10,9 @@ from colibri.autopilot.control.rotor_loss.detector import RotorWatch
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.flight_record import tilt_deg
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import refused, restart
+from tests.support.flying import QUICK, refused, restart
+
+pytestmark = QUICK
 
 NEXT_TO_NONE = 0.001
 """Part of the thrust that is left of a rotor without its blades: it is gone at once, which is the worst that can be."""

@@ -16,7 +16,9 @@ from colibri.mavlink.hil.sensors import Frame, SensorFrame, Updated
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import COMPONENT, DENIED, SYSTEM, refused
+from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
+
+pytestmark = QUICK
 
 ON_SENSORS = pytest.mark.sitl(feedback="sensors", seed=3)
 OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"

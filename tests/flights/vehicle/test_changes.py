@@ -12,7 +12,9 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world, state_frame
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, DENIED, SYSTEM, refused
+from tests.support.flying import ACCEPTED, COMPONENT, DENIED, QUICK, SYSTEM, refused
+
+pytestmark = QUICK
 
 INJECT, RESTART = mav.MAV_CMD_INJECT_FAILURE, mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 STORAGE, CALIBRATE = mav.MAV_CMD_PREFLIGHT_STORAGE, mav.MAV_CMD_PREFLIGHT_CALIBRATION

@@ -10,7 +10,9 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import FORCE, Sitl
-from tests.support.flying import ACCEPTED, DENIED, in_mode, refused, restart
+from tests.support.flying import ACCEPTED, DENIED, QUICK, in_mode, refused, restart
+
+pytestmark = QUICK
 
 ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
 TAKEOFF = mav.MAV_CMD_NAV_TAKEOFF

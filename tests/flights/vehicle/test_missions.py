@@ -12,9 +12,9 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, DENIED, EVERY_KIND, SYSTEM, in_mode, reached, refused
+from tests.support.flying import ACCEPTED, COMPONENT, DENIED, EVERY_KIND, QUICK, SYSTEM, in_mode, reached, refused
 
-pytestmark = pytest.mark.sitl(airborne=3.0)
+pytestmark = [QUICK, pytest.mark.sitl(airborne=3.0)]
 ACTIVE, PAUSED, COMPLETE = mav.MISSION_STATE_ACTIVE, mav.MISSION_STATE_PAUSED, mav.MISSION_STATE_COMPLETE
 PAUSE = mav.MAV_CMD_DO_PAUSE_CONTINUE
 

@@ -15,6 +15,7 @@ from tests.support.flying import (
     ACCEPTED,
     COMPONENT,
     DENIED,
+    QUICK,
     RELATIVE,
     SYSTEM,
     UNSUPPORTED,
@@ -24,7 +25,7 @@ from tests.support.flying import (
     refused,
 )
 
-pytestmark = pytest.mark.sitl(airborne=5.0)
+pytestmark = [QUICK, pytest.mark.sitl(airborne=5.0)]
 CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 

@@ -12,8 +12,10 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import latest, refused, restart
+from tests.support.flying import QUICK, latest, refused, restart
 from tools.chaos.places import Thrower
+
+pytestmark = QUICK
 
 LATENCY_MS = 20.0
 TOO_FAST = "lemniscate:lap=3,height=20"
@@ -109,7 +111,7 @@ def test_a_rangefinder_keeps_the_height_through_its_faults(sitl_fleet: Callable[
         sitl.inject("distance_sensor", "ok")
         sitl.run(1.0)
         assert not source.estimate.health.not_accepted
-    sitl.land()
+    sitl.land(within=30.0)
     assert abs(sitl.position[2]) < 0.01
 
 

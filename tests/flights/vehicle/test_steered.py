@@ -14,9 +14,9 @@ from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, EVERY_S, SYSTEM, in_mode, refused, stream
+from tests.support.flying import ACCEPTED, COMPONENT, EVERY_S, QUICK, SYSTEM, in_mode, refused, stream
 
-pytestmark = pytest.mark.sitl(airborne=5.0)
+pytestmark = [QUICK, pytest.mark.sitl(airborne=5.0)]
 HERE: Vector = (0.0, 0.0, 5.0)
 STILL: Vector = (0.0, 0.0, 0.0)
 REDUCED_TILT = {"MPC_MAN_TILT_MAX": 20.0}

@@ -6,8 +6,11 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl.vehicle import Sitl
+from tests.support.flying import QUICK
 from tools.harness.stations import Station
 from tools.soak.clients import crew, faults
+
+pytestmark = QUICK
 
 LASTS_S = 20.0
 WARM_S = 8.0
