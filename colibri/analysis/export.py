@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
+from colibri.analysis.logs import csv_rows
 from colibri.common.errors import Error
 from colibri.mavlink.ulog.flight_topics import FILTER, FLIGHT_TOPICS
 from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
@@ -91,10 +92,10 @@ def write_flight_tables(path: Path, folder: Path) -> bool:
         if first is None:
             continue
         known = ~np.isnan(first).all(axis=0) if topic is FILTER else np.ones(len(topic.names), np.bool_)
-        with _table(folder, topic.table).open("w", encoding="utf-8") as file:
-            file.write(",".join(np.array(topic.names)[known]) + "\n")
+        with _table(folder, topic.table).open("wb") as file:
+            file.write((",".join(np.array(topic.names)[known]) + "\n").encode())
             for block in chain([first], blocks):
-                file.writelines(",".join(map(repr, row)) + "\n" for row in block[:, known].tolist())
+                file.write(csv_rows(block[:, known]))
     return True
 
 

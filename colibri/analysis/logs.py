@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +14,7 @@ from colibri.mavlink.ulog.log import TopicReader
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 _AT_ONCE = 4096
+_NUMBERS = msgspec.json.Encoder()
 
 
 class RecordingError(InFlightError):
@@ -67,6 +69,17 @@ def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
         at = np.searchsorted(instants_us[:-1], times_us)
         found[first : first + _AT_ONCE] = instants_us[at] == times_us
     return found
+
+
+def csv_rows(table: Array) -> bytes:
+    """Return rows as lines of CSV, numbers with every bit.
+
+    JSON has the same numbers in a fraction of the time that `repr` takes, but for those that are not finite.
+    """
+    rows = table.tolist()
+    if np.isfinite(table).all():
+        return _NUMBERS.encode(rows)[2:-2].replace(b"],[", b"\n") + b"\n"
+    return "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
 
 
 class Rows:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from io import StringIO
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -116,7 +116,7 @@ def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | Non
     with suppress(RecordingError, LogFormatError, OSError):
         if why is not None:
             return _write_outcome(plan, None, why)
-        with (plan.out / TABLE).open("w", encoding="utf-8") as file:
+        with (plan.out / TABLE).open("wb") as file:
             read_flight(FlightReader(plan), TableWriter(file).add)
     return None
 
@@ -126,18 +126,18 @@ def files_of(plan: FlightPlan, report: Report | None, log: TopicReader) -> Itera
     yield PROVENANCE, encoded_provenance(plan)
     yield FILE, b"".join(log.encoded())
     if report is not None:
-        table = StringIO()
+        table = BytesIO()
         writer = TableWriter(table)
         for part in FlightReader(plan, log):
             writer.add(part)
-        yield TABLE, table.getvalue().encode()
+        yield TABLE, table.getvalue()
         yield REPORT, encoded_report(report)
 
 
 def _write_outcome(
     plan: FlightPlan, summary: Summary | None, failure: str | None, *others: Callable[[Samples], None]
 ) -> Report:
-    with (plan.out / TABLE).open("w", encoding="utf-8") as file:
+    with (plan.out / TABLE).open("wb") as file:
         found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file).add, *others)
     (plan.out / REPORT).write_bytes(encoded_report(found))
     return found

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from hashlib import sha256
 from math import isnan
-from typing import NamedTuple, TextIO
+from typing import IO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.analysis.logs import RecordingError, Rows, at_times, log_of, read_blocks, read_series
+from colibri.analysis.logs import RecordingError, Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array
@@ -207,14 +207,14 @@ def path_times(times_s: Array, lags: Lags) -> Array:
 class TableWriter:
     """Writes the table of a flight as CSV, part by part; numbers keep every bit."""
 
-    def __init__(self, file: TextIO) -> None:
+    def __init__(self, file: IO[bytes]) -> None:
         """Write the names of the columns."""
         self._file = file
-        file.write(",".join(COLUMNS) + "\n")
+        file.write((",".join(COLUMNS) + "\n").encode())
 
     def add(self, part: Samples) -> None:
         """Append the rows of a part."""
-        self._file.writelines(",".join(map(repr, row)) + "\n" for row in part.table.tolist())
+        self._file.write(csv_rows(part.table))
 
 
 def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from colibri.analysis.estimation import read_estimation, rms
-from colibri.analysis.logs import Rows, at_times, log_of, read_blocks, read_series
+from colibri.analysis.logs import Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.recording import COLUMNS, FlightReader, Recording, read_recording
 from colibri.analysis.series import figure_series
@@ -127,9 +129,18 @@ def test_the_report_is_that_of_the_whole_table(plan: FlightPlan, monkeypatch: py
     counts = np.count_nonzero(recording.active, axis=0).tolist()
     assert list(report["constrained_samples"].values()) == counts
     assert sum(report["qp_status"].values()) == len(recording.slack)
-    text = (plan.out / "flight.csv").read_text(encoding="utf-8")
-    rows = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in recording.table.tolist())]
-    assert text == "\n".join(rows) + "\n"
+    names, *rows = (plan.out / "flight.csv").read_text(encoding="utf-8").splitlines()
+    assert names == ",".join(COLUMNS)
+    assert np.array([row.split(",") for row in rows]).astype(float).tobytes() == recording.table.tobytes()
+
+
+@given(rows=st.lists(st.lists(st.floats(), min_size=3, max_size=3), min_size=1, max_size=5))
+def test_a_table_keeps_every_bit(rows: list[list[float]]) -> None:
+    *lines, end = csv_rows(np.array(rows)).decode().split("\n")
+    assert not end
+    read = [[float(value) for value in line.split(",")] for line in lines]
+    assert np.array_equal(np.array(read), np.array(rows), equal_nan=True)
+    assert np.array_equal(np.signbit(read), np.signbit(rows) & ~np.isnan(rows))
 
 
 def test_estimation_does_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
