@@ -7,7 +7,7 @@ from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail
 from colibri.common.spec import add_options as add_spec
 from colibri.common.spec import from_namespace
-from colibri.flights.fleet import FleetSpec, ground_links, sitl
+from colibri.flights.fleet_spec import FleetSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -21,7 +21,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Serve ground stations as the command line says; return the exit code."""
+    from colibri.flights.fleet import sitl
+
     if args.view and args.count > 1:
         fail("--view shows one vehicle: leave --count out")
-    with viewed(args, ground_links(from_namespace(FleetSpec, args), args.instance)):
+    with viewed(args, from_namespace(FleetSpec, args).links(args.instance)):
         return sitl(from_namespace(FleetSpec, args), quiet=args.quiet)

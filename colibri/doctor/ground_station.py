@@ -5,7 +5,7 @@ from time import perf_counter
 
 from colibri.common.types import Address
 from colibri.doctor.finding import Finding, Verdict
-from colibri.flights.fleet import GROUND_PORT
+from colibri.flights.fleet_spec import GROUND_PORT
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.wire.dialect import Codec, mav
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 
 from colibri.doctor.finding import Finding, Verdict
-from colibri.flights.fleet import GROUND_PORT, PLANT_PORT, SDK_PORT
+from colibri.flights.fleet_spec import GROUND_PORT, PLANT_PORT, SDK_PORT
 
 HOST = "127.0.0.1"
 WITHIN_S = 1.0

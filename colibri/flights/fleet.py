@@ -3,24 +3,21 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import inf
-from pathlib import Path
 from time import perf_counter, time
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.spec import AutopilotSpec, GroundSpec, name_of
+from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.earth.geodesy import geodetic_of
-from colibri.common.earth.home import DEFAULT_HOME, HomePlace
-from colibri.common.earth.home import home as read_home
+from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.common.process.log_files import set_aside
-from colibri.common.spec import Option, part_of
+from colibri.common.spec import part_of
+from colibri.flights.fleet_spec import PLANT_PORT, FleetSpec
 from colibri.flights.fleet_status import StatusLines
 from colibri.flights.folder import LOGS, occupied, prepare
 from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
-from colibri.flights.spec import VehiclesSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
@@ -28,45 +25,9 @@ from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
 
-PLANT_PORT = 14560
-GROUND_PORT = 14550
-SDK_PORT = 14540
 MAX_FLEET = 100
 _MAX_DEATHS, _LOOP_S = 3, 60.0
 """A vehicle whose processes die more often than that in that time is not started again."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FleetSpec(VehiclesSpec, GroundSpec):
-    """Vehicles that ground stations connect to."""
-
-    instance: Annotated[int, Option("number of the (first) vehicle: its system id is N + 1", "N", least=0)] = 0
-    count: Annotated[int, Option("how many vehicles", "N", least=0)] = 1
-    home: Annotated[
-        HomePlace,
-        Option("where they stand, degrees and m, yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
-    ] = DEFAULT_HOME
-    spacing: Annotated[
-        float, Option("how far each vehicle of a fleet stands east of the one before", "M", "m", least=0.0)
-    ] = 3.0
-    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
-    state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
-    out: Annotated[
-        Path | None,
-        Option("record in DIR/N what `colibri replay` flies again: both processes' logs (default: not)", "DIR"),
-    ] = None
-    plant_port: Annotated[
-        int | None, Option("the plant's (default: 14560 + N; 0: any that is free)", "PORT", least=0, most=65535)
-    ] = None
-    speed: Annotated[float, Option("times real time, or max", "N", above=0.0, endless=True)] = 1.0
-    duration: Annotated[
-        float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
-    ] = inf
-    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
-
-    def folder(self, instance: int) -> Path | None:
-        """Return the folder of a vehicle's logs; None where none are written."""
-        return None if self.out is None else self.out / str(instance)
 
 
 @dataclass(slots=True, eq=False)
@@ -97,18 +58,11 @@ class Member:
         return self.instance + 1
 
 
-def ground_links(spec: FleetSpec, instance: int) -> list[str]:
-    """Return the URLs that instance `instance` serves: those of the options, or the two that clients listen on."""
-    if spec.gcs:
-        return list(spec.gcs)
-    return [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
-
-
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
     """Fly vehicles until interrupted; return the exit code."""
     _check(spec)
     instances = range(spec.instance, spec.instance + spec.count)
-    fleet = [Member(it, number * spec.spacing, ground_links(spec, it)) for number, it in enumerate(instances)]
+    fleet = [Member(it, number * spec.spacing, spec.links(it)) for number, it in enumerate(instances)]
     with ExitStack() as held:
         for folder in filter(None, map(spec.folder, instances)):
             held.enter_context(occupied(folder))
@@ -132,7 +86,7 @@ def _check(spec: FleetSpec) -> None:
         profile, assumed = spec.load()
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
         vehicle = (load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed).without(spec.without)
-        check_reach(ground_links(spec, spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
+        check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
     except Error as error:
         fail(str(error))
     if spec.feedback is Feedback.SENSORS and (vehicle.sensors is None or assumed.sensors is None):

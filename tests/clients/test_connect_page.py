@@ -12,7 +12,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.earth.home import DEFAULT_HOME
-from colibri.flights.fleet import GROUND_PORT, SDK_PORT
+from colibri.flights.fleet_spec import GROUND_PORT, SDK_PORT
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.sitl_process import Vehicle, vehicle
 

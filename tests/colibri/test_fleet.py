@@ -17,7 +17,8 @@ from colibri.autopilot.spec import AutopilotSpec
 from colibri.cli.main import main
 from colibri.common.earth.geodesy import enu_of
 from colibri.common.earth.home import DEFAULT_HOME
-from colibri.flights.fleet import FleetSpec, Member, ground_links, place_of, start_again
+from colibri.flights.fleet import Member, place_of, start_again
+from colibri.flights.fleet_spec import FleetSpec
 from colibri.flights.fleet_status import StatusLines, status_table
 from colibri.flights.launcher import Child, end_children
 from colibri.flights.replay import replay_flight
@@ -58,8 +59,8 @@ def test_what_only_the_autopilot_can_refuse(tmp_path: Path) -> None:
 
 def test_each_instance_has_its_own_port_for_sdks() -> None:
     asked = FleetSpec()
-    assert ground_links(asked, 0) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14540"]
-    assert ground_links(asked, 2) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14542"]
+    assert asked.links(0) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14540"]
+    assert asked.links(2) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14542"]
 
 
 def test_who_only_starts_vehicles_does_not_load_what_flies() -> None:

@@ -12,7 +12,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.spec import Option, SpecError, add_options, from_json, from_namespace, from_values, part_of, to_json
-from colibri.flights.fleet import FleetSpec
+from colibri.flights.fleet_spec import FleetSpec
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import Gust, RecordedWind, Wind

@@ -12,7 +12,7 @@ from colibri.common.machine_code.on_disk import MachineCode
 from colibri.doctor import examine, flying, network, packages
 from colibri.doctor.finding import Finding, Verdict
 from colibri.doctor.ground_station import called, ground_station
-from colibri.flights.fleet import PLANT_PORT
+from colibri.flights.fleet_spec import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav
 from tests.support.commands import exit_code

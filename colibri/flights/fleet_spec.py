@@ -1,0 +1,53 @@
+"""Vehicles that ground stations connect to: the options of `colibri sitl`."""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Literal
+
+from colibri.autopilot.spec import GroundSpec
+from colibri.common.earth.home import DEFAULT_HOME, HomePlace
+from colibri.common.earth.home import home as read_home
+from colibri.common.spec import Option
+from colibri.flights.spec import VehiclesSpec
+
+PLANT_PORT = 14560
+GROUND_PORT = 14550
+SDK_PORT = 14540
+
+
+@dataclass(frozen=True, kw_only=True)
+class FleetSpec(VehiclesSpec, GroundSpec):
+    """Vehicles that ground stations connect to."""
+
+    instance: Annotated[int, Option("number of the (first) vehicle: its system id is N + 1", "N", least=0)] = 0
+    count: Annotated[int, Option("how many vehicles", "N", least=0)] = 1
+    home: Annotated[
+        HomePlace,
+        Option("where they stand, degrees and m, yaw clockwise from north", "LAT,LON,ALT,YAW", read=read_home),
+    ] = DEFAULT_HOME
+    spacing: Annotated[
+        float, Option("how far each vehicle of a fleet stands east of the one before", "M", "m", least=0.0)
+    ] = 3.0
+    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
+    out: Annotated[
+        Path | None,
+        Option("record in DIR/N what `colibri replay` flies again: both processes' logs (default: not)", "DIR"),
+    ] = None
+    plant_port: Annotated[
+        int | None, Option("the plant's (default: 14560 + N; 0: any that is free)", "PORT", least=0, most=65535)
+    ] = None
+    speed: Annotated[float, Option("times real time, or max", "N", above=0.0, endless=True)] = 1.0
+    duration: Annotated[
+        float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
+    ] = inf
+    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
+
+    def folder(self, instance: int) -> Path | None:
+        """Return the folder of a vehicle's logs; None where none are written."""
+        return None if self.out is None else self.out / str(instance)
+
+    def links(self, instance: int) -> list[str]:
+        """Return the URLs that a vehicle serves: those of the options, or the two that clients listen on."""
+        return list(self.gcs) or [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
