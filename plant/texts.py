@@ -2,20 +2,12 @@
 
 from argparse import ArgumentTypeError
 from itertools import pairwise
-from math import isfinite
 from pathlib import Path
 
 from colibri.common.errors import unknown
+from colibri.common.process.arguments import number
 from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
-
-
-def number(text: str) -> float:
-    """Read a finite number."""
-    value = float(text)
-    if not isfinite(value):
-        raise ValueError
-    return value
 
 
 def start_values(text: str) -> dict[str, float]:

@@ -3,12 +3,10 @@
 import argparse
 import re
 from argparse import ArgumentTypeError
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, NoReturn
 
 from colibri.common.process.lifecycle import fail
-
-LAST_SYSTEM_ID = 255
 
 
 class ArgumentParser(argparse.ArgumentParser):
@@ -40,33 +38,12 @@ def positive(text: str) -> float:
     return value
 
 
-def not_negative(text: str) -> float:
-    """Read a number from 0 on of the command line."""
-    value = number(text)
-    if value < 0.0:
-        raise ArgumentTypeError(f"must not be below zero, not {text}")
-    return value
-
-
 def natural(text: str) -> int:
     """Read a whole number from 0 on of the command line."""
     value = int(text)
     if value < 0:
         raise ArgumentTypeError(f"must not be below zero, not {text}")
     return value
-
-
-def system_id(text: str) -> int:
-    """Read a MAVLink system id of the command line."""
-    value = int(text)
-    if not 1 <= value <= LAST_SYSTEM_ID:
-        raise ArgumentTypeError(f"must be from 1 to {LAST_SYSTEM_ID}, not {text}")
-    return value
-
-
-def speed(text: str) -> float:
-    """Read how many times real time to fly: a number above zero, or `max`."""
-    return inf if text == "max" else positive(text)
 
 
 def seeds(text: str) -> range:

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TypeVar
 
 from colibri.common.process.arguments import natural
-from colibri.mavlink.hil.feedback import Feedback, feedback
+from colibri.mavlink.hil.feedback import Feedback
 from tools.kills import autopilots, plants
 from tools.kills.between import HangsError
 
@@ -28,7 +28,7 @@ def main() -> int:
     parser.add_argument("--of", choices=("autopilot", "plant"), default="autopilot", help="who dies")
     parser.add_argument("--kills", type=natural, default=200)
     parser.add_argument("--seed", type=natural, default=1)
-    parser.add_argument("--feedback", type=feedback, default=Feedback.STATE, metavar="state|sensors")
+    parser.add_argument("--feedback", type=Feedback, default=Feedback.STATE, metavar="state|sensors")
     args = parser.parse_args()
     started_s = perf_counter()
     run = _autopilots if args.of == "autopilot" else _plants
