@@ -17,6 +17,8 @@ from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 from colibri.plant.vehicle.description import load_vehicle
+from tools.pages.failsafes import tables
+from tools.pages.tables import with_tables
 
 PAGE = Path(__file__).parents[4] / "docs" / "failsafes.md"
 SECOND_US = 1_000_000
@@ -198,6 +200,7 @@ def test_rows_say_what_they_add_to_a_warning() -> None:
     assert begun({Condition.BATTERY_LOW: Action.WARN}).lines == ((WARNING, "battery low"),)
 
 
-def test_the_page_names_the_time_to_clear() -> None:
+def test_the_page_is_current() -> None:
     page = PAGE.read_text(encoding="utf-8")
+    assert page == with_tables(page, tables())
     assert f"cleared` once the condition has not held for {CLEAR_AFTER_US * 1e-6:g} s" in page
