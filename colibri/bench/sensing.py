@@ -11,8 +11,8 @@ from colibri.bench.speed import Report, Samples, real_time_factor, summarised
 from colibri.bench.stages import summary
 from colibri.bench.variants import plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.flights.flight import SYSTEM_ID
 from colibri.flights.fly import fly_plan
-from colibri.flights.in_process import SYSTEM_ID
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.sensors import SensorFrame

@@ -1,23 +1,28 @@
 """What ground stations cost: the time to serve them after a frame, and what is left of it in the control step."""
 
 import socket
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+from unittest.mock import patch
 
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.copter import copter_autopilot
+from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.bench.speed import Report
 from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
+from colibri.flights.flight import Direct, Flight
 from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError, fly_processes
+from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.rates import GCS, SDK
 from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
@@ -60,13 +65,18 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     plant = PlantBuilder(plan.spec, plan.plant_vehicle, {plan.spec.feedback: nudged(plan.start)}).build(
         plan.spec.feedback, autopilot.frame_interval_us
     )
-    times_us = []
-    with gc_frozen():
-        while plant.world.time_us < plan.spec.duration * 1e6:
-            plant.answer(autopilot.step(*plant.measure()).command)
-            began_s = perf_counter()
-            autopilot.serve()
-            times_us.append((perf_counter() - began_s) * 1e6)
+    times_us: list[float] = []
+    serve = autopilot.serve
+
+    def timed(inbox: Iterable[Received] = ()) -> list[Outgoing]:
+        began_s = perf_counter()
+        outbox = serve(inbox)
+        times_us.append((perf_counter() - began_s) * 1e6)
+        return outbox
+
+    with gc_frozen(), patch.object(autopilot, "serve", timed):
+        for _ in Flight(plant, autopilot, Direct()).samples(plan.spec.duration):
+            pass
     sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)
     return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.spec.duration}
 

@@ -14,7 +14,8 @@ from colibri.autopilot.control.registry import DecisionError, check_answer, in_w
 from colibri.common.errors import Error, InFlightError
 from colibri.common.types import Array
 from colibri.conformance.subject import Subject
-from colibri.flights.in_process import Direct, put_together
+from colibri.flights.flight import Direct, Flight
+from colibri.flights.in_process import put_together
 from colibri.plant.vehicle.description import Vehicle
 
 _STEPS = ("step", "step_on_path", "step_attitude")
@@ -131,11 +132,9 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
         raise
     except Exception as error:  # of its warm_up
         return Flown([], in_words(error), error)
-    exchange = Direct(autopilot)
     try:
-        while plant.world.time_us + plant.interval_us <= plan.spec.duration * 1e6:
-            _, command, _ = exchange(plant)
-            plant.answer(command)
+        for _ in Flight(plant, autopilot, Direct()).samples(plan.spec.duration):
+            pass
     except DecisionError as error:
         return Flown(recorders[0].steps, str(error), error)
     except InFlightError:  # the plant's: the vehicle has left what the model describes

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
-from itertools import chain
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
@@ -18,13 +17,40 @@ class Source(IntEnum):
     FAULTS = 2
 
 
-def streams(seed: int, source: Source, count: int) -> list[Iterator[float]]:
-    """Return independent streams of standard normal numbers; the same for the same `seed` (not negative)."""
-    return [chain.from_iterable(_blocks(child)) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]
+class Chance:
+    """A stream of standard normal numbers, of 24 bits each.
+
+    NumPy takes the rare ones of the tail from libm, whose last bit differs by computer.
+    """
+
+    def __init__(self, seed: SeedSequence) -> None:
+        self._generator = default_rng(seed)
+        self._left: list[float] = []
+        """Drawn, the next one last."""
+
+    def __iter__(self) -> Iterator[float]:
+        return self
+
+    def __next__(self) -> float:
+        if not self._left:
+            self._draw()
+        return self._left.pop()
+
+    def take(self, count: int) -> list[float]:
+        """Return the next numbers, so many."""
+        taken: list[float] = []
+        while len(taken) < count:
+            if not self._left:
+                self._draw()
+            first = max(0, len(self._left) - (count - len(taken)))
+            taken += self._left[: first - 1 if first else None : -1]
+            del self._left[first:]
+        return taken
+
+    def _draw(self) -> None:
+        self._left = self._generator.standard_normal(_BLOCK).astype(np.float32).tolist()[::-1]
 
 
-def _blocks(seed: SeedSequence) -> Iterator[list[float]]:
-    """Yield numbers of 24 bits: NumPy takes the rare ones of the tail from libm, whose last bit differs by computer."""
-    generator = default_rng(seed)
-    while True:
-        yield generator.standard_normal(_BLOCK).astype(np.float32).tolist()
+def streams(seed: int, source: Source, count: int) -> list[Chance]:
+    """Return independent streams; the same for the same `seed` (not negative)."""
+    return [Chance(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]

@@ -1,12 +1,12 @@
 """How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
 
-from collections.abc import Iterator
 from math import sqrt
 
 import numpy as np
 
 from colibri.common.kernels import exp
 from colibri.common.types import Vector
+from colibri.plant.environment.random_streams import Chance
 
 _DRAWN = 128
 """Samples whose errors are drawn at once."""
@@ -18,7 +18,7 @@ class GaussMarkov:
     After Δ it is x exp(-Δ / T) plus chance of variance σ² (1 - exp(-2 Δ / T)).
     """
 
-    def __init__(self, deviation: float, time_s: float, chance: Iterator[float]) -> None:
+    def __init__(self, deviation: float, time_s: float, chance: Chance) -> None:
         """Begin somewhere in the stationary distribution of σ = `deviation`, with T = `time_s`."""
         self._deviation = deviation
         self._time_s = time_s
@@ -42,7 +42,7 @@ class Triad:
     """
 
     def __init__(
-        self, density: float, walk: float, turn_on: float, limit: float, interval_s: float, chance: Iterator[float]
+        self, density: float, walk: float, turn_on: float, limit: float, interval_s: float, chance: Chance
     ) -> None:
         """Switch on.
 
@@ -76,7 +76,7 @@ class Triad:
         """Have bias and white noise of samples to come, of many at once, where no more than `left` are still drawn."""
         if len(self._drawn) > left:
             return
-        drawn = np.fromiter(self._chance, np.float64, 6 * _DRAWN).reshape(_DRAWN, 6)
+        drawn = np.array(self._chance.take(6 * _DRAWN)).reshape(_DRAWN, 6)
         biases = np.add.accumulate(np.concatenate([self._last[None], self._walk * drawn[:, :3]]))[1:]
         self._last = biases[-1]
         later: list[list[float]] = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()

@@ -1,13 +1,12 @@
 """What faults do to the output of sensors: each frame goes through them on its way out."""
 
 from collections import deque
-from collections.abc import Iterator
 from typing import Any
 
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import DELAYED, GARBAGE, OFF, OK, SENSORS, SLOW, STUCK, WRONG, Fault
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.plant.environment.random_streams import Source, streams
+from colibri.plant.environment.random_streams import Chance, Source, streams
 from colibri.plant.sensors.instrument import Instrument
 from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.sensors import Sensors
@@ -16,7 +15,7 @@ from colibri.plant.vehicle.sensors import Sensors
 class Reading:
     """The output of one sensor, with a fault or none."""
 
-    def __init__(self, row: Instrument, chance: Iterator[float]) -> None:
+    def __init__(self, row: Instrument, chance: Chance) -> None:
         """Be well; `chance` are standard normal numbers, drawn only for more noise."""
         self._add, self._at = row.add, row.at
         self._chance = chance

@@ -1,7 +1,6 @@
 """The plant's GPS receiver: it measures at its own rate, and sends later."""
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import replace
 from math import hypot
 
@@ -11,6 +10,7 @@ from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import GPS
 from colibri.mavlink.hil.sensors import GpsFix
+from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
@@ -21,7 +21,7 @@ from colibri.plant.vehicle.sensors import Gps
 class GpsReceiver:
     """Fixes of the past: position with white and correlated errors, velocity with white ones."""
 
-    def __init__(self, part: Gps, origin: Geodetic, chance: Iterator[float]) -> None:
+    def __init__(self, part: Gps, origin: Geodetic, chance: Chance) -> None:
         """Switch on a receiver of a vehicle whose ENU frame begins at `origin`."""
         self._part = part
         self._origin = origin
@@ -70,7 +70,7 @@ class GpsReceiver:
         return None
 
 
-def _switched_on(part: Gps, setting: Setting, chance: Iterator[float]) -> Measure:
+def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
     receiver, rate = GpsReceiver(part, setting.origin, chance), Rate(part.rate_hz)
     seen: list[World] = []
 

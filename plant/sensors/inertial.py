@@ -1,10 +1,10 @@
 """The plant's accelerometer and gyroscope: they measure at every frame."""
 
-from collections.abc import Iterator
 from functools import partial
 
 from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
 from colibri.mavlink.hil.sensors import Updated
+from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import Triad
 from colibri.plant.sensors.instrument import Instrument, Measure, Setting
@@ -15,7 +15,7 @@ _ACCELEROMETER_LEFT, _GYROSCOPE_LEFT = 3, 5
 sample, at one of those, while the autopilot has most to do."""
 
 
-def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float]) -> Measure:
+def _accelerometer(part: Accelerometer, setting: Setting, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
     errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
     setting.ahead.append(partial(errors.draw, _ACCELEROMETER_LEFT))
@@ -23,7 +23,7 @@ def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float
     return lambda world: errors.measure(specific_force(world))
 
 
-def _gyroscope(part: Gyroscope, setting: Setting, chance: Iterator[float]) -> Measure:
+def _gyroscope(part: Gyroscope, setting: Setting, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
     errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
     setting.ahead.append(partial(errors.draw, _GYROSCOPE_LEFT))

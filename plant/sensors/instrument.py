@@ -1,10 +1,11 @@
 """The interface of a sensor: the true world in, its output at that frame out; and what faults do to that."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import Physics, World
 
 T = TypeVar("T")
@@ -53,7 +54,7 @@ class Instrument(NamedTuple):
     field: str
     group: int
     unit: int
-    switched_on: Callable[[Any, Setting, Iterator[float]], Measure]
+    switched_on: Callable[[Any, Setting, Chance], Measure]
     add: Callable[[Any, Vector], Any] = vector_sum
     at: Callable[[Any, int], Any] = as_it_is
 

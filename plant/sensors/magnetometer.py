@@ -1,19 +1,18 @@
 """The plant's magnetometer: the earth's field in the body, the vehicle's own, and noise."""
 
-from collections.abc import Iterator
-
 from colibri.common.earth.magnetic_field import field_enu_gauss
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import MAGNETOMETER
 from colibri.mavlink.hil.sensors import Updated
+from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Magnetometer
 
 
-def _switched_on(part: Magnetometer, setting: Setting, chance: Iterator[float]) -> Measure:
+def _switched_on(part: Magnetometer, setting: Setting, chance: Chance) -> Measure:
     earth_gauss, rate, noise = field_enu_gauss(setting.origin), Rate(part.rate_hz), part.noise_gauss
     own = part.hard_iron_gauss
     iron = (own * next(chance), own * next(chance), own * next(chance))

@@ -1,11 +1,11 @@
 """The plant's rangefinder: it looks down its own axis onto flat ground, and sees what is nearest in its beam."""
 
-from collections.abc import Iterator
 from math import hypot, inf
 
 from colibri.common.kernels import acos, cos
 from colibri.mavlink.hil.faults import RANGEFINDER
 from colibri.mavlink.hil.sensors import Distance
+from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
@@ -14,7 +14,7 @@ from colibri.plant.vehicle.sensors import Rangefinder
 _FLATTEST_COSINE = 1e-3
 
 
-def _switched_on(part: Rangefinder, _setting: Setting, chance: Iterator[float]) -> Measure:
+def _switched_on(part: Rangefinder, _setting: Setting, chance: Chance) -> Measure:
     rate, half_beam_rad = Rate(part.rate_hz), 0.5 * part.field_of_view_rad
 
     def measure(world: World) -> Distance | None:

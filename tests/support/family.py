@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Array
-from colibri.flights.in_process import Direct, put_together
+from colibri.flights.flight import Direct, Flight
+from colibri.flights.in_process import put_together
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from colibri.plant.physics.start import Start
@@ -62,12 +63,10 @@ def fly_family(track: str, count: int, duration_s: float, **start: float) -> lis
 
 def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     autopilot, plant = put_together(replace(plan, start=start), lambda: 0.0)
-    exchange, states, fallback = Direct(autopilot), [], []
+    states, fallback = [], []
     with gc_frozen():
-        while plant.world.time_us < duration_s * 1e6:
-            step, command, _ = exchange(plant)
-            plant.answer(command)
-            states.append((plant.world.time_us * 1e-6, *plant.world.state))
+        for step, _, world, *_ in Flight(plant, autopilot, Direct()).samples(duration_s):
+            states.append((world.time_us * 1e-6, *world.state))
             fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)
     return _flown(plan, np.array(states), np.array(fallback))
 

@@ -15,7 +15,7 @@ from tools.fuzz.campaign import campaign
 from tools.fuzz.datagrams import FRAME_US, Fuzzer
 from tools.fuzz.frames import AUTOPILOT, PLANT
 from tools.fuzz.ground import MAX_GROWTH_MIB, growth_mib
-from tools.fuzz.memory import NOW_S, Flight
+from tools.fuzz.memory import NOW_S, HostileWire, fly
 
 FRAMES = 50
 
@@ -34,18 +34,18 @@ def test_decoding_never_raises_and_keeps_nothing(seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def gc_frozen() -> list[tuple[float, ...]]:
-    return Flight().fly(FRAMES)
+    return fly(FRAMES, HostileWire())
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_flight_under_fire_is_the_same_flight(seed: int, gc_frozen: list[tuple[float, ...]]) -> None:
     """Hostile datagrams from the peer's own address, before and after each good one, change no bit of any state."""
     chance = random.Random(seed)
-    flight = Flight()
-    states = flight.fly(FRAMES, 20, (Fuzzer(chance, AUTOPILOT, PLANT), Fuzzer(chance, PLANT, AUTOPILOT)))
+    wire = HostileWire(20, (Fuzzer(chance, AUTOPILOT, PLANT), Fuzzer(chance, PLANT, AUTOPILOT)))
+    states = fly(FRAMES, wire)
     assert states == gc_frozen
-    assert flight.plant_end.frame_interval_us == FRAME_US
-    plant, autopilot = flight.plant_end.dropped, flight.autopilot_end.dropped
+    assert wire.plant_end.frame_interval_us == FRAME_US
+    plant, autopilot = wire.plant_end.dropped, wire.autopilot_end.dropped
     assert min(plant[reason] for reason in ("foreign", "invalid", "repeated", "unexpected", "unknown")) > 10
     assert min(autopilot[reason] for reason in ("foreign", "invalid", "out of step", "unexpected", "unknown")) > 10
 

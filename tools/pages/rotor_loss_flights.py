@@ -9,12 +9,12 @@ import numpy as np
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Array
+from colibri.flights.flight import Direct, Flight
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import Intensity, Wind
@@ -144,8 +144,9 @@ def fly(case: Case, seed: int) -> Flown:
     autopilot = copter_autopilot(profile, vehicle, settings, lambda: 0.0, values=values)
     starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
     plant = PlantBuilder(world, vehicle, starts).build(case.feedback, autopilot.frame_interval_us)
-    _take_off(autopilot, plant)
-    return _lose(autopilot, plant, seed, _fault(case, seed % 4))
+    flight = Flight(plant, autopilot, Direct())
+    _take_off(flight)
+    return _lose(flight, seed, _fault(case, seed % 4))
 
 
 def fly_all(cases: Iterable[Case], seeds: Iterable[int]) -> dict[Case, list[Flown]]:
@@ -161,30 +162,30 @@ def _fault(case: Case, rotor: int) -> Fault:
     return Fault(MOTOR, WRONG, rotor + 1, (_BLADES_LEFT, 0.0, 0.0, 0.0))
 
 
-def _take_off(autopilot: Autopilot[Copter], plant: Plant) -> None:
+def _take_off(flight: Flight[Copter]) -> None:
     """Climb to the height, and stay for a moment."""
-    copter = autopilot.stages
+    copter, plant = flight.autopilot.stages, flight.plant
     while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
-        _step(autopilot, plant)
+        flight.step()
         assert plant.world.time_us < _MAX_DURATION_S * 1e6, "it must be ready to arm"
     copter.pilot.select(Mode.TAKEOFF, ())
     copter.pilot.arm(())
     began_us = plant.world.time_us
     while copter.pilot.state.mode is not Mode.HOLD:
-        _step(autopilot, plant)
+        flight.step()
         assert plant.world.time_us < began_us + _MAX_DURATION_S * 1e6, "it must reach its height"
 
 
-def _lose(autopilot: Autopilot[Copter], plant: Plant, seed: int, fault: Fault) -> Flown:
+def _lose(flight: Flight[Copter], seed: int, fault: Fault) -> Flown:
     """Lose a rotor; fly until the vehicle rests."""
-    copter = autopilot.stages
+    copter, plant = flight.autopilot.stages, flight.plant
     lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
     rows: list[tuple[float, ...]] = []
     ends_us, noticed_s = lost_us + round(_MAX_DURATION_S * 1e6), nan
     while plant.world.time_us < ends_us:
         if plant.world.time_us == lost_us:
             plant.inject([fault])
-        controls = _step(autopilot, plant)
+        controls = flight.step().command.controls
         after_s = (plant.world.time_us - lost_us) * 1e-6
         rows.append((after_s, *_seen(plant), *controls))
         if copter.parts.rotor_loss.lost is not None and np.isnan(noticed_s):
@@ -195,13 +196,6 @@ def _lose(autopilot: Autopilot[Copter], plant: Plant, seed: int, fault: Fault) -
     at_loss = int(np.argmin(np.abs(path[:, _T])))
     path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
     return Flown(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
-
-
-def _step(autopilot: Autopilot[Copter], plant: Plant) -> tuple[float, ...]:
-    step = autopilot.step(*plant.measure())
-    plant.answer(step.command, step.faults)
-    autopilot.serve()
-    return step.command.controls
 
 
 def _seen(plant: Plant) -> tuple[float, ...]:

@@ -1,6 +1,5 @@
 """What sensors add to the truth: the statistics that their descriptions promise."""
 
-from collections.abc import Iterator
 from itertools import islice
 from math import exp
 
@@ -8,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from colibri.plant.environment.random_streams import Source, streams
+from colibri.plant.environment.random_streams import Chance, Source, streams
 from colibri.plant.sensors.errors import GaussMarkov, Triad
 
 INTERVAL_S = 0.01
 ZERO = (0.0, 0.0, 0.0)
 
 
-def chance(seed: int = 0) -> Iterator[float]:
+def chance(seed: int = 0) -> Chance:
     (stream,) = streams(seed, Source.SENSORS, 1)
     return stream
 

@@ -1,0 +1,189 @@
+"""One flight, stepped: a plant, an autopilot, and the wire between them."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+
+from colibri.autopilot.core.autopilot import Autopilot, Stages
+from colibri.autopilot.core.step import Received, Step, answer
+from colibri.common.types import Address
+from colibri.flights.snapshots import Snapshot
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.world_changes import WorldChange
+from colibri.mavlink.node.hub import Outgoing
+from colibri.plant.physics.world import World
+from colibri.plant.simulation.plant import Plant
+
+SYSTEM_ID = 1
+NEVER_LATE_S = 0.0
+_ADDRESS: Address = ("memory", 0)
+StagesT = TypeVar("StagesT", bound=Stages)
+Traffic: TypeAlias = Callable[[int, list[bytes]], None]
+"""Records frames of MAVLink: (simulated time in µs, frames)."""
+
+
+class Answered(NamedTuple):
+    """The answer to a frame, as it reached the plant.
+
+    Attributes:
+        step: The autopilot's step.
+        command: The command.
+        faults: Faults and changes of the world that come with it.
+        datagram: The frame as the autopilot received it; None on a wire without datagrams.
+    """
+
+    step: Step
+    command: ActuatorCommand
+    faults: Sequence[Fault | WorldChange]
+    datagram: bytes | None
+
+
+class Wire(Protocol):
+    """Carries a frame of the plant to the autopilot, and the answer back."""
+
+    def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
+        """Return the answer to the plant's next frame.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+
+
+class Sample(NamedTuple):
+    """A frame that was flown.
+
+    Attributes:
+        step: The autopilot's step.
+        command: The command that reached the plant.
+        world: The world that it led to, at the time of the next frame.
+        datagram: The frame as the autopilot received it; None on a wire without datagrams.
+        to_stations: What goes to ground stations.
+    """
+
+    step: Step
+    command: ActuatorCommand
+    world: World
+    datagram: bytes | None
+    to_stations: list[Outgoing]
+
+
+class Flight(Generic[StagesT]):
+    """A flight within this process.
+
+    Attributes:
+        plant: The vehicle in its world.
+        autopilot: The autopilot.
+        wire: What lies between them.
+    """
+
+    def __init__(self, plant: Plant, autopilot: Autopilot[StagesT], wire: Wire) -> None:
+        self.plant, self.autopilot, self.wire = plant, autopilot, wire
+
+    @property
+    def time_us(self) -> int:
+        """Simulated time."""
+        return self.plant.world.time_us
+
+    def step(self, inbox: Iterable[Received] = ()) -> Sample:
+        """Fly a frame, and serve ground stations, which sent `inbox`.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+            IntegrationError: The state cannot be integrated any further.
+        """
+        step, command, faults, datagram = self.wire.exchange(self.plant, self.autopilot)
+        self.plant.answer(command, faults)
+        return Sample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
+
+    def samples(self, duration_s: float) -> Iterator[Sample]:
+        """Fly frame by frame, for as long as a whole frame is left of `duration_s` since time 0.
+
+        Raises:
+            DecisionError, IntegrationError: As `step`.
+        """
+        end_us = duration_s * 1e6 - self.plant.interval_us
+        while self.plant.world.time_us <= end_us:
+            yield self.step()
+
+    def snapshot(self) -> Snapshot:
+        """Return the flight as it is now: plant, autopilot and wire, and nothing of what records it.
+
+        Vehicle, profile and track never change, and are shared; see `colibri.flights.snapshots` for what is copied.
+
+        Raises:
+            SnapshotError: A control law or a track of the user's has a state that cannot be read.
+        """
+        return Snapshot((self.plant, self.autopilot, self.wire))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this flight: it goes on with the same bits."""
+        snapshot.restore()
+
+
+class Direct:
+    """Hands frame and command over in double precision, without the codec."""
+
+    def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
+        """Return the autopilot's answer as it is."""
+        step = autopilot.step(*plant.measure())
+        return Answered(step, step.command, step.faults, None)
+
+
+class InMemory:
+    """Carries the datagrams that two processes would send, in the same conversation.
+
+    Attributes:
+        plant_end, autopilot_end: Its two ends.
+    """
+
+    def __init__(
+        self, frame_interval_us: int, feedback: Feedback, system_id: int = SYSTEM_ID, traffic: Traffic | None = None
+    ) -> None:
+        """Have the autopilot call the plant and request `feedback`; `traffic` records all frames."""
+        self._traffic = traffic
+        self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
+        self.autopilot_end = AutopilotEnd(
+            system_id=system_id, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
+        )
+        self.autopilot_end.poll(NEVER_LATE_S)
+        self._to_plant(0)
+
+    def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
+        """Return the autopilot's answer as the plant decoded it."""
+        now_us = plant.world.time_us
+        frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
+        self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
+        step, datagram = self._to_autopilot(now_us, autopilot)
+        command = self._to_plant(now_us)
+        assert step is not None, "the autopilot answers every new frame"
+        assert command is not None, "the answer names the frame awaited"
+        return Answered(step, command, self.plant_end.take_faults(), datagram)
+
+    def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
+        """Return what reaches the autopilot of the plant's datagrams."""
+        return datagrams
+
+    def carried_down(self, datagrams: list[bytes]) -> list[bytes]:
+        """Return what reaches the plant of the autopilot's datagrams."""
+        return datagrams
+
+    def _to_autopilot(self, now_us: int, autopilot: Autopilot[Any]) -> tuple[Step | None, bytes]:
+        sent = self.plant_end.take_outbox()
+        if self._traffic is not None:
+            self._traffic(now_us, [frame for outgoing in sent for frame in outgoing.frames])
+        step, datagram = None, b""
+        for datagram in self.carried_up([outgoing.datagram for outgoing in sent]):
+            step = answer(self.autopilot_end, autopilot, datagram, NEVER_LATE_S) or step
+        return step, datagram
+
+    def _to_plant(self, now_us: int) -> ActuatorCommand | None:
+        command = None
+        for datagram in self.carried_down(self.autopilot_end.take_outbox()):
+            command = self.plant_end.receive(datagram, _ADDRESS, NEVER_LATE_S) or command
+        if self._traffic is not None:
+            self._traffic(now_us, list(self.plant_end.received))
+        self.plant_end.received.clear()
+        return command
