@@ -1,7 +1,5 @@
 """The control loop: the state from frames, one control law, and the rotor command between its samples."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -180,10 +178,14 @@ class ControlLoop:
         Raises:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
-        with self._guarded(time_us):
+        try:
             if self._waiting is not None and pace is not Pace.CLOCK:
                 return self._decide_on_path(self._waiting, time_us, state, references, pace)
             return self._take(time_us, self._controller.step(self._memory, time_us, state, references))
+        except DecisionError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise self._raised(time_us, error) from error
 
     def _decide_on_path(
         self, law: PathController[Any], time_us: int, state: VehicleState, references: Horizon, pace: Pace
@@ -202,8 +204,12 @@ class ControlLoop:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
         assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
-        with self._guarded(time_us):
+        try:
             return self._take(time_us, self._controller.step_attitude(self._memory, time_us, state, demand))
+        except DecisionError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
@@ -228,15 +234,8 @@ class ControlLoop:
         self._command(decision.rotor_speeds, time_us)
         return decision
 
-    @contextmanager
-    def _guarded(self, time_us: int) -> Iterator[None]:
-        try:
-            yield
-        except DecisionError:
-            raise
-        except (Exception, SystemExit) as error:
-            text = f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}"
-            raise LawError(text) from error
+    def _raised(self, time_us: int, error: BaseException) -> LawError:
+        return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
 
     def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
         maximum = self.vehicle.rotors.max_speed

@@ -1,7 +1,7 @@
 """The autopilot as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar, TypeVarTuple
 
 from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 class Sample(NamedTuple):
@@ -58,7 +59,7 @@ class Stages(Protocol):
     def mode(self) -> str:
         """The flight mode."""
 
-    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
         """Return what `call` returns; where it raises, what `otherwise` does, or raise."""
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
@@ -140,7 +141,7 @@ class Autopilot(Generic[StagesT]):
         flown: Sample | None = None
         decision = estimate = None
         if due:
-            flown = stages.guard(STEP, lambda: self._sample(known, now_us), lambda: None)
+            flown = stages.guard(STEP, self._sample, _nothing, known, now_us)
             decision = stages.rescue(known, now_us) if flown is None else flown.decision
             estimate = stages.state_source.estimate
         command = stages.actuate(now_us)
@@ -173,3 +174,7 @@ class Autopilot(Generic[StagesT]):
         if stages.delay.delay_us == 0:
             return state
         return stages.guard(DELAY, lambda: stages.loop.observe(stages.ahead(known)), lambda: state)
+
+
+def _nothing() -> None:
+    """Replace what raised by nothing."""

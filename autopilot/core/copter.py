@@ -127,7 +127,7 @@ class Copter:
             self.guard(table.BATTERY, know_charge, _nothing)
         if plant_status.delay_us is not None:
             self.delay.measure(plant_status.delay_us)
-        self.guard(table.RESTART, lambda: self._start.wake(frame.time_us), _nothing)
+        self.guard(table.RESTART, self._start.wake, _nothing, frame.time_us)
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or unless `now` the one before, whatever the estimator does."""
@@ -196,10 +196,9 @@ class Copter:
             return self._refuse(inbox)
         self._report()
         plant_status, self._plant_status = self._plant_status, NOTHING
-        self.guard(table.STATIONS, lambda: self.stations.receive_status(plant_status, now_us), _nothing)
+        self.guard(table.STATIONS, self.stations.receive_status, _nothing, plant_status, now_us)
         self._receive_from_stations(inbox, now_us)
-        parameters, subscribers = self.parameters, self.parts.subscribers
-        self.guard(table.PARAMETERS, lambda: subscribers.adopt(parameters), lambda: subscribers.keep(parameters))
+        self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
         return self.stations.poll(now_us)
 
     def record(self) -> Checkpoint | None:
@@ -209,16 +208,19 @@ class Copter:
             return None
         return self.guard(table.CHECKPOINT, lambda: self._checkpointer.record(now_us), lambda: None)
 
+    def _keep_parameters(self) -> None:
+        self.parts.subscribers.keep(self.parameters)
+
     def _report(self) -> None:
         """Report a control sample; where that raises, ground stations read the mode, and old values beside it."""
         sample, self._sample = self._sample, None
         if sample is not None:
-            self.guard(table.TELEMETRY, lambda: self._reporter.report(sample), self.stations.go_on)
+            self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, sample)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
         """Pass on what came; a datagram that raises is dropped."""
         arriving = iter(inbox)
-        while self.guard(table.DATAGRAM, lambda: self._receive_one(arriving, now_us), lambda: True):
+        while self.guard(table.DATAGRAM, self._receive_one, _true, arriving, now_us):
             pass
 
     def _receive_one(self, arriving: Iterator[Received], now_us: int) -> bool:
@@ -237,6 +239,10 @@ class Copter:
         self._receive_from_stations(inbox, self._waiting_us)
         self.stations.refuse_commands("")
         return self.stations.take_outbox()
+
+
+def _true() -> bool:
+    return True
 
 
 def _nothing() -> None:

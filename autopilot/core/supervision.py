@@ -31,12 +31,12 @@ class Supervision:
     def step(self, now_us: int, state: VehicleState) -> None:
         """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
         parts, guard = self._parts, self._guard
-        guard(table.ROTOR_WATCH, lambda: self._watch_rotors(state), lambda: None)
-        steered, position_known = guard(table.SETPOINTS, lambda: self._sensed(now_us), lambda: (NOT_STEERED, True))
+        guard(table.ROTOR_WATCH, self._watch_rotors, _nothing, state)
+        steered, position_known = guard(table.SETPOINTS, self._sensed, _not_steered, now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
         parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed))
-        guard(table.FAILSAFES, lambda: self._execute(now_us, state), lambda: None)
+        guard(table.FAILSAFES, self._execute, _nothing, now_us, state)
         self._missed_us = None
 
     def _execute(self, now_us: int, state: VehicleState) -> None:
@@ -86,3 +86,11 @@ class Supervision:
             rotor_lost=parts.rotor_loss.lost,
             pace=pilot.behaviour.limits,
         )
+
+
+def _nothing() -> None:
+    """Replace what raised by nothing."""
+
+
+def _not_steered() -> tuple[Steered, bool]:
+    return NOT_STEERED, True

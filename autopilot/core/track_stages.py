@@ -1,7 +1,7 @@
 """The stages of a vehicle that flies one track, without ground stations; what a stage raises is raised."""
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
 from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Decision, Pace, VehicleState
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 def track_autopilot(
@@ -89,10 +90,10 @@ class TrackStages:
         self._acts_us: int | None = None
         self._landing, self._ground_m = Landing(), 0.0
 
-    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
         """Return what `call` returns, and let it raise."""
         del part, otherwise
-        return call()
+        return call(*args)
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
         """Take in charge and delay as the plant reports them."""

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, TypeVarTuple
 
 from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.fence import Fence
@@ -50,6 +50,7 @@ from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 MAX_SAID = 20
 """Status texts kept for whoever watches the process."""
@@ -84,7 +85,7 @@ class StationSettings:
 class Guarding(Protocol):
     """Catches the exceptions of parts by their names."""
 
-    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
         """Return what `call` returns, or what `otherwise` does where that raises."""
 
     def caught(self, part: str, error: Exception, instead: str = "") -> None:
@@ -205,8 +206,8 @@ class Stations:
 
     def poll(self, now_us: int) -> list[Outgoing]:
         """Do what is due; return what to send. Called once a frame."""
-        self._guard("progress", lambda: self._tell(now_us), _nothing)
-        self._guard("hub", lambda: self._poll_hub(now_us), _nothing)
+        self._guard("progress", self._tell, _nothing, now_us)
+        self._guard("hub", self._poll_hub, _nothing, now_us)
         said = self._text.take()
         self._said.extend(said)
         armed = self._pilot.state.armed

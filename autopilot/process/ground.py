@@ -130,7 +130,7 @@ class Ground:
         self._record_told()
         if stations.system.restart:
             self._restart(stations.system.restart)
-        self.copter.guard(table.PROCESS, lambda: self._look_after(now_s), lambda: None)
+        self.copter.guard(table.PROCESS, self._look_after, lambda: None, now_s)
         self._links.send(outbox)
         records = self.copter.defence.take()
         if records:

@@ -1,4 +1,4 @@
-"""A plant and an autopilot in lockstep in one loop, without processes or files: a million messages take minutes."""
+"""A vehicle and its clients without processes or files: a million messages take minutes."""
 
 from typing import Any
 
@@ -10,6 +10,7 @@ from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.types import Vector
+from colibri.flights.flight import Direct, Flight
 from colibri.mavlink.files.tree import Files
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand
@@ -35,7 +36,6 @@ class BareFlight(Stepped, Steered):
 
     Attributes:
         system: The vehicle's system id.
-        autopilot: Flies it.
         plant: The plant.
         client: The first ground station.
         rotors: The last command to the plant.
@@ -49,9 +49,10 @@ class BareFlight(Stepped, Steered):
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=DEFAULT_ORIGIN, files=files)
         self.client = Client()
         self._clients: list[Client] = []
-        self.autopilot = self._new_autopilot()
+        autopilot = self._new_autopilot()
         builder = PlantBuilder(WorldSpec(), self._vehicle, {Feedback.STATE: STANDING}, origin=DEFAULT_ORIGIN)
-        self.plant = builder.build(Feedback.STATE, self.autopilot.frame_interval_us)
+        self.plant = builder.build(Feedback.STATE, autopilot.frame_interval_us)
+        self._flight = Flight(self.plant, autopilot, Direct())
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.add(self.client)
         self.step()
@@ -60,7 +61,7 @@ class BareFlight(Stepped, Steered):
     @property
     def copter(self) -> Copter:
         """The vehicle that ground stations fly."""
-        return self.autopilot.stages
+        return self._flight.autopilot.stages
 
     @property
     def time_us(self) -> int:
@@ -81,7 +82,7 @@ class BareFlight(Stepped, Steered):
 
     def restart(self) -> None:
         """Start the autopilot again, wherever the vehicle is."""
-        self.autopilot = self._new_autopilot()
+        self._flight = Flight(self.plant, self._new_autopilot(), Direct())
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
 
@@ -94,11 +95,9 @@ class BareFlight(Stepped, Steered):
 
     def step(self) -> None:
         """Fly one frame."""
-        step = self.autopilot.step(*self.plant.measure())
-        self.rotors = step.command
-        self.plant.answer(step.command, step.faults)
-        inbox = [received for client in self._clients for received in client.take_sent()]
-        for link, address, datagram in self.autopilot.serve(inbox):
+        sample = self._flight.step([received for client in self._clients for received in client.take_sent()])
+        self.rotors = sample.command
+        for link, address, datagram in sample.to_stations:
             for client in self._clients:
                 if (client.link, client.address) == (link, address):
                     client.receive(datagram)

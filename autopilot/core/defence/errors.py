@@ -6,7 +6,7 @@ A part that has raised is tried again at its next turn; `table` has all parts, a
 from collections import Counter
 from collections.abc import Callable
 from traceback import format_exception
-from typing import TypeVar
+from typing import TypeVar, TypeVarTuple
 
 import msgspec
 
@@ -17,6 +17,7 @@ from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.services.statustext import CRITICAL
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 _MAX_RECORDS = 3
 """Of one part: what raises in every frame would fill the disk."""
 _MAX_KEPT = 100
@@ -71,7 +72,7 @@ class Defence:
         """Record with each exception what `checkpoint` returns."""
         self._checkpoint = checkpoint
 
-    def guard(self, part: str, call: Callable[[], T], otherwise: Callable[[], T]) -> T:
+    def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
         """Return what `call` returns; what `otherwise` does where that raises, or the part is left out by now.
 
         Raises:
@@ -80,7 +81,7 @@ class Defence:
         if part in self.off and PARTS[part].optional:
             return otherwise()
         try:
-            return call()
+            return call(*args)
         except Exception as error:
             self.caught(part, error)
         return otherwise()
