@@ -4,7 +4,7 @@ from math import hypot, pi, tau
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.interface import Horizon
@@ -57,6 +57,8 @@ def led(reference: Reference, target: Target, limits: Limits, seconds: float) ->
 
 SLACK = 1.003
 """Of the acceleration, which follows a jerk that changes only once a sample."""
+LATE_S = 2.0 * INTERVAL_S
+"""How late an acceleration ends: it changes once a sample, so that a speed exceeds its limit by that much of it."""
 START = at(ORIGIN)
 
 
@@ -64,9 +66,9 @@ def within(limits: Limits, motions: Array, headings: Array) -> bool:
     """Whether motion and turns keep to the limits."""
     velocity, acceleration, jerk = motions[:, 1], motions[:, 2], motions[:, 3]
     shares = (
-        np.hypot(velocity[:, 0], velocity[:, 1]).max() / limits.speed_m_s,
-        velocity[:, 2].max() / limits.climb_m_s,
-        -velocity[:, 2].min() / limits.sink_m_s,
+        np.hypot(velocity[:, 0], velocity[:, 1]).max() / (limits.speed_m_s + LATE_S * limits.acceleration_m_s2),
+        velocity[:, 2].max() / (limits.climb_m_s + LATE_S * limits.lift_m_s2),
+        -velocity[:, 2].min() / (limits.sink_m_s + LATE_S * limits.lift_m_s2),
         np.hypot(acceleration[:, 0], acceleration[:, 1]).max() / limits.acceleration_m_s2,
         np.abs(acceleration[:, 2]).max() / limits.lift_m_s2,
         np.hypot(jerk[:, 0], jerk[:, 1]).max() / limits.jerk_m_s3,
@@ -83,6 +85,8 @@ def long_enough_s(limits: Limits, place: Vector) -> float:
 
 @settings(max_examples=8, deadline=None)
 @given(LIMITS, PLACES, ANGLES)
+@example(Limits(2.0, 1.0, 1.0, 6.0, 1.0, 24.0, 1.0, 1.0), (0.0, 2.0, 0.0), 0.0)
+@example(Limits(2.0, 2.0, 3.0, 7.0, 3.0, 26.0, 4.0, 5.0), (-5.0, -4.0, 3.0), 0.0)
 def test_rest_to_rest_keeps_limits_and_does_not_overshoot(limits: Limits, place: Vector, yaw_rad: float) -> None:
     target = still_target(place, yaw_rad, SAMPLES)
     motions, headings, end = led(START, target, limits, long_enough_s(limits, place))
