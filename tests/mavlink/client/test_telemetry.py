@@ -50,7 +50,7 @@ def test_a_vehicle_that_was_started_again_has_another_clock() -> None:
 
 
 @pytest.mark.parametrize("drift", [0.0, -0.016, -0.1, 0.03])
-def test_a_simulator_s_clock_that_drifts_is_followed_and_never_unknown(drift: float) -> None:
+def test_a_drifting_clock_of_a_simulator_is_followed(drift: float) -> None:
     clock, chance, unknown = VehicleClock(), Random(5), 0
     for n in range(300):
         now_us = 100_000 * n
@@ -83,7 +83,7 @@ def test_what_is_no_answer_says_nothing_of_the_clock() -> None:
         clock.own_us(0)
 
 
-def test_a_state_is_in_enu_and_flu_whichever_messages_it_comes_by() -> None:
+def test_a_state_is_in_enu_and_flu_by_any_messages() -> None:
     rate, q = (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0)
     odometry = StateAssembler().receive(
         said("ODOMETRY", 20_000, 1, 12, 1.0, 2.0, -3.0, q, 0.5, 0.0, 0.0, *rate, NO_COVARIANCE, NO_COVARIANCE, 0, 8, 9),
