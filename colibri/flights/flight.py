@@ -1,7 +1,7 @@
 """One flight, stepped: a plant, an autopilot, and the wire between them."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from colibri.autopilot.core.autopilot import Autopilot, Stages
 from colibri.autopilot.core.step import Received, Step, answer
@@ -13,9 +13,11 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
-from colibri.mavlink.node.hub import Outgoing
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
+
+if TYPE_CHECKING:
+    from colibri.mavlink.node.hub import Outgoing
 
 SYSTEM_ID = 1
 NEVER_LATE_S = 0.0
@@ -67,7 +69,7 @@ class Sample(NamedTuple):
     command: ActuatorCommand
     world: World
     datagram: bytes | None
-    to_stations: list[Outgoing]
+    to_stations: "list[Outgoing]"
 
 
 class Flight(Generic[StagesT]):
