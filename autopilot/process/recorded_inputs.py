@@ -7,6 +7,7 @@ import msgspec
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
+from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
@@ -62,6 +63,28 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     profile_tables: Profile | None = None
     vehicle_tables: Vehicle | None = None
     track_file: str | None = None
+
+
+def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file: str | None) -> Setup:
+    """Return the record of how an autopilot begins; `track_file` is the text of its track's file."""
+    return Setup(
+        profile=name_of(spec.profile),
+        controller=profile.controller,
+        solver=spec.solver,
+        delay_s=spec.delay_s,
+        vehicle=name_of(spec.vehicle or profile.simulation.vehicle),
+        feedback=spec.feedback,
+        track=spec.flown,
+        floor_m=spec.floor,
+        origin=spec.home.origin,
+        boot_unix_us=spec.boot_unix_us,
+        system_id=spec.system_id,
+        identity=spec.identity,
+        ground=spec.served,
+        profile_tables=profile,
+        vehicle_tables=vehicle,
+        track_file=track_file,
+    )
 
 
 class ReceivedDatagram(

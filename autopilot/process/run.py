@@ -10,8 +10,8 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import log_in
-from colibri.autopilot.process.recorded_inputs import Setup
-from colibri.autopilot.spec import TRACK, AutopilotSpec, name_of
+from colibri.autopilot.process.recorded_inputs import setup_of
+from colibri.autopilot.spec import TRACK, AutopilotSpec
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
@@ -56,28 +56,6 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
     if ground and ground.errors.failed:
         return EXIT_FAILED
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
-
-
-def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file: str | None) -> Setup:
-    """Return the record of how an autopilot begins; `track_file` is the text of its track's file."""
-    return Setup(
-        profile=name_of(spec.profile),
-        controller=profile.controller,
-        solver=spec.solver,
-        delay_s=spec.delay_s,
-        vehicle=name_of(spec.vehicle or profile.simulation.vehicle),
-        feedback=spec.feedback,
-        track=spec.flown,
-        floor_m=spec.floor,
-        origin=spec.home.origin,
-        boot_unix_us=spec.boot_unix_us,
-        system_id=spec.system_id,
-        identity=spec.identity,
-        ground=spec.served,
-        profile_tables=profile,
-        vehicle_tables=vehicle,
-        track_file=track_file,
-    )
 
 
 def _end(spec: AutopilotSpec, frame_interval_us: int) -> AutopilotEnd:

@@ -9,7 +9,7 @@ from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.process.logs import AutopilotLog, log_in
-from colibri.autopilot.process.run import setup_of
+from colibri.autopilot.process.recorded_inputs import setup_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading
 from colibri.flights.flight import Direct, Flight, InMemory, Wire
