@@ -43,7 +43,7 @@ class Telemetry:
     Attributes:
         autopilot: MAV_AUTOPILOT; None before the first heartbeat.
         system: Its system id; 0 before.
-        origin: Where its local frame begins; None while nothing says.
+        origin: Where its local frame begins; None before it is received.
         home_enu_m: As it says.
     """
 
