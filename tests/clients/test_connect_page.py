@@ -30,14 +30,12 @@ def snippets(beginning: str) -> list[str]:
 
 
 def free_port() -> int:
-    """Return a port of this computer that nobody has."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
         return int(sock.getsockname()[1])
 
 
 def run(code: str, default_port: int, port: int, folder: Path) -> None:
-    """Run a snippet as a program, on another port."""
     assert code.count(str(default_port)) == 1
     program = folder / "snippet.py"
     program.write_text(code.replace(str(default_port), str(port)), encoding="utf-8")
@@ -47,13 +45,11 @@ def run(code: str, default_port: int, port: int, folder: Path) -> None:
 
 
 def assert_landed(flown: Vehicle) -> None:
-    """Hold that the flight is over, on the ground."""
     landed = flown.seen.wait_until_disarmed()
     assert abs(landed.height_m) < 0.05
 
 
 def went_to(flown: Vehicle, latitude_deg: float, longitude_deg: float, height_m: float) -> bool:
-    """Whether the vehicle came to within 0.3 m of a place."""
     origin = Geodetic(*DEFAULT_HOME[:3])
     x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, DEFAULT_HOME.altitude_m), origin)
     return min(dist(sight.position_enu_m, (x, y, height_m)) for sight in flown.seen.sights) < 0.3

@@ -25,7 +25,6 @@ def place(latitude_deg: float, longitude_deg: float, height_m: float) -> tuple[f
 
 
 def said(program: str, flown: Vehicle) -> list[str]:
-    """Run a program against a vehicle; return what it printed."""
     command = [sys.executable, str(PROGRAMS / program), f"udpout:127.0.0.1:{flown.port}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GIVE_UP_AFTER_S)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -15,18 +15,15 @@ SYSTEMS = (3, 4, 5)
 
 
 def height_m(station: GroundStation, system: int) -> float:
-    """Return the height of a vehicle above its home, as it says next."""
     return -float(station.wait("LOCAL_POSITION_NED", lambda where: where.get_srcSystem() == system).z)
 
 
 def is_armed(station: GroundStation, system: int) -> bool:
-    """Return whether a vehicle's rotors may turn, as it says next."""
     beat = station.wait("HEARTBEAT", lambda beat: beat.get_srcSystem() == system)
     return bool(beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED)
 
 
 def take_off(station: GroundStation, system: int, height_m: float) -> None:
-    """Arm a vehicle and let it take off. Everybody is sent it."""
     assert station.command(mavlink2.MAV_CMD_COMPONENT_ARM_DISARM, 1, 0, 0, 0, 0, 0, 0, system=system) == ACCEPTED
     climb = (0, 0, 0, nan, nan, nan, height_m)
     assert station.command(mavlink2.MAV_CMD_NAV_TAKEOFF, *climb, system=system) == ACCEPTED
@@ -59,8 +56,6 @@ def test_each_flies_its_own_flight(tmp_path: Path) -> None:
 
 
 def at_height(system: int, height_m: float) -> Callable[[Message], bool]:
-    """Return what tells whether a vehicle is at a height."""
-
     def holds(where: Message) -> bool:
         return bool(where.get_srcSystem() == system and abs(where.z + height_m) < 0.1)
 

@@ -16,16 +16,12 @@ WITHIN_S = 120.0
 
 
 def run(module: str, url: str, folder: Path) -> None:
-    """Run a program for MAVSDK 4 to its good end."""
     with Client([sys.executable, "-m", f"tests.clients.{module}", url], folder, {"PYTHONPATH": str(ROOT)}) as client:
         client.wait(WITHIN_S)
 
 
 class Wire:
-    """What pymavlink writes to."""
-
     def __init__(self, sock: socket.socket) -> None:
-        """Write to a connection."""
         self.write = sock.sendall
 
 

@@ -24,7 +24,6 @@ SPEED = 4.0
 
 @contextmanager
 def connected(folder: Path, *options: str) -> Iterator[tuple[MavProxy, Vehicle]]:
-    """Run a vehicle and MAVProxy, connected, while the block lasts."""
     with (
         vehicle(folder, *options, speed=SPEED) as flown,
         MavProxy(folder, f"udpout:127.0.0.1:{flown.port}") as proxy,
@@ -33,7 +32,6 @@ def connected(folder: Path, *options: str) -> Iterator[tuple[MavProxy, Vehicle]]
 
 
 def at(east_m: float, north_m: float) -> str:
-    """Return a place by its distance from home, as latitude and longitude."""
     place = geodetic_of((east_m, north_m, 0.0), Geodetic(*DEFAULT_HOME[:3]))
     return f"{place.latitude_deg:.7f} {place.longitude_deg:.7f}"
 

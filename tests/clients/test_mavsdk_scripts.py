@@ -40,7 +40,6 @@ HOME: Vector = (0.0, 0.0, 0.0)
 
 
 def run(name: str, flown: Vehicle, folder: Path) -> None:
-    """Run a script to its good end."""
     room = folder / name
     room.mkdir()
     command = [sys.executable, "-m", f"tests.clients.mavsdk_scripts.{name}", flown.mavsdk_url]
@@ -50,7 +49,6 @@ def run(name: str, flown: Vehicle, folder: Path) -> None:
 
 @contextmanager
 def after(name: str, folder: Path) -> Iterator[Vehicle]:
-    """Run a script; the vehicle goes on while the block lasts."""
     with vehicle(folder, speed=SPEED) as flown:
         for parameter in ("COM_OF_LOSS_T", "COM_RC_LOSS_T"):
             flown.seen.set_parameter(parameter, PATIENT_S)

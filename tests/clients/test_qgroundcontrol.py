@@ -24,7 +24,6 @@ SPEED = 4.0
 
 @contextmanager
 def connected(folder: Path) -> Iterator[tuple[GroundStation, Vehicle]]:
-    """Run a vehicle that calls a ground station while the block lasts."""
     with GroundStation() as station, vehicle(folder, links=(station.url,), speed=SPEED) as flown:
         station.wait("HEARTBEAT")
         yield station, flown
@@ -49,7 +48,6 @@ def reposition(station: GroundStation, *four_to_seven: float) -> int:
 
 
 def degrees_e7(east_m: float, north_m: float) -> tuple[int, int]:
-    """Return a place on earth by its distance from home."""
     place = geodetic_of((east_m, north_m, 0.0), Geodetic(*DEFAULT_HOME[:3]))
     return round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
 
@@ -199,7 +197,6 @@ def test_its_virtual_joystick(tmp_path: Path) -> None:
 
 
 def set_mode_steering(station: GroundStation, steer: Callable[[int], None]) -> None:
-    """Change to position mode while the sticks are sent."""
     number = custom_mode(Mode.POSITION)
     station.mav.set_mode_send(1, CUSTOM, number)
     before = len(station.heard)

@@ -27,7 +27,6 @@ def sign(station: GroundStation, key: bytes = KEY) -> None:
 
 
 def change_speed(station: GroundStation) -> int:
-    """Command something harmless; return the result."""
     return station.command(SPEED, 1, 3.0, -1, 0, 0, 0, 0)
 
 
@@ -42,7 +41,6 @@ def refuses(station: GroundStation) -> bool:
 
 @pytest.fixture
 def key_file(tmp_path: Path) -> Path:
-    """A key as a user keeps it."""
     path = tmp_path / "key"
     path.write_text(KEY.hex() + "\n", encoding="ascii")
     return path

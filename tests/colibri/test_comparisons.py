@@ -97,7 +97,6 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def written(folder: Path, name: str, old: str = "", new: str = "") -> str:
-    """Return a copy of profile `flight` in a folder."""
     folder.mkdir(exist_ok=True)
     path = folder / name
     text = PROFILE.read_text(encoding="utf-8")
@@ -149,8 +148,6 @@ def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: py
 
 
 class Raises:
-    """A law that hovers, and raises after a moment."""
-
     control_interval_us = 10_000
     preview = Preview(10_000, 1)
 

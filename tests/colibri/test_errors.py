@@ -46,7 +46,6 @@ def sources() -> list[tuple[Path, ast.Module]]:
 
 
 def names(node: ast.expr | None) -> list[str]:
-    """Return the last parts of the names in an expression."""
     if isinstance(node, ast.BinOp):
         return names(node.left) + names(node.right)
     elements = node.elts if isinstance(node, ast.Tuple) else [] if node is None else [node]

@@ -70,7 +70,6 @@ def test_who_only_starts_vehicles_does_not_load_what_flies() -> None:
 
 @contextmanager
 def standing(folder: Path, *links: str) -> Iterator[tuple[Vehicle, list[psutil.Process]]]:
-    """Run a vehicle while the block lasts, and see its plant and its autopilot."""
     with vehicle(folder, links=links) as flown:
         children = psutil.Process(flown.process.pid).children(recursive=True)
         assert len(children) == 2
@@ -125,7 +124,6 @@ def test_a_process_that_dies_is_started_again(tmp_path: Path, name: str) -> None
 
 
 def dead(name: str, code: int) -> Child:
-    """Return a process that has ended."""
     child = Child(AutopilotSpec() if name == "autopilot" else PlantSpec(link="udpin:127.0.0.1:0"))
     child.kill()
     child.code = lambda: code  # type: ignore[method-assign]

@@ -87,7 +87,6 @@ def test_a_flight_on_sensors_is_replayed(tmp_path: Path) -> None:
 
 
 def change(log: Path, time_us: int, more: float) -> None:
-    """Change the first rotor's command of one instant."""
     content = bytearray(log.read_bytes())
     rows = np.concatenate(list(FlightFile(log).blocks(COMMAND)))
     (row,) = rows[np.rint(1e6 * rows[:, 0]) == time_us]

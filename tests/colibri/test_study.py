@@ -32,14 +32,12 @@ def short() -> Flown:
 
 
 def plans(flights: Sequence[Settings]) -> list[FlightPlan]:
-    """Return flights of studies as they are planned."""
     planned = campaign(flights)
     common = common_of(planned)
     return [plan_point(common, point) for point in planned.points()]
 
 
 def plan_of(**settings: Any) -> FlightPlan:
-    """Return a flight of a study as it is planned."""
     (plan,) = plans([settings])
     return plan
 

@@ -63,7 +63,6 @@ TRACK = "lemniscate:lap=10"
 
 
 def main(program: str, folder: Path) -> None:
-    """Fly until each of them has ended a flight; write what happened."""
     ended: dict[str, dict[str, Any]] = {}
     with own_physics(Path(program), folder) as bench:
         for number, (name, case) in enumerate(CASES.items()):

@@ -72,7 +72,6 @@ class Bench:
         return round((perf_counter() - self.began_s) * 1e6 * SPEED)
 
     def turn(self) -> None:
-        """Carry what has come, and what is to be sent."""
         assert self.companion is not None, "somebody flies"
         for datagram, sender in self.link.receive_now():
             self._address = sender
@@ -94,7 +93,6 @@ class Bench:
         self.link.wait(0.001)
 
     def order(self, number: int, *parameters: float) -> None:
-        """Have the pilot give a command."""
         self.client.begin(Command(self._target, number, *parameters))
 
     def set(self, name: str, value: int) -> None:
@@ -107,21 +105,18 @@ class Bench:
         return self.companion.peer.target
 
     def freeze(self, for_s: float) -> None:
-        """Have PX4 stand still."""
         self.process.send_signal(signal.SIGSTOP)
         self.stopped_until_us = self.now_us + round(for_s * 1e6)
 
 
 @contextmanager
 def own_physics(build: Path, folder: Path) -> Iterator[Bench]:
-    """Start PX4 with its own physics."""
     with _started([str(build / "bin" / "px4"), "-d", str(build / "etc")], folder, OWN_PHYSICS) as bench:
         yield bench
 
 
 @contextmanager
 def on_the_plant(build: Path, folder: Path, vehicle: str) -> Iterator[Bench]:
-    """Start PX4 on our plant."""
     colibri, parameters = (sys.executable, "-m", "colibri"), folder / "parameters"
     run([*colibri, "vehicle", vehicle, "--for", "px4", "--out", str(parameters)], check=True)
     options = ("--serve", "px4", "--vehicle", vehicle, "--speed", str(SPEED), "--out", str(folder / "plant"))

@@ -35,7 +35,6 @@ _COLIBRI = (sys.executable, "-m", "colibri")
 
 
 def main(whom: str, program: str, folder: Path) -> None:
-    """Fly twice on one plant; what was flown is in FOLDER/plant."""
     parameters = folder / "parameters"
     run([*_COLIBRI, "vehicle", VEHICLES[whom], "--for", whom, "--out", str(parameters)], check=True)
     with plant(whom, folder):
@@ -47,7 +46,6 @@ def main(whom: str, program: str, folder: Path) -> None:
 
 @contextmanager
 def plant(whom: str, folder: Path) -> Iterator[None]:
-    """Have `colibri plant` wait for it."""
     served = "px4" if whom == "px4" else "ardupilot-json"
     options = ("--serve", served, "--vehicle", VEHICLES[whom], "--speed", str(SPEED), "--out", str(folder / "plant"))
     with (
@@ -62,13 +60,11 @@ def plant(whom: str, folder: Path) -> Iterator[None]:
 
 @contextmanager
 def px4(build: Path, parameters: Path, folder: Path) -> Iterator[None]:
-    """Start PX4 with the parameters in its environment, as docs/simulators.md says."""
     with killed_after(px4_command(build), folder, os.environ | px4_settings(parameters, SPEED)):
         yield
 
 
 def px4_command(build: Path) -> list[str]:
-    """Return how PX4 is started for our plant."""
     return [str(build / "bin" / "px4"), "-d", str(build / "etc"), "-s", "etc/init.d-posix/rcS"]
 
 
@@ -130,7 +126,6 @@ def hover(whom: str) -> None:
 
 
 def wanted(whom: str, *, armed: bool, up: bool) -> Iterator[Command]:
-    """Yield the commands that bring it one step further: telemetry, mode, arming, take-off."""
     repeat = Repeat(_ASK_EVERY_US, 1)
     yield set_message_interval(_VEHICLE, "LOCAL_POSITION_NED", 1e5, repeat=repeat)
     if not armed:

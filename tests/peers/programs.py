@@ -11,7 +11,6 @@ ALONE = ("unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up &
 
 
 def can_be_alone() -> bool:
-    """Whether this system lets a user have a network namespace."""
     try:
         return run([*ALONE, "true"], stdout=DEVNULL, stderr=DEVNULL, check=False).returncode == 0
     except OSError:

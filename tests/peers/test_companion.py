@@ -74,7 +74,6 @@ def fly(folder: Path, vehicle: list[str], options: str, beside: str = "true", **
 
 
 def arducopter(folder: Path, options: str) -> dict[str, Any]:
-    """Fly ArduCopter with its own physics, at real time."""
     program = program_of("ardupilot")
     parameters = folder / "companion.parm"
     parameters.write_text("".join(f"{name} {value}\n" for name, value in COPTER_PARAMETERS.items()), encoding="utf-8")
@@ -86,7 +85,6 @@ def arducopter(folder: Path, options: str) -> dict[str, Any]:
 
 
 def arducopter_on_the_plant(folder: Path, options: str) -> dict[str, Any]:
-    """Fly ArduCopter on our plant, as the Hummingbird, at real time."""
     program, parameters, colibri = program_of("ardupilot"), folder / "companion.parm", f"{sys.executable} -m colibri"
     told = [*colibri.split(), "vehicle", "hummingbird", "--for", "ardupilot", "--out", str(parameters)]
     subprocess.run(told, check=True)
@@ -102,7 +100,6 @@ def arducopter_on_the_plant(folder: Path, options: str) -> dict[str, Any]:
 
 
 def px4(folder: Path, options: str) -> dict[str, Any]:
-    """Fly PX4 with its own physics, at real time."""
     build = program_of("px4")
     vehicle = [str(build / "bin" / "px4"), "-i", str(PX4_INSTANCE), "-d", str(build / "etc")]
     return fly(

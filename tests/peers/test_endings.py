@@ -24,7 +24,6 @@ LIMITS = [name for name in CASES if name not in ("pilot", "interrupted", "estima
 
 @pytest.fixture(scope="module")
 def endings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """Fly them all, one after another, on one PX4."""
     folder, program = tmp_path_factory.mktemp("endings"), program_of("px4")
     run(
         [*ALONE, sys.executable, "-m", "tests.peers.endings", str(program), str(folder)],

@@ -25,7 +25,6 @@ OWN_PHYSICS = "sihsim"
 
 
 def main(program: str, folder: Path, name: str) -> None:
-    """Fly the spiral; write how well."""
     build = Path(program)
     settings = CompanionSettings(may_arm=True, duration_s=DURATION_S, limits=PATIENT)
     with own_physics(build, folder) if name == OWN_PHYSICS else on_the_plant(build, folder, name) as bench:
@@ -47,7 +46,6 @@ def main(program: str, folder: Path, name: str) -> None:
 
 
 def fly(bench: Bench, name: str, track: str, settings: CompanionSettings) -> Companion:
-    """Fly one flight to its end; return its companion."""
     profile, vehicle = load_profile("flight"), load_vehicle(name)
     path = load_track(track, vehicle, profile).track
     companion = bench.companion = Companion(settings, profile, vehicle, path, perf_counter)

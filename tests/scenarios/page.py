@@ -10,7 +10,6 @@ PAGE = "scenarios-flown.md"
 
 
 def page() -> str:
-    """Return the page."""
     count = sum(len(group) for group in GROUPS.values())
     flights = sum(len(each.seeds) if isinstance(each, Scenario) else 1 for group in GROUPS.values() for each in group)
     calm = [each for group in GROUPS.values() for each in group if isinstance(each, Scenario) and each.calm]
@@ -39,7 +38,6 @@ def _seeds(each: Scenario | FleetScenario) -> str:
 
 
 def main() -> int:
-    """Write the page into the folder that the command line names."""
     (Path(sys.argv[1]) / PAGE).write_text(page(), encoding="utf-8")
     return 0
 

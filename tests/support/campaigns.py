@@ -37,7 +37,6 @@ def planned(**tables: Any) -> Campaign:
 
 
 def flown(**tables: Any) -> list[Flown]:
-    """Return what comes of each flight."""
     campaign = planned(**tables)
     common = common_of(campaign)
     return [fly_point(common, point) for point in campaign.points()]

@@ -39,7 +39,6 @@ _NOTHING: Vector = (0.0, 0.0, 0.0)
 
 
 def at(position: Vector, velocity: Vector = _NOTHING, yaw_rad: float = 0.0) -> VehicleState:
-    """Return a level vehicle."""
     attitude = (float(np.cos(0.5 * yaw_rad)), 0.0, 0.0, float(np.sin(0.5 * yaw_rad)))
     return VehicleState(position, velocity, attitude, (0.0, 0.0, yaw_rad), _NOTHING)
 
@@ -104,15 +103,12 @@ class Cockpit:
         self.stock()
 
     def missing(self) -> tuple[Need, ...]:
-        """Return the needs that nothing meets."""
         return self.unmet
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Take note of the client that steers."""
         self.engaged.append((peer, now_us))
 
     def step(self, samples: int = 1, *, position_known: bool = True) -> Guidance:
-        """Fly on; return the last guidance."""
         for _ in range(samples):
             self.now_us += PREVIEW.interval_us
             self.pilot.sense(Sensed(self.now_us, self.state, self.steered, position_known))
@@ -129,7 +125,6 @@ class Cockpit:
         return self.guidance
 
     def fly_for(self, duration_s: float) -> None:
-        """Fly on for a while."""
         self.step(round(duration_s * 1e6 / PREVIEW.interval_us))
 
     def do(self, command: str, *params: float, frame: int | None = None, **places: float) -> Refusal:
@@ -141,7 +136,6 @@ class Cockpit:
         return self.commands.handlers()[number](asked) or Refusal(result=ACCEPTED)
 
     def load(self, plan_type: int, *items: MissionItem) -> None:
-        """Take a plan."""
         self.missions.load(plan_type, plan_of(items))
 
     def said(self, words: str) -> bool:
@@ -149,7 +143,6 @@ class Cockpit:
         return any(words in text for _, text in self.lines.take())
 
     def place(self, east_m: float, north_m: float) -> Geodetic:
-        """Return a place on earth."""
         return geodetic_of((east_m, north_m, 0.0), DEFAULT_ORIGIN)
 
     def stock(self, **changes: Any) -> None:

@@ -22,7 +22,6 @@ def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
 
 
 def exit_code(command: list[str]) -> int | str | None:
-    """Run a command; return what the shell would see."""
     try:
         return main(command)
     except SystemExit as ended:

@@ -72,7 +72,6 @@ def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
 
 
 def _flown(plan: FlightPlan, states: Array, fallback: NDArray[np.bool_]) -> Flown:
-    """Return the flight of times and states (n, 14)."""
     t, places, (_, q1, q2, _) = states[:, 0], states[:, 7:10], states[:, 10:14].T
     tilt = np.arccos(np.clip(1.0 - 2.0 * (q1 * q1 + q2 * q2), -1.0, 1.0))
     errors = np.linalg.norm(places - position(plan.track, t), axis=1)
@@ -80,7 +79,6 @@ def _flown(plan: FlightPlan, states: Array, fallback: NDArray[np.bool_]) -> Flow
 
 
 def main() -> None:
-    """Print the table."""
     print("| lap (s) | tilt: largest (deg) | median of the largest | distance (m) | height (m) | fallback samples |")  # noqa: T201
     print("| ---: | ---: | ---: | ---: | ---: | ---: |")  # noqa: T201
     for lap_s in LAPS_S:

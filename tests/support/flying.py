@@ -43,7 +43,6 @@ def in_mode(sitl: Sitl, mode: Mode) -> bool:
 
 
 def degrees_e7(sitl: Sitl, east_m: float, north_m: float) -> tuple[int, int]:
-    """Return latitude and longitude as a COMMAND_INT has them."""
     place = geodetic_of((east_m, north_m, 0.0), sitl.origin)
     return round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
 
@@ -58,14 +57,12 @@ def orbit(
 
 
 def stream(sitl: Sitl, seconds: float, send: Callable[[], object]) -> None:
-    """Fly for so long, and send something ten times a second."""
     for _ in range(round(seconds / EVERY_S)):
         send()
         sitl.run(EVERY_S)
 
 
 def latest(sitl: Sitl, name: str) -> Any:
-    """Request a message, and return it."""
     number = float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
     assert sitl.command(mav.MAV_CMD_REQUEST_MESSAGE, number) == ACCEPTED
     sitl.run(0.02)
@@ -88,7 +85,6 @@ def restart(sitl: Sitl, change: Callable[[History], History | None] = lambda kep
 
 
 def reached(sitl: Sitl) -> list[int]:
-    """Return the items of the mission that were reached, in order."""
     return [fields.seq for fields in sitl.heard("MISSION_ITEM_REACHED")]
 
 

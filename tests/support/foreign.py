@@ -12,8 +12,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 class Ended(NamedTuple):
-    """Exit code and standard error of a command."""
-
     returncode: int | str | None
     stderr: str
 
@@ -47,7 +45,6 @@ TRACK = Package("their_track", "colibri.tracks", ("helix = Helix",))
 
 
 def example(page: str) -> str:
-    """Return the only example in Python of a page of docs/."""
     (code,) = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
     return str(code)
 

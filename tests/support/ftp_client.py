@@ -40,8 +40,6 @@ def parsed(send: Send) -> Reply:
 
 
 class Client:
-    """Asks one question after the other."""
-
     def __init__(self, service: Ftp, peer: Peer = PEER, session: int = 0) -> None:
         self.service = service
         self.peer = peer

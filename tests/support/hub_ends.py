@@ -37,8 +37,6 @@ class Recorder:
 
 
 class CountedShell(Shell):
-    """A shell that counts how often it is polled."""
-
     polls = 0
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -68,8 +66,6 @@ class Observer:
 
 
 class Station:
-    """Somebody at the other end."""
-
     def __init__(self, system: int = 255, component: int = 190) -> None:
         self.codec = Codec(system, component)
 

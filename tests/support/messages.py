@@ -13,7 +13,6 @@ NAN = float("nan")
 
 
 def message(name: str, *fields: Any, peer: Peer = GROUND) -> Message:
-    """Return message `name` as it arrives from `peer`."""
     codec = Codec(peer.system, peer.component)
     (received,) = codec.decode(codec.encode(name, *fields))
     return received
@@ -25,7 +24,6 @@ def command_long(command: int, *params: float, confirmation: int = 0) -> Message
 
 
 def command_int(command: int, *params: float, frame: int = 0, x: int = 0, y: int = 0, z: float = 0.0) -> Message:
-    """Return a COMMAND_INT; parameters that are left out are zero."""
     return message("COMMAND_INT", 1, 1, frame, command, 0, 0, *params, *(0.0,) * (4 - len(params)), x, y, z)
 
 

@@ -34,8 +34,6 @@ ITEMS = [some_item(number) for number in range(3)]
 
 
 class Ground:
-    """The vehicle behind a service, as far as missions go."""
-
     def __init__(self, rules: Rules = VALID) -> None:
         self.loaded: list[tuple[int, Plan]] = []
         self.progress = Progress()
@@ -63,17 +61,14 @@ class Ground:
         return self.guided
 
     def hear(self, peer: Peer, name: str, *fields: Any) -> list[Message]:
-        """Let the service hear a message; return its answers as a ground station decodes them."""
         (message,) = Codec(peer.system, peer.component).decode(Codec(*peer[1:]).encode(name, *fields))
         return self.decoded(self.service.receive(message, peer, self.now_us))
 
     def poll(self, after_us: int = 0) -> list[Message]:
-        """Let time pass; return what the service says then."""
         self.now_us += after_us
         return self.decoded(self.service.poll(self.now_us))
 
     def decoded(self, sends: Iterable[Send]) -> list[Message]:
-        """Return messages as they come off the wire."""
         return [message for send in sends for message in self.codec.decode(self.codec.encode(send.name, *send.fields))]
 
 
@@ -83,12 +78,10 @@ def fielded(item: MissionItem, plan_type: int = 0, current: int = 0) -> tuple[An
 
 
 def results(messages: Iterable[Message]) -> list[int]:
-    """Return the results of the MISSION_ACKs among messages."""
     return [message.fields.type for message in messages if message.name == "MISSION_ACK"]
 
 
 def asked(messages: Iterable[Message]) -> list[tuple[str, int]]:
-    """Return what items are asked for."""
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST")
     return [(message.name, message.fields.seq) for message in messages if message.name in names]
 
@@ -97,17 +90,14 @@ CANCELLED: int = mav.MAV_MISSION_OPERATION_CANCELLED
 
 
 def count(ground: Ground, number: int, peer: Any = FIRST, plan_type: int = MISSION) -> list[Any]:
-    """Begin an upload of so many items; return the answers."""
     return ground.hear(peer, "MISSION_COUNT", *VEHICLE, number, plan_type)
 
 
 def give(ground: Ground, seq: int, item: MissionItem, peer: Any = FIRST, plan_type: int = MISSION) -> list[Any]:
-    """Give an item of an upload; return the answers."""
     return ground.hear(peer, "MISSION_ITEM_INT", *VEHICLE, seq, *fielded(item, plan_type))
 
 
 def upload(ground: Ground, items: Any = ITEMS, plan_type: int = MISSION) -> list[Any]:
-    """Give every item as it is asked for; return the last answers."""
     answers = count(ground, len(items), plan_type=plan_type)
     for seq, item in enumerate(items):
         assert asked(answers) == [("MISSION_REQUEST_INT", seq)]

@@ -56,7 +56,6 @@ class Flight:
         self.speeds: list[float] = []
 
     def fly(self, seconds: float, until: int = COMPLETE) -> None:
-        """Let time pass, until the mission is in a state."""
         end_us = self.now_us + round(seconds * 1e6)
         while self.now_us < end_us and self.mission.progress.state != until:
             self.step()

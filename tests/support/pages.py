@@ -28,7 +28,6 @@ class Block(NamedTuple):
 
 
 def blocks(*languages: str) -> Iterator[Block]:
-    """Yield the fenced blocks of all pages in one of these languages."""
     for path in PAGES:
         for language, text in _FENCE.findall(path.read_text(encoding="utf-8")):
             if language in languages:
@@ -41,7 +40,6 @@ def prose(path: Path) -> str:
 
 
 def links(path: Path) -> list[str]:
-    """Return where the links and pictures of a page lead."""
     return _LINK.findall(re.sub(r"`[^`\n]*`", "", prose(path)))
 
 

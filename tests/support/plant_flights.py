@@ -20,7 +20,6 @@ FRAME_US = 4000
 
 
 def hummingbird(*parts: str) -> Vehicle:
-    """Return the Hummingbird with these of its parts alone."""
     return load_vehicle("hummingbird").without(set(PARTS) - set(parts))
 
 
@@ -31,7 +30,6 @@ def command(*speeds: float, vehicle: Vehicle) -> ActuatorCommand:
 
 
 def hover(vehicle: Vehicle, share_of_weight: float = 1.0) -> ActuatorCommand:
-    """Return the command that carries the weight, or a share of it."""
     return command(vehicle.hover_speed * share_of_weight**0.5, vehicle=vehicle)
 
 
@@ -59,15 +57,12 @@ def flight(
 
 
 def blowing(velocity_enu_m_s: Vector) -> Weather:
-    """Return the weather of air that always moves like that."""
     return Weather(RecordedWind(Path("always.csv"), (0.0,), (velocity_enu_m_s,)))
 
 
 def states(worlds: Sequence[World]) -> Array:
-    """Return their states, (n, 13)."""
     return np.array([world.state for world in worlds])
 
 
 def speeds(worlds: Sequence[World]) -> Array:
-    """Return their rotor speeds, (n, 4)."""
     return np.array([world.rotor_speeds for world in worlds])

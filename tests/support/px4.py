@@ -54,7 +54,6 @@ class Px4:
         self.origin: Geodetic = DEFAULT_ORIGIN
 
     def hello(self) -> list[bytes]:
-        """Return what it says when it has connected."""
         interval = self._codec.encode(
             "COMMAND_LONG", 0, 0, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0, mav.MAVLINK_MSG_ID_HIL_STATE_QUATERNION, 5e3,
             *[0.0] * 5,
@@ -62,7 +61,6 @@ class Px4:
         return [interval, self._codec.encode("HEARTBEAT", 0, mav.MAV_AUTOPILOT_PX4, 0, 0, 0, 3)]
 
     def hear(self, datagram: bytes) -> list[bytes]:
-        """Return its answer to what the simulator sends."""
         answers = []
         for message in self._codec.decode(datagram):
             fields = message.fields

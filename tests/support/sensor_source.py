@@ -109,8 +109,6 @@ class Faults:
 
 
 class Recording(NamedTuple):
-    """What was measured, and the truth."""
-
     frames: list[SensorFrame]
     motion: Motion
     gyro_bias: Array
@@ -125,7 +123,6 @@ def record(
     faults: Faults | None = None,
     origin: Geodetic = DEFAULT_ORIGIN,
 ) -> Recording:
-    """Measure along a path."""
     faults = faults or Faults()
     dt = INTERVAL_US * 1e-6
     t: Array = np.arange(round(duration_s / dt), dtype=np.float64) * dt

@@ -9,17 +9,14 @@ from colibri.common.types import Quaternion, Vector
 
 
 def reals(limit: float) -> st.SearchStrategy[float]:
-    """Finite numbers up to `limit` in size."""
     return st.floats(-limit, limit, allow_nan=False)
 
 
 def vectors(limit: float = 1e3) -> st.SearchStrategy[Vector]:
-    """Vectors with components up to `limit`."""
     return st.tuples(reals(limit), reals(limit), reals(limit))
 
 
 def quaternions() -> st.SearchStrategy[Quaternion]:
-    """Unit quaternions."""
     components = st.tuples(reals(1.0), reals(1.0), reals(1.0), reals(1.0))
     return components.filter(lambda q: sum(c * c for c in q) > 1e-3).map(normalized)
 

@@ -48,7 +48,6 @@ def messages(name: str) -> st.SearchStrategy[Message]:
 
 
 def anything(kind: str) -> st.SearchStrategy[Any]:
-    """Return values of a wire type."""
     if kind == "float":
         return st.floats(width=32) | st.floats(-60.0, 60.0, width=32) | st.floats(0.0, 1.0, width=32)
     minimum, maximum = _RANGES[kind]

@@ -32,7 +32,6 @@ class Vehicle:
         ]
 
     def poll(self, now_us: int) -> list[tuple[int | None, bytes]]:
-        """Return what is sent without a request."""
         sends = [
             self._encoded(send)
             for service in self._services
@@ -63,14 +62,12 @@ class Link:
         self.datagrams = 0
 
     def run(self, until: Callable[[], Any], within_us: int = MINUTE_US) -> bool:
-        """Let time pass until something is so; return whether it came to be."""
         end_us = self.now_us + within_us
         while self.now_us < end_us and not until():
             self.step()
         return bool(until())
 
     def step(self) -> None:
-        """Let one frame pass."""
         self.now_us += STEP_US
         self._send_down(self._vehicle.poll(self.now_us))
         for number, frame in self._arrived(self._up):

@@ -57,7 +57,6 @@ class Flight:
         self.world = self.physics.step(self.world, command, STEP_US)
 
     def follow(self, name: str, seconds: float) -> np.ndarray:
-        """Fly a track; return the position errors, m."""
         planner, errors = Planner(track(name), "by-formula", self.law.preview), []
         for _ in range(round(seconds * 1e6) // STEP_US):
             references = planner.horizon(self.world.time_us)

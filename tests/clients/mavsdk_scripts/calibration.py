@@ -8,7 +8,6 @@ from tests.clients.mavsdk_scripts.connection import connected, streamed
 
 
 def main(url: str) -> None:
-    """Calibrate the vehicle at `url`."""
     with connected(url) as vehicle:
         calibration = Calibration(vehicle)
         for kind in ("gyro", "accelerometer", "magnetometer", "level_horizon"):

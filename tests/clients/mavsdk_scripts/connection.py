@@ -19,7 +19,6 @@ METRES_PER_DEGREE = 111_319.5
 
 @contextmanager
 def connected(url: str) -> Iterator[Any]:
-    """Yield the vehicle at `url`, once it is found."""
     mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     try:
         result = mavsdk.add_any_connection(url)
@@ -66,7 +65,6 @@ def streamed(begin: Callable[[Callable[..., None]], None], next_result: object, 
 
 
 def refused(call: Callable[[], object], reason: object) -> None:
-    """Demand that MAVSDK reports `reason` as the result of a call."""
     try:
         call()
     except MavsdkError as error:
@@ -77,13 +75,11 @@ def refused(call: Callable[[], object], reason: object) -> None:
 
 
 def distance_m(telemetry: Telemetry, north_m: float, east_m: float, down_m: float) -> float:
-    """Return how far the vehicle is from a place, NED from its origin."""
     at = telemetry.position_velocity_ned().position
     return hypot(at.north_m - north_m, at.east_m - east_m, at.down_m - down_m)
 
 
 def take_off(vehicle: Any, height_m: float) -> tuple[Action, Telemetry]:
-    """Climb to a height above the ground and hold there."""
     action, telemetry = Action(vehicle), Telemetry(vehicle)
     until(lambda: telemetry.health().is_armable and telemetry.health().is_home_position_ok, "a vehicle to arm")
     action.set_takeoff_altitude(height_m)

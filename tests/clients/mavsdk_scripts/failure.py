@@ -12,7 +12,6 @@ ENABLE = "SYS_FAILURE_EN"
 
 
 def main(url: str) -> None:
-    """Take GPS from the vehicle at `url` for a while."""
     with connected(url) as vehicle:
         telemetry, failure, param = Telemetry(vehicle), Failure(vehicle), Param(vehicle)
         until(lambda: telemetry.gps_info().fix_type >= FixType.FIX_3D, "a fix")

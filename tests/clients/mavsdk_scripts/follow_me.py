@@ -11,7 +11,6 @@ TARGETS_NORTH_EAST_M = ((10.0, 0.0), (10.0, 15.0))
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         _, telemetry = take_off(vehicle, 4.0)
         follow_me = FollowMe(vehicle)

@@ -12,7 +12,6 @@ SIZE = 20_000
 
 
 def main(url: str) -> None:
-    """Exchange files with the vehicle at `url`."""
     here = Path("exchanged.bin")
     here.write_bytes(Random(1).randbytes(SIZE))
     with connected(url) as vehicle:

@@ -12,7 +12,6 @@ RADIUS_M = 3.0
 
 
 def main(url: str) -> None:
-    """Fence the vehicle at `url` in, and leave it fenced in."""
     with connected(url) as vehicle:
         telemetry, geofence = Telemetry(vehicle), Geofence(vehicle)
         until(lambda: telemetry.health().is_home_position_ok, "home")

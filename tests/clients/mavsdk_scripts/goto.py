@@ -8,7 +8,6 @@ NORTH_M, EAST_M, HEIGHT_M, HEADING_DEG = 15.0, -10.0, 8.0, 90.0
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 3.0)
         altitude_m = telemetry.home().absolute_altitude_m + HEIGHT_M

@@ -8,7 +8,6 @@ from tests.clients.mavsdk_scripts.connection import connected, streamed, take_of
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`, then ask it for its logs."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 1.5)
         action.land()

@@ -15,7 +15,6 @@ class Sticks:
     """Held until they are moved: sent again and again, as a joystick does."""
 
     def __init__(self, manual: ManualControl) -> None:
-        """Begin in the middle."""
         self.held = (0.0, 0.0, 0.5, 0.0)
         self._manual = manual
         manual.set_manual_control_input(*self.held)
@@ -28,13 +27,11 @@ class Sticks:
             self._manual.set_manual_control_input(*self.held)
 
     def drop(self) -> None:
-        """Send no more."""
         self._dropped.set()
         self._thread.join()
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 4.0)
         manual = ManualControl(vehicle)

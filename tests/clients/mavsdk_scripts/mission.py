@@ -14,7 +14,6 @@ HEIGHT_M, SPEED_M_S = 6.0, 4.0
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         mission, action, telemetry = Mission(vehicle), Action(vehicle), Telemetry(vehicle)
         until(lambda: telemetry.health().is_armable and telemetry.health().is_home_position_ok, "a vehicle to arm")

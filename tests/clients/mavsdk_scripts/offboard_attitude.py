@@ -12,7 +12,6 @@ HOVER = 0.34
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 10.0)
         offboard = Offboard(vehicle)

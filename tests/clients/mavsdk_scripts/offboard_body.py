@@ -11,7 +11,6 @@ HALVES = (90.0, 270.0)
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         _, telemetry = take_off(vehicle, 4.0)
         offboard = Offboard(vehicle)

@@ -10,7 +10,6 @@ PLACES_NED_YAW = ((4.0, 0.0, -4.0, 90.0), (0.0, 3.0, -6.0, 0.0))
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         _, telemetry = take_off(vehicle, 3.0)
         offboard = Offboard(vehicle)

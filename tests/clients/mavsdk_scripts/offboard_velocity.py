@@ -12,7 +12,6 @@ VELOCITIES_NED_YAW = ((2.0, 0.0, 0.0, 0.0), (0.0, 1.5, 0.0, 90.0), (0.0, 0.0, 0.
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         _, telemetry = take_off(vehicle, 5.0)
         offboard = Offboard(vehicle)

@@ -10,7 +10,6 @@ RADIUS_M, SPEED_M_S, HEIGHT_M, NORTH_M, EAST_M = 5.0, 2.0, 6.0, 5.0, 0.0
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 4.0)
         altitude_m = telemetry.home().absolute_altitude_m + HEIGHT_M

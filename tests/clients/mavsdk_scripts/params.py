@@ -10,7 +10,6 @@ WHOLE, REAL = "SYS_FAILURE_EN", "MIS_TAKEOFF_ALT"
 
 
 def main(url: str) -> None:
-    """Set parameters of the vehicle at `url`."""
     with connected(url) as vehicle:
         param = Param(vehicle)
         everything = param.get_all_params()

@@ -8,7 +8,6 @@ HEIGHT_M = 5.0
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, HEIGHT_M)
         assert telemetry.in_air()

@@ -44,7 +44,6 @@ RATE_HZ = 10.0
 
 
 def main(url: str) -> None:
-    """Listen to the vehicle at `url`."""
     with connected(url) as vehicle:
         telemetry = Telemetry(vehicle)
         heard: set[str] = set()

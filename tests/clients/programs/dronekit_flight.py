@@ -11,7 +11,6 @@ GIVE_UP_AFTER_S = 60.0
 
 
 def say(*words: object) -> None:
-    """Print a line at once."""
     sys.stdout.write(" ".join(map(str, words)) + "\n")
     sys.stdout.flush()
 
@@ -36,7 +35,6 @@ def when(attribute: str, holds: Callable[[Any], bool]) -> Event:
 
 
 def wait(heard: Event, what: str) -> None:
-    """Wait for a listener."""
     if not heard.wait(GIVE_UP_AFTER_S):
         sys.exit(f"waited in vain: {what}")
     say(what)

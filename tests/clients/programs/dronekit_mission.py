@@ -17,12 +17,10 @@ RELATIVE = mavutil.mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 def item(command: int, latitude_deg: float, longitude_deg: float, height_m: float) -> Command:
-    """Return an item of a mission."""
     return Command(0, 0, 0, RELATIVE, command, 0, 0, 0, 0, 0, 0, latitude_deg, longitude_deg, height_m)
 
 
 def wait(condition: Callable[[], bool], what: str) -> None:
-    """Wait until `condition()`."""
     give_up_s = monotonic() + GIVE_UP_AFTER_S
     while not condition():
         if monotonic() > give_up_s:
@@ -32,7 +30,6 @@ def wait(condition: Callable[[], bool], what: str) -> None:
 
 
 def say(*words: object) -> None:
-    """Print a line at once."""
     sys.stdout.write(" ".join(map(str, words)) + "\n")
     sys.stdout.flush()
 

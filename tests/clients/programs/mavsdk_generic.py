@@ -12,7 +12,6 @@ HEIGHT_M = 3.0
 
 
 def main(url: str) -> None:
-    """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, HEIGHT_M)
         refused(action.get_return_to_launch_altitude, ActionResult.UNSUPPORTED)

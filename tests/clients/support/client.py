@@ -39,22 +39,18 @@ class Client:
             )
 
     def __enter__(self) -> Self:
-        """Let it run while the block lasts."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End it."""
         self.end()
 
     @property
     def printed(self) -> str:
-        """What it has printed so far."""
         return self._printed.read_text(encoding="utf-8", errors="replace")
 
     def wait_printed(self, pattern: str, within_s: float = 20.0, *, times: int = 1) -> None:
-        """Wait until a regular expression is found in what it has printed, `times` times."""
         wait_for(
             lambda: len(re.findall(pattern, self.printed)) >= times or self.process.poll() is not None,
             f"{pattern} in what is printed",
@@ -71,7 +67,6 @@ class Client:
         assert code == 0, f"{'no end' if code is None else f'exit code {code}'}:\n{self.printed[-2000:]}"
 
     def end(self) -> None:
-        """End it, and what it has started, however they are."""
         with suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()

@@ -17,17 +17,14 @@ def place(latitude_deg: float, longitude_deg: float, height_m: float) -> Vector:
 
 
 def away_m(sight: Sight, where: Vector) -> float:
-    """Return how far the vehicle is from a place."""
     return hypot(*(seen - wanted for seen, wanted in zip(sight.position_enu_m, where, strict=True)))
 
 
 def closest_m(sights: Sequence[Sight], where: Vector) -> float:
-    """Return how close the vehicle came to a place."""
     return min(away_m(sight, where) for sight in sights)
 
 
 def turned_rad(angle: float) -> float:
-    """Return an angle within half a turn of zero."""
     return atan2(sin(angle), cos(angle))
 
 
@@ -43,10 +40,8 @@ def heading_deg(sight: Sight) -> float:
 
 
 def speed_m_s(sight: Sight) -> float:
-    """Return the horizontal speed."""
     return hypot(*sight.velocity_enu_m_s[:2])
 
 
 def during(sights: Sequence[Sight], start_s: float, end_s: float) -> list[Sight]:
-    """Return what was seen in an interval of simulated time."""
     return [sight for sight in sights if start_s <= sight.time_s <= end_s]

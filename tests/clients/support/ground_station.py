@@ -31,7 +31,6 @@ class GroundStation:
     """
 
     def __init__(self, system_id: int = 255, component_id: int = 190, port: int = 0, *, announced: bool = True) -> None:
-        """Listen on `port` (0: any that is free); `announced`: send heartbeats."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self.mav = mavlink2.MAVLink(self, system_id, component_id)
@@ -44,39 +43,31 @@ class GroundStation:
         self._heartbeat_due_s = 0.0
 
     def __enter__(self) -> Self:
-        """Listen while the block lasts."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Listen no more."""
         self._socket.close()
 
     @property
     def port(self) -> int:
-        """Where it listens."""
         return int(self._socket.getsockname()[1])
 
     @property
     def url(self) -> str:
-        """The link that calls it."""
         return f"udpout:127.0.0.1:{self.port}"
 
     def write(self, datagram: bytes) -> None:
-        """Send a frame to everybody; called by `mav`."""
         self._tell(datagram)
         for peer in self.peers:
             self._socket.sendto(datagram, peer)
 
     def listen_to_sent(self, listener: Callable[[bytes], None]) -> None:
-        """Tell `listener` every frame that is sent from now on."""
         self._tell = listener
 
     def call(self, port: int) -> None:
-        """Speak to a vehicle that waits on `port`."""
         self.peers.append(("127.0.0.1", port))
 
     def pump(self, within_s: float = 0.05) -> list[Message]:
-        """Return what has come, having waited for it as long as that."""
         if self._announced and self.peers and monotonic() >= self._heartbeat_due_s:
             self._heartbeat_due_s = monotonic() + _HEARTBEAT_EVERY_S
             self.mav.heartbeat_send(mavlink2.MAV_TYPE_GCS, mavlink2.MAV_AUTOPILOT_INVALID, 0, 0, 0)
@@ -110,7 +101,6 @@ class GroundStation:
     def until(
         self, seen: Observer, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S
     ) -> Sight:
-        """Listen until the vehicle, as the observer sees it, meets `condition`."""
         give_up_s = monotonic() + within_s
         while not condition(sight := seen.now):
             assert monotonic() < give_up_s, f"waited in vain for {what}; {sight}; {seen.texts}"
@@ -126,7 +116,6 @@ class GroundStation:
     def command_int(
         self, number: int, frame: int, four: Iterable[float], x: int, y: int, z: float, *, system: int = 1
     ) -> int:
-        """Send COMMAND_INT; return the result of its acknowledgement."""
         self.mav.command_int_send(system, 1, frame, number, 0, 0, *four, x, y, z)
         return self._acknowledged(number, system)
 

@@ -16,7 +16,6 @@ GIVE_UP_AFTER_S = 60.0
 
 
 def program() -> Path:
-    """Return MAVProxy's command."""
     found = shutil.which("mavproxy.py", path=str((ENVIRONMENT / "bin").absolute()))
     assert found, f"no MAVProxy in {ENVIRONMENT}: `make test-clients` installs it, COLIBRI_CLIENTS names another place"
     return Path(found)
@@ -38,18 +37,15 @@ class MavProxy:
         self._read = 0
 
     def __enter__(self) -> Self:
-        """Wait until it knows its vehicle."""
         self.expect(r"Received \d+ parameters")
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End it."""
         self._client.end()
 
     def type(self, line: str, pattern: str) -> re.Match[str]:
-        """Type a line; return what matches a regular expression in what it prints from then on."""
         self._read = len(self._client.printed)
         stdin = self._client.process.stdin
         assert stdin is not None, "it reads what is typed"

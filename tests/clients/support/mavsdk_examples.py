@@ -41,12 +41,10 @@ class Result(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Passed, or not."""
         return "failed" if self.failure else "passed, ended by the runner" if self.example.endless else "passed, exit 0"
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the examples; return 1 if one fails."""
     args = _parser().parse_args(argv)
     folder = args.folder / "examples" if (args.folder / "examples").is_dir() else args.folder
     chosen = [example for example in EXAMPLES if not args.only or example.name in args.only]
@@ -69,7 +67,6 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def table(results: Sequence[Result]) -> str:
-    """Return the results as Markdown."""
     rows = [
         f"| {result.example.name} | {result.verdict} | {result.seconds:.1f} | {_shows(result.example)} |"
         for result in results

@@ -23,7 +23,6 @@ MAX_DIFFERENT = 0.005
 
 
 def rows_of(count: int) -> Array:
-    """Return rows of time, noise, and a column that never changes."""
     noise = np.random.default_rng(count).normal(size=count)
     return np.stack([np.arange(count, dtype=np.float64), noise, np.full(count, 7.0)], axis=1)
 
@@ -75,7 +74,6 @@ def picture(figure: Figure) -> NDArray[np.uint8]:
 
 
 def different(one: Figure, other: Figure) -> float:
-    """Return the part of the pixels in which two figures are clearly different."""
     return float((np.ptp([picture(one), picture(other)], axis=0).max(axis=1) > 64).mean())
 
 

@@ -16,7 +16,6 @@ from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, SHORT, Here, Hovers
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
-    """The tables of the campaign that `OPTIONS` are, flown in this process."""
     folder = tmp_path_factory.mktemp("expected") / "out"
     campaign = planned(fly={"duration": 0.6}, seeds=SEEDS, draw={MASS: {"uniform": [0.68, 0.74]}})
     fly_campaign(campaign, Here(), folder)

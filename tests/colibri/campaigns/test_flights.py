@@ -15,8 +15,6 @@ from tests.support.campaigns import MASS, SHORT, Hovers, flown, planned
 
 
 class Falls(Hovers):
-    """A law that stops all rotors, and raises when told so."""
-
     def step(self, _memory: None, time_us: int, state: colibri.VehicleState, _references: object) -> Any:
         if time_us > 50_000 and self.raises:
             raise ZeroDivisionError("by zero")

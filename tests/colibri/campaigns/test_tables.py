@@ -100,7 +100,6 @@ def test_a_metric_that_was_not_kept_is_refused() -> None:
 
 
 def points(line: Line2D) -> list[list[float]]:
-    """Return abscissas and ordinates of a line."""
     return [np.asarray(values).tolist() for values in line.get_data()]
 
 

@@ -35,7 +35,6 @@ both = pytest.mark.parametrize("name", LAWS)
 
 @pytest.fixture(scope="module")
 def certified() -> Certificate:
-    """Return the certificate of what profile flight flies."""
     return CERTIFICATES[PROFILE.controller]
 
 
@@ -154,7 +153,6 @@ def test_the_lqr_is_unstable_beyond_the_largest_ranges() -> None:
 
 
 def made(tmp_path: Path, changes: dict[str, str]) -> str:
-    """Return profile flight with changes, as a file."""
     text, path = profile_text("flight"), tmp_path / "unstable.toml"
     for one, other in changes.items():
         assert text.count(one) == 1

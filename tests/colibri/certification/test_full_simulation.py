@@ -66,8 +66,6 @@ class Case(Protocol):
 
 
 class Lqr:
-    """That of `lpv-mpc`."""
-
     name = "lpv-mpc"
     certified: AttitudeLaw = LqrAttitude(table(name), VEHICLE, CONDITIONS)
     begun = LpvMpc(table(name), VEHICLE, lambda: 0.0).initial(VEHICLE.hover_speed)
@@ -86,8 +84,6 @@ class Lqr:
 
 
 class Whole:
-    """The unconstrained law of `whole-lpv-mpc`."""
-
     name = "whole-lpv-mpc"
     certified: AttitudeLaw = WholeAttitude(table(name), VEHICLE, CONDITIONS)
 

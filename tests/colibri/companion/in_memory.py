@@ -22,8 +22,6 @@ NO_LAW_CLOCK = 0.0
 
 
 class Mutinous:
-    """The law of profile `flight`, until it raises."""
-
     def __init__(self) -> None:
         self.raises = False
 
@@ -85,7 +83,6 @@ class Ride(Generic[Flown]):
         return self.sitl.time_us + AHEAD_US
 
     def step(self) -> None:
-        """Fly one frame."""
         now_us = self.now_us
         for datagram in self._down.due(now_us):
             self.companion.receive(datagram, now_us)
@@ -102,14 +99,12 @@ class Ride(Generic[Flown]):
             self._down.put(datagram, self.now_us)
 
     def until(self, condition: Callable[[], object], within_s: float) -> None:
-        """Fly until something is so."""
         ends_s = self.sitl.time_s + within_s
         while not condition():
             assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
             self.step()
 
     def to_the_end(self, within_s: float) -> None:
-        """Fly until the companion has ended."""
         self.until(lambda: self.companion.ended is not None, within_s)
 
 
@@ -124,11 +119,9 @@ class Port:
         station.departing = self._departing  # type: ignore[method-assign]
 
     def carry(self, datagrams: list[bytes]) -> None:
-        """Hand datagrams to the vehicle."""
         self._to_vehicle.extend(datagrams)
 
     def take(self) -> list[bytes]:
-        """Return what the vehicle has sent."""
         taken, self._from_vehicle = self._from_vehicle, []
         return taken
 

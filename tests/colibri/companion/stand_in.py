@@ -120,7 +120,6 @@ class StandIn:
         return bool(self.position[2] > 0.05)
 
     def choose(self, mode: int) -> None:
-        """Have the pilot choose a mode."""
         self.mode = mode
         self.modes.append((self.time_us, mode))
 

@@ -48,12 +48,10 @@ def moves_of(ride: Ride[Sitl], since_us: int = 0) -> list[int]:
 
 
 def in_air(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
-    """Return a companion of a vehicle that hovers at 3 m, on its true state."""
     return Ride(flights.begin(airborne=3.0), HOVER, settings or CompanionSettings(), **more)
 
 
 def flying(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
-    """Return one that flies it."""
     ride = in_air(flights, settings, **more)
     ride.until(lambda: ride.companion.phase is Phase.FLYING, 10.0)
     return ride
@@ -188,7 +186,6 @@ def test_an_identification_finds_the_vehicles_response(flights: Flights) -> None
 
 
 def _say(ride: Ride[Sitl], name: str, *fields: Any) -> Callable[[], None]:
-    """Return what has the vehicle say something at each step, whatever else it says."""
     codec = Codec(1, 1)
     return lambda: ride.companion.receive(codec.encode(name, *fields), ride.now_us)
 

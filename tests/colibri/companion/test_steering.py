@@ -58,7 +58,6 @@ def test_a_free_fall_is_one() -> None:
 
 
 def logged(lags_s: tuple[float, float, float], late_s: float, noise: float) -> RateLog:
-    """Return the log of steps flown by a vehicle that lags so."""
     t = np.arange(0.0, duration_s(), 0.008)
     commands = np.array([step_at(float(time_s)) for time_s in t])
     measured_s, rates, rate = np.arange(0.0, duration_s(), 0.01), [], np.zeros(3)

@@ -39,8 +39,6 @@ class Good:
 
 
 class Stateful(Good):
-    """Keeps how often it was asked."""
-
     asked = 0
 
     def step(self, *args: Any) -> tuple[Any, Any]:
@@ -50,8 +48,6 @@ class Stateful(Good):
 
 
 class Remembering(Good):
-    """Writes to the memory that it is given."""
-
     def initial(self, _rotor_speed: float) -> list[int]:
         return [0]
 
@@ -62,32 +58,24 @@ class Remembering(Good):
 
 
 class Unpicklable(Good):
-    """Remembers a function."""
-
     def step(self, *args: Any) -> tuple[Any, Any]:
         memory, decision = super().step(*args)
         return (lambda: memory), decision
 
 
 class Random(Good):
-    """Never decides the same."""
-
     def step(self, *args: Any) -> tuple[Any, Any]:
         memory, decision = super().step(*args)
         return memory, decision._replace(rotor_speeds=decision.rotor_speeds * (1.0 - 1e-9 * next(_COUNT)))
 
 
 class BuiltOtherwise(Good):
-    """Is another law each time it is built."""
-
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.offset = np.array([1e-6 * next(_COUNT), 0.0, 0.0])
 
 
 class Overwriting(Good):
-    """Returns one array again and again."""
-
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.speeds = np.zeros(4)
@@ -99,16 +87,12 @@ class Overwriting(Good):
 
 
 class Scribbling(Good):
-    """Writes to its references."""
-
     def step(self, memory: Any, time_us: int, state: Any, references: Any) -> tuple[Any, Any]:
         references.position_enu_m[0, 0] += 1e-3
         return super().step(memory, time_us, state, references)
 
 
 class NoUpsideDown(Good):
-    """Raises where its model ends."""
-
     def step(self, memory: Any, time_us: int, state: Any, references: Any) -> tuple[Any, Any]:
         if abs(state.euler[0]) > 2.0:
             raise ValueError("no model for this roll")
@@ -116,8 +100,6 @@ class NoUpsideDown(Good):
 
 
 class NotFinite(Good):
-    """Divides by a distance that is 0 on the ground alone."""
-
     def step(self, memory: Any, time_us: int, state: Any, references: Any) -> tuple[Any, Any]:
         memory, decision = super().step(memory, time_us, state, references)
         part = 1.0 if state.position_enu_m[2] > 1e-3 else np.nan
@@ -125,8 +107,6 @@ class NotFinite(Good):
 
 
 class TooFast(Good):
-    """Asks for more than a rotor can where its reference jumps."""
-
     def step(self, memory: Any, time_us: int, state: Any, references: Any) -> tuple[Any, Any]:
         memory, decision = super().step(memory, time_us, state, references)
         off_m = np.linalg.norm(references.position_enu_m[0] - state.position_enu_m)
@@ -134,54 +114,40 @@ class TooFast(Good):
 
 
 class Listed(Good):
-    """Returns rotor speeds as a list."""
-
     def step(self, *args: Any) -> tuple[Any, Any]:
         memory, decision = super().step(*args)
         return memory, decision._replace(rotor_speeds=decision.rotor_speeds.tolist())
 
 
 class NoAngles(Good):
-    """Says no attitude."""
-
     def step(self, *args: Any) -> tuple[Any, Any]:
         memory, decision = super().step(*args)
         return memory, decision._replace(attitude_reference=None)
 
 
 class NoDiagnostics(Good):
-    """Says nothing of how it decided."""
-
     def step(self, *args: Any) -> tuple[Any, Any]:
         memory, decision = super().step(*args)
         return memory, decision._replace(diagnostics=None)
 
 
 class Drifting(Good):
-    """Holds another place than it is told."""
-
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.offset = np.array([0.8, 0.0, 0.0])
 
 
 class Half(Good):
-    """Says its charge, and cannot be told another."""
-
     def charge_ah(self, _memory: Any) -> float:
         return 0.0
 
 
 class Forgetful(Half):
-    """Is told another charge, and forgets it."""
-
     def with_charge(self, memory: Any, _charge_ah: float) -> Any:
         return memory
 
 
 class Tilted(Good):
-    """Takes attitudes, and holds the roll the wrong way round."""
-
     def step_attitude(self, memory: Any, _time_us: int, state: Any, demand: Any) -> tuple[Any, Any]:
         wanted = demand.angles[0] * (-1.0, 1.0, 1.0)
         moment = self.inertia * (100.0 * (wanted - state.euler) - 18.0 * np.array(state.rate_flu_rad_s))
@@ -190,15 +156,11 @@ class Tilted(Good):
 
 
 class LateLoading(Good):
-    """Decides otherwise once what is compiled is loaded."""
-
     def warm_up(self) -> None:
         self.offset = np.array([1e-6, 0.0, 0.0])
 
 
 class TableBound(Good):
-    """Raises at a memory of another gain than its own."""
-
     def initial(self, _rotor_speed: float) -> float:
         return float(self.table["gain"])
 
@@ -209,8 +171,6 @@ class TableBound(Good):
 
 
 class LostAnew(Good):
-    """Flies only what it has begun itself at the start of a flight."""
-
     def initial(self, _rotor_speed: float) -> int:
         return 0
 
@@ -221,8 +181,6 @@ class LostAnew(Good):
 
 
 class OfTwoTypes(Good):
-    """Remembers nothing at first, then a tuple, and decides by it."""
-
     def initial(self, _rotor_speed: float) -> None:
         return None
 

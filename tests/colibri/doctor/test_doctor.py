@@ -27,7 +27,6 @@ ROUTES = (
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """Yield a port of loopback that this process has."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mine:
         mine.bind((network.HOST, 0))
         yield mine.getsockname()[1]

@@ -34,7 +34,6 @@ def forked() -> Iterator[Launcher]:
 
 
 def up_and_on(sitl: Sitl) -> None:
-    """Exchange everything there is to exchange with a ground station, in the air."""
     sitl.set_param("RTL_RETURN_ALT", 7.0)
     items = sitl.items
     sitl.upload_mission([items.takeoff(1.0), items.waypoint(1.0, 0.5, 1.5)])
@@ -49,7 +48,6 @@ def up_and_on(sitl: Sitl) -> None:
 
 
 def flown(launcher: Launcher | None, fly: Callable[[Sitl], object], **setting: Any) -> tuple[str, list[str]]:
-    """Fly; return the hash and what the vehicle said."""
     with Flights(Setting(**setting), launcher) as flights:
         sitl = flights.begin()
         fly(sitl)
@@ -230,7 +228,6 @@ def test_a_process_that_cannot_begin_is_quoted() -> None:
 
 
 def process_of(sitl: Sitl, package: str) -> int:
-    """Return the number of a flight's process."""
     return sitl.processes[package]
 
 

@@ -56,7 +56,6 @@ def verdict(result: pytest.RunResult) -> str:
 
 
 def first_test() -> str:
-    """Return the test file of the docs."""
     found = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
     assert found is not None
     return found[1]

@@ -23,7 +23,6 @@ def all_of(folder: Path, trials: int = 14) -> list[Ended]:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[Ended]:
-    """What comes of 14 trials by one process."""
     return all_of(tmp_path_factory.mktemp("expected"))
 
 

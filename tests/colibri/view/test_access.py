@@ -26,7 +26,6 @@ def server() -> Iterator[PageServer]:
 
 
 def status(server: PageServer, headers: dict[str, str]) -> int:
-    """Return how a request with these headers is answered."""
     connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20.0)
     connection.request("GET", "/", headers=headers)
     code = connection.getresponse().status

@@ -62,7 +62,6 @@ def test_plans_are_drawn_where_they_lie(sitl: Sitl) -> None:
 
 @pytest.fixture
 def others() -> tuple[Observer, Any]:
-    """Return an observer, and what hands it a message of an ArduPilot copter."""
     observer, codec = Observer(), Codec(1, 1)
 
     def send(name: str, *fields: Any) -> None:
@@ -141,7 +140,6 @@ def test_offered_modes_exist() -> None:
 
 
 def messages(observer: Observer, at_s: float) -> list[Any]:
-    """Return what is sent at a time."""
     return [message for each in observer.poll(at_s) for message in Codec(1, 1).decode(each)]
 
 
@@ -151,6 +149,5 @@ def names(observer: Observer, at_s: float) -> list[str]:
 
 
 def landings(observer: Observer, at_s: float) -> int:
-    """Return how many commands to land are sent at a time."""
     numbers = [each.fields.command for each in messages(observer, at_s) if each.name == "COMMAND_LONG"]
     return numbers.count(mav.MAV_CMD_NAV_LAND)

@@ -22,7 +22,6 @@ ON_STATION_LOSS = pytest.mark.sitl(airborne=10.0, params={"NAV_DLL_ACT": RETURN,
 
 
 def reported_state(sitl: Sitl) -> int:
-    """Return the MAV_STATE of the next HEARTBEAT."""
     sitl.run(0.1)
     return int(sitl.gcs.latest("HEARTBEAT").system_status)
 
@@ -38,7 +37,6 @@ def go_offboard(sitl: Sitl, velocity: Vector) -> None:
 
 
 def drain(sitl: Sitl, part: float) -> None:
-    """Have so much of the full battery's charge gone at once."""
     sitl.inject("battery", "wrong", 0, 1.0 - part)
 
 

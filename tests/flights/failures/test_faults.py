@@ -92,7 +92,6 @@ def test_a_late_command_gives_another_reproducible_flight(sitl_fleet: Callable[.
 
 
 def mass_kg(sitl: Sitl) -> float:
-    """Return the mass that the control law has estimated."""
     decision = sitl.inside.copter.parts.actuation.decision
     assert decision is not None
     return decision.diagnostics.mass_kg

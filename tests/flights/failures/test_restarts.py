@@ -29,7 +29,6 @@ def fly_mission(sitl: Sitl, *plan: items.Item) -> None:
 
 
 def max_tilt_deg(sitl: Sitl, seconds: float) -> float:
-    """Fly for so long; return the largest roll or pitch."""
     tilts: list[float] = []
     sitl.run(seconds, lambda: tilts.append(max(map(abs, sitl.euler[:2]))))
     return degrees(max(tilts))

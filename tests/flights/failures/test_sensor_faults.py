@@ -37,7 +37,6 @@ def between(monkeypatch: pytest.MonkeyPatch, sitl: Sitl, change: Callable[[Any],
 
 
 def stays(sitl: Sitl, seconds: float, max_m: float = 1.0) -> None:
-    """Fly for so long, never farther from here than that up, down and sideways."""
     x, y, z = sitl.position
     sitl.hold(lambda: abs(sitl.position[2] - z) < max_m and dist(sitl.position[:2], (x, y)) < max_m, for_=seconds)
 

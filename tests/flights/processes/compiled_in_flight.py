@@ -28,7 +28,6 @@ def versions() -> dict[str, int]:
 
 
 def fly(flight: Sitl) -> None:
-    """Fly by every kind of reference that there is: up, across, by a velocity, an attitude, on a track, home."""
     flight.takeoff()
     flight.goto(5.0, 0.0, 3.0, wait=False)
     flight.run(1.0)
@@ -57,7 +56,6 @@ def fly(flight: Sitl) -> None:
 
 
 def main() -> None:
-    """Print a line for each."""
     with Flights(setting_of([]), None) as flights:
         flight = flights.begin()
         before = versions()

@@ -27,14 +27,12 @@ class DelayRelay(Relay):
     """Delays datagrams, both ways alike."""
 
     def __init__(self, plant_url: str, delay_s: float) -> None:
-        """Relay to the plant at `plant_url`, each datagram so much later."""
         super().__init__(plant_url)
         self._delay_s = delay_s
         self._late: deque[tuple[float, str, bytes]] = deque()
         Thread(target=self._deliver_late, daemon=True).start()
 
     def pass_on(self, to: str, datagram: bytes) -> None:
-        """Keep it until it is due."""
         self._late.append((perf_counter() + self._delay_s, to, datagram))
 
     def _deliver_late(self) -> None:
@@ -75,7 +73,6 @@ def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, f
 
 
 def main() -> int:
-    """Fly at the speed and the round trips of the command line."""
     speed, *round_trips_ms = map(float, sys.argv[1:])
     for round_trip_ms in round_trips_ms:
         for case in (STEP, LEMNISCATE):

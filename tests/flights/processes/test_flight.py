@@ -113,7 +113,6 @@ def test_constant_wind_leaves_no_offset(tmp_path: Path) -> None:
 
 
 def max_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
-    """Return the largest distance to the reference of the same instant."""
     settled = flown["t"] >= after_s
     axes = [flown[axis][settled] - flown[f"{axis}_ref"][settled] for axis in "xyz"]
     return float(np.linalg.norm(axes, axis=0).max())
@@ -176,7 +175,6 @@ def test_whichever_way_it_turns_it_comes_back(start: str) -> None:
 
 
 def check_recovered(flown: list[Flown]) -> None:
-    """Check that all are upright within a second and no lower than 3 m below."""
     assert max(it.tilt_deg[it.t > 1.0].max() for it in flown) < 65.0
     assert min(it.z_m.min() for it in flown) > 17.0
 

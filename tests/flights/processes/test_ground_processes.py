@@ -42,7 +42,6 @@ def logs(tmp_path: Path) -> Path:
 
 @contextmanager
 def hovering(logs: Path, *links: str) -> Iterator[tuple[Process, Process, Observer, str]]:
-    """Let a vehicle that was picked up in the air hover; give its plant, its autopilot, and who sees it."""
     plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", "--speed", repr(SPEED), *HIGH)
     with Observer() as seen, running(plant):
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
@@ -62,7 +61,6 @@ def hovers(sight: Sight) -> bool:
 
 
 def flies_on(seen: Observer, seconds: float) -> None:
-    """See the vehicle hover for so long, simulated."""
     until_s = seen.now.time_s + seconds
     seen.wait(lambda sight: sight.time_s > until_s, f"{seconds} s of flight")
     assert all(map(hovers, seen.sights)), seen.now
@@ -93,7 +91,6 @@ def test_an_autopilot_says_that_its_plant_is_gone(logs: Path) -> None:
 
 @contextmanager
 def flooding(port: int, datagrams: list[bytes]) -> Iterator[Callable[[], int]]:
-    """Send datagrams as fast as this process can; give how many were sent."""
     ended, sent = Event(), 0
 
     def flood() -> None:
@@ -163,6 +160,5 @@ def caller(port: int) -> socket.socket:
 
 
 def connected(autopilot: Process, how_many: int) -> bool:
-    """Whether the autopilot says that it hears so many, on the link that waits."""
     status = autopilot.events("status")[-1]
     return any(len(link["heard"]) >= how_many for link in status["links"] if link["url"].startswith("tcpin"))

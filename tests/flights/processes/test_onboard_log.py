@@ -40,7 +40,6 @@ class Flown:
 
 
 def fly(seen: Observer) -> None:
-    """Take off, stay, land."""
     for number, params in (
         (mav.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, nan, nan, nan, HEIGHT_M)),
         (mav.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,)),

@@ -23,7 +23,6 @@ STATE_COLUMNS = slice(1, 14)
 
 
 def replayed(inputs: Iterable[InputRecord]) -> dict[int, tuple[float, ...]]:
-    """Return position, velocity, attitude and rates by time."""
     vehicle = load_vehicle("hummingbird")
     assert vehicle.sensors is not None
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)

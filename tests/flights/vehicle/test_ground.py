@@ -19,7 +19,6 @@ TAKEOFF = mav.MAV_CMD_NAV_TAKEOFF
 
 
 def put(sitl: Sitl, start: Start) -> None:
-    """Move the vehicle elsewhere, as it may be after a fall."""
     inside = sitl.inside
     inside.world = starting_world(start, load_vehicle("hummingbird"))._replace(time_us=sitl.time_us)
 

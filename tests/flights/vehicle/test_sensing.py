@@ -23,7 +23,6 @@ CURVE = position(track(TOO_FAST), np.linspace(0.0, 3.0, 20_000))
 
 
 def off_m(sitl: Sitl) -> float:
-    """Return how far the estimate is off the truth."""
     estimate = sitl.inside.copter.parts.state_source.estimate
     assert estimate is not None
     return dist(estimate.frame.position_enu_m, sitl.position)

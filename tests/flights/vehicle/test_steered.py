@@ -23,7 +23,6 @@ REDUCED_TILT = {"MPC_MAN_TILT_MAX": 20.0}
 
 
 def fly_by(sitl: Sitl, seconds: float, **setpoint: Any) -> None:
-    """Fly by one setpoint, in offboard."""
     stream(sitl, EVERY_S, lambda: sitl.setpoint(**setpoint))
     if sitl.mode is not Mode.OFFBOARD:
         sitl.select(Mode.OFFBOARD)

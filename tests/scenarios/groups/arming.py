@@ -13,7 +13,6 @@ WRONG_MAGIC = 2989.0
 
 
 def soon(sitl: Sitl) -> None:
-    """See that it has not taken longer than 5 s."""
     assert sitl.time_s <= 5.0
 
 

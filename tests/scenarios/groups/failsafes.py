@@ -41,8 +41,6 @@ IN_THE_AIR = {"airborne": 5.0}
 
 
 def charge_is(state: int) -> Step:
-    """See what BATTERY_STATUS calls the charge."""
-
     def step(sitl: Sitl) -> None:
         sitl.run(1.1)
         assert sitl.gcs.latest("BATTERY_STATUS").charge_state == state

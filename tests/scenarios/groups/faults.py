@@ -44,8 +44,6 @@ ON_SENSORS = {"feedback": "sensors"}
 
 
 def touches_down_slower(m_s: float) -> Step:
-    """See how fast it came to the ground."""
-
     def fastest(columns: Columns) -> float:
         low = (columns["z"] < 0.5) & (columns["z"] > 0.02)
         return float(-columns["vz"][low].min())
@@ -67,12 +65,10 @@ def lands_on_three(number: int, *, tilt: float, within_s: float) -> Step:
 
 
 def max_tilt_in_the_air(columns: Columns) -> float:
-    """Return the figure: the largest tilt off the ground, degrees."""
     return float(tilt_deg(columns)[columns["z"] > 0.1].max())
 
 
 def falls_like_a_stone(sitl: Sitl) -> None:
-    """See that the rotors stop within 2 s and the time that a fall takes."""
     max_s = 2.0 + sqrt(2.0 * sitl.position[2] / 10.0)
     sitl.wait_until(lambda: not sitl.armed, within=max_s, what="the end of the flight")
 
@@ -83,8 +79,6 @@ def stays_away(sitl: Sitl) -> None:
 
 
 def descends_less(max_m: float, seconds: float) -> Step:
-    """See that it does not lose more than that."""
-
     def step(sitl: Sitl) -> None:
         began_m = sitl.position[2]
         sitl.hold(lambda: sitl.position[2] > began_m - max_m, for_=seconds, what=f"at most {max_m:g} m lost")

@@ -10,7 +10,6 @@ from tests.scenarios.words.scenario import FleetScenario
 
 
 def alone_and_together(sitls: Sequence[Sitl]) -> None:
-    """Fly all side by side, the last by itself at the end: the same."""
     *together, alone = sitls
     alone.fleet = ()
     for flight in (Fleet(together), (alone,)):
@@ -24,7 +23,6 @@ def alone_and_together(sitls: Sequence[Sitl]) -> None:
 
 
 def each_hears_its_own(sitls: Sequence[Sitl]) -> None:
-    """Give each another order."""
     for number, sitl in enumerate(sitls):
         sitl.takeoff(2.0 + number)
     assert len({sitl.time_us for sitl in sitls}) == 1

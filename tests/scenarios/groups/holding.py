@@ -25,12 +25,10 @@ KICKED = {"airborne": 5.0, "start": {"p": radians(400.0)}}
 
 
 def kicked(deg: float) -> None:
-    """See that there was a kick."""
     assert deg > 1.0
 
 
 def is_tilted(deg: float) -> None:
-    """See that the tilt is the one asked for."""
     assert abs(deg - 20.0) < 0.5
 
 

@@ -44,7 +44,6 @@ OVER_A_ROUGH_LINK = (
 
 
 def kill_autopilot(sitl: Sitl) -> None:
-    """Kill it, as kill -9 does; it is started again at once."""
     sitl.kill_autopilot()
 
 
@@ -60,14 +59,12 @@ def unlike(sitls: Sequence[Sitl]) -> None:
 
 
 def hears_spoiled(sitl: Sitl) -> None:
-    """See that spoiled datagrams were dropped and counted, and that most came through."""
     dropped = sum(sitl.gcs.dropped.values())
     assert dropped > 20
     assert sum(sitl.gcs.counts.values()) > 3 * dropped
 
 
 def many_listen(sitl: Sitl) -> None:
-    """Have two more ground stations, and see that none misses a heartbeat for 30 s."""
     stations = [sitl.gcs, sitl.client(252), sitl.client(253, 25)]
     sitl.run(2.0)
     before = [station.counts["HEARTBEAT"] for station in stations]
@@ -83,8 +80,6 @@ def is_not_moved(sitl: Sitl) -> None:
 
 
 def lands_after(kills: int, every_s: float) -> Step:
-    """Kill the autopilot so often on the way, and see the mission end."""
-
     def step(sitl: Sitl) -> None:
         for _ in range(kills):
             sitl.run(every_s)

@@ -26,7 +26,6 @@ MAX_COMMANDS = {mav.MAV_CMD_NAV_TAKEOFF: 7, mav.MAV_CMD_DO_CHANGE_SPEED: 7, mav.
 
 
 def send_noise(sitl: Sitl) -> None:
-    """Send bytes that are no messages: noise, halves of messages, long ones."""
     chance = Random(1)
     whole = Codec(255, 190).encode("PARAM_REQUEST_READ", 1, 1, b"TRACK", -1)
     for number in range(400):
@@ -38,8 +37,6 @@ def send_noise(sitl: Sitl) -> None:
 
 
 def fire(count: int) -> Step:
-    """Send messages that are right by their checksum, and mean anything."""
-
     def step(sitl: Sitl) -> None:
         messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MAX_COMMANDS))
         for number in range(count):
@@ -51,7 +48,6 @@ def fire(count: int) -> Step:
 
 
 def still_answers(sitl: Sitl) -> None:
-    """See that it beats, and answers what is asked."""
     before = sitl.gcs.counts["HEARTBEAT"]
     sitl.run(2.1)
     assert sitl.gcs.counts["HEARTBEAT"] - before >= 2
@@ -59,8 +55,6 @@ def still_answers(sitl: Sitl) -> None:
 
 
 def parameter_refused(name: str, value: float) -> Step:
-    """Try to set what cannot be, and see that nothing has changed."""
-
     def step(sitl: Sitl) -> None:
         before = sitl.get_param(name)
         with pytest.raises(RefusedError):
@@ -71,7 +65,6 @@ def parameter_refused(name: str, value: float) -> Step:
 
 
 def many_items_refused(sitl: Sitl) -> None:
-    """Announce more items than there is room for."""
     sitl.gcs.forget()
     announce = lambda _: sitl.send("MISSION_COUNT", sitl.system, 1, TOO_MANY, 0)  # noqa: E731
     sitl.gcs.request(announce, lambda: sitl.heard("MISSION_ACK"), "MISSION_ACK")
@@ -79,13 +72,11 @@ def many_items_refused(sitl: Sitl) -> None:
 
 
 def on_wire(**changes: Any) -> MissionItem:
-    """Return a waypoint with something wrong."""
     usual = MissionItem(FRAME, WAYPOINT, 1, 0.0, 0.3, 0.0, nan, 473977420, 85455940, 5.0)
     return usual._replace(**changes)
 
 
 def slower_than(sitl: Sitl, m_s: float) -> None:
-    """See that it was never faster than that."""
     assert abs(sitl.flown()["vx"]).max() < m_s
 
 

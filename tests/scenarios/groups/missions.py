@@ -43,8 +43,6 @@ def off_the_square(columns: Columns) -> float:
 
 
 def reads_back(count: int) -> Step:
-    """See that the vehicle has so many items."""
-
     def step(sitl: Sitl) -> None:
         sitl.gcs.forget()
         ask = at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
@@ -55,7 +53,6 @@ def reads_back(count: int) -> Step:
 
 
 def changes_mode_while_it_uploads(sitl: Sitl) -> None:
-    """Begin an upload, land, and see that the upload ends well."""
     upload = sitl.gcs.begin_upload([item.on_wire(sitl.origin) for item in LONG])
     sitl.run(0.05)
     assert upload.result is None
@@ -66,7 +63,6 @@ def changes_mode_while_it_uploads(sitl: Sitl) -> None:
 
 
 def is_fast(sitl: Sitl, m_s: float) -> None:
-    """See that it has flown so fast, and no faster."""
     fastest = float(abs(sitl.flown()["vy"]).max())
     assert abs(fastest - m_s) < 0.1
 

@@ -25,7 +25,6 @@ def lost_at_its_time(sitl: Sitl) -> None:
 
 
 def begin_offboard(sitl: Sitl) -> None:
-    """Hover by setpoints."""
     sitl.run(0.2, lambda: setpoint(position=PLACE)(sitl))
     sitl.select(Mode.OFFBOARD)
 

@@ -37,7 +37,6 @@ UPDRAFT = Path(__file__).parent / "updraft.csv"
 
 
 def believed_height_stays(sitl: Sitl) -> None:
-    """See that the height that the vehicle itself tells stays what it is."""
     told = [message.z for message in sitl.heard("LOCAL_POSITION_NED")[-100:]]
     assert max(told) - min(told) <= 0.1
 

@@ -28,7 +28,6 @@ def off_track(name: str, since_s: float) -> Callable[[Columns], float]:
 
 
 def on_track(name: str, *, rms_m: float, seconds: float, since_s: float = 5.0) -> tuple[Step, ...]:
-    """Fly a track for so long, and see how far it was off."""
     return run(seconds), measured("the RMS error", off_track(name, since_s), rms_m)
 
 
@@ -50,8 +49,6 @@ def follows_by_its_estimate(sitl: Sitl, max_m: float) -> None:
 
 
 def circles_at(m_s: float, within_m_s: float) -> Step:
-    """See that its speed over ground is that, for 10 s."""
-
     def step(sitl: Sitl) -> None:
         columns = sitl.flown(sitl.time_s - 10.0)
         speed = np.hypot(columns["vx"], columns["vy"])
@@ -61,8 +58,6 @@ def circles_at(m_s: float, within_m_s: float) -> Step:
 
 
 def yaw_turns_through(min_deg: float) -> Step:
-    """See that yaw has turned so far, without a jump."""
-
     def step(sitl: Sitl) -> None:
         columns = sitl.flown()
         w, x, y, z = (columns[name] for name in ("qw", "qx", "qy", "qz"))

@@ -21,17 +21,14 @@ class Condition(NamedTuple):
 
 
 def height(up_m: float, within_m: float) -> Condition:
-    """Its height is about so."""
     return Condition(f"height {up_m:g} ± {within_m:g} m", lambda sitl: abs(sitl.position[2] - up_m) <= within_m)
 
 
 def above(up_m: float) -> Condition:
-    """It is higher than that."""
     return Condition(f"above {up_m:g} m", lambda sitl: sitl.position[2] > up_m)
 
 
 def below(up_m: float) -> Condition:
-    """It is not as high as that."""
     return Condition(f"below {up_m:g} m", lambda sitl: sitl.position[2] < up_m)
 
 
@@ -41,7 +38,6 @@ def near(place: tuple[float, float, float], within_m: float) -> Condition:
 
 
 def over(east_m: float, north_m: float, within_m: float) -> Condition:
-    """It is over a spot, however high."""
     return Condition(
         f"within {within_m:g} m of ({east_m:g}, {north_m:g})",
         lambda sitl: dist(sitl.position[:2], (east_m, north_m)) <= within_m,
@@ -54,12 +50,10 @@ def away(from_home_m: float) -> Condition:
 
 
 def slower(m_s: float) -> Condition:
-    """It moves slower than that."""
     return Condition(f"slower than {m_s:g} m/s", lambda sitl: sitl.speed_m_s < m_s)
 
 
 def ground_speed(m_s: float, within_m_s: float) -> Condition:
-    """It flies over ground at about that speed."""
     return Condition(
         f"{m_s:g} ± {within_m_s:g} m/s over ground",
         lambda sitl: abs(hypot(*sitl.velocity[:2]) - m_s) <= within_m_s,
@@ -72,17 +66,14 @@ def climbs(m_s: float, within_m_s: float) -> Condition:
 
 
 def tilted_less(deg: float) -> Condition:
-    """Its thrust points within so many degrees of straight up."""
     return Condition(f"tilt below {deg:g}°", lambda sitl: sitl.tilt_deg < deg)
 
 
 def turns_slower(deg_s: float) -> Condition:
-    """It yaws slower than that."""
     return Condition(f"yaw rate below {deg_s:g}°/s", lambda sitl: abs(degrees(sitl.rates[2])) < deg_s)
 
 
 def mode(name: Mode) -> Condition:
-    """It is in that mode."""
     return Condition(f"mode {name}", lambda sitl: sitl.mode is name)
 
 
@@ -91,15 +82,12 @@ DISARMED = Condition("disarmed", lambda sitl: not sitl.armed)
 
 
 def says(text: str) -> Condition:
-    """It has said so."""
     return Condition(f"says “{text}”", lambda sitl: sitl.said(text))
 
 
 def quiet_about(text: str) -> Condition:
-    """It has not said so."""
     return Condition(f"does not say “{text}”", lambda sitl: not sitl.said(text))
 
 
 def every(*conditions: Condition) -> Condition:
-    """All of them hold."""
     return Condition(", ".join(each.words for each in conditions), lambda sitl: all(c.holds(sitl) for c in conditions))

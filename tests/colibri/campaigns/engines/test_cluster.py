@@ -28,8 +28,6 @@ def free_port() -> int:
 
 
 class Processes:
-    """A scheduler, and workers that come when they are called."""
-
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self.address = f"tcp://127.0.0.1:{free_port()}"
         self._stack = stack
@@ -82,8 +80,6 @@ def test_an_address_that_is_none_is_refused() -> None:
 
 def test_workers_with_another_version_are_refused() -> None:
     class Client:
-        """What answers in place of a cluster."""
-
         def run(self, function: Any, *_: str, on_error: str) -> dict[str, str | Exception]:
             assert function.__module__.split(".")[0] != "colibri", "a worker may not have it"
             assert on_error == "return"

@@ -40,7 +40,6 @@ def test_jobs_are_taken_as_they_are_needed() -> None:
 
 
 def workers(folder: Path, number: int) -> list[psutil.Process]:
-    """Return the processes that have left a file, when there are `number`."""
     until_s = monotonic() + PATIENCE_S
     while len(names := [path.name for path in folder.iterdir()]) < number:
         assert monotonic() < until_s

@@ -11,7 +11,6 @@ from colibri.campaigns.values import CampaignError
 
 
 def late(job: int) -> int:
-    """Be the later done, the earlier a job is."""
     sleep(0.2 / (1 + job))
     return job * job
 

@@ -18,7 +18,6 @@ TOKEN = Token("a-token")
 
 @pytest.fixture
 def vehicle() -> Iterator[LiveVehicle]:
-    """Return a vehicle on a link that nobody calls."""
     begun = LiveVehicle("udpin:127.0.0.1:0", name="a vehicle")
     yield begun
     begun.close()

@@ -62,7 +62,6 @@ def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: Recorde
 
 
 def _obey(page: Page, show: Show, now_s: float) -> None:
-    """Have it shown what was done in the browser, once that has come."""
     done = page.controls.done.get(timeout=60.0)
     page.controls.done.put(done)
     show.turn(now_s)
