@@ -1,44 +1,19 @@
 """Flights with faults of actuators and battery, with a payload, and of an autopilot that is slow or late."""
 
 from collections.abc import Callable
-from math import dist, nan
+from math import dist
 
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG
-from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, DENIED, QUICK, UNSUPPORTED, restart
+from tests.support.flying import QUICK, restart
 
 pytestmark = QUICK
 
-INJECT = mav.MAV_CMD_INJECT_FAILURE
 NOMINAL_KG, PAYLOAD_KG = 0.698, 0.15
 CALM_HOVER = pytest.mark.sitl(airborne=5.0)
-
-
-@CALM_HOVER
-def test_a_weak_rotor_is_injected_and_compensated(sitl: Sitl) -> None:
-    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 0.65) == DENIED
-    assert sitl.said("SYS_FAILURE_EN is 0")
-    sitl.set_param("SYS_FAILURE_EN", 1)
-    assert sitl.command(INJECT, GPS, OFF) == UNSUPPORTED
-    assert sitl.said("flown by the state")
-    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 65.0) == DENIED
-    assert sitl.said("part that is left must be 0.001 to 1")
-    assert sitl.command(INJECT, MOTOR, WRONG, 1.0, 0.65, nan, nan, nan) == ACCEPTED
-    assert len(sitl.gcs.acks) == 4
-    sitl.run(8.0)
-    away = [dist(place, (0.0, 0.0, 5.0)) for place in sitl.path]
-    assert 0.005 < max(away) < 0.5
-    weak, other = sitl.rotors.controls[0], sitl.rotors.controls[2]
-    assert weak / other == pytest.approx(0.65**-0.5, rel=0.02)
-    assert sitl.inside.copter.parts.rotor_loss.watch.max_evidence == 0.0
-    assert sitl.command(INJECT, MOTOR, OK) == ACCEPTED
-    sitl.run(4.0)
-    assert sitl.rotors.controls[0] == pytest.approx(sitl.rotors.controls[2], rel=0.01)
 
 
 @CALM_HOVER
@@ -74,18 +49,6 @@ def test_a_slow_solver_acts_late_and_skips_samples(sitl_fleet: Callable[..., lis
     assert missed[2] == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
     assert len({sitl.sha256 for sitl in (prompt, in_time, late)}) == 3
     assert flown(12.0).sha256 == late.sha256
-
-
-def test_a_late_command_gives_another_reproducible_flight(sitl_fleet: Callable[..., list[Sitl]]) -> None:
-    def flown(latency_ms: float) -> Sitl:
-        (sitl,) = sitl_fleet(1, airborne=5.0, system=1, latency=latency_ms)
-        sitl.run(1.5)
-        return sitl
-
-    prompt, late = flown(0.0), flown(5.0)
-    assert late.sha256 == flown(5.0).sha256
-    assert late.sha256 != prompt.sha256
-    assert dist(late.position, prompt.position) < 0.05
 
 
 # A payload that is picked up and dropped in flight: its mass is estimated, in the air alone.

@@ -11,7 +11,7 @@ from colibri.autopilot.core.checkpoint import FOLLOWS_US, History
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, EVERY_KIND, QUICK, in_mode, orbit, reached, restart
+from tests.support.flying import ACCEPTED, EVERY_KIND, QUICK, reached, restart
 
 pytestmark = QUICK
 
@@ -60,33 +60,6 @@ def test_a_mission_goes_on_as_if_nothing_had_happened(sitl_fleet: Callable[..., 
     assert sitl.said("restarted in flight: return goes on")
     charges_ah = [each.inside.copter.parts.battery.charge_ah for each in (sitl, wanted)]
     assert charges_ah[0] == pytest.approx(charges_ah[1], rel=0.01)
-
-
-@pytest.mark.parametrize(
-    "mode",
-    [
-        *(Mode.HOLD, Mode.TRACK, Mode.RETURN),
-        *(pytest.param(mode, marks=pytest.mark.long) for mode in (Mode.TAKEOFF, Mode.LAND, Mode.ORBIT)),
-    ],
-)
-def test_every_mode_goes_on(sitl_fleet: Callable[..., list[Sitl]], mode: Mode) -> None:
-    def flown(*, killed: bool) -> Sitl:
-        (sitl,) = sitl_fleet(1, system=1, airborne=3.0)
-        sitl.goto(8.0, 3.0, 3.0, wait=False)
-        sitl.run(2.0)
-        if mode is Mode.ORBIT:
-            assert orbit(sitl, 4.0, 3.0, 0.0) == ACCEPTED
-        elif mode is not Mode.HOLD:
-            sitl.select(mode)
-        sitl.run(6.0 if mode is Mode.ORBIT else 3.0)
-        if killed:
-            restart(sitl)
-        sitl.run(4.0)
-        return sitl
-
-    wanted, sitl = flown(killed=False), flown(killed=True)
-    assert state(sitl) == state(wanted)
-    assert np.linalg.norm(sitl.path - wanted.path, axis=1).max() < 0.01
 
 
 @pytest.mark.parametrize("missed", [30, pytest.param(1, marks=pytest.mark.long)])
@@ -172,40 +145,6 @@ def test_offboard_waits_for_setpoints_as_after_a_loss(sitl: Sitl) -> None:
     assert sitl.said("setpoints lost: hold")
 
 
-@IN_THE_AIR
-def test_sticks_that_stay_silent_after_a_restart_are_lost(sitl: Sitl) -> None:
-    with sitl.sticks_held():
-        sitl.run(0.1)
-        sitl.select(Mode.POSITION)
-    restart(sitl)
-    sitl.run(0.4)
-    assert sitl.mode is Mode.POSITION
-    sitl.run(0.2)
-    assert sitl.said("sticks lost: hold")
-
-
-@pytest.mark.sitl(airborne=3.0, params={"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 1.0})
-def test_a_station_that_stays_silent_after_it_is_lost(sitl: Sitl) -> None:
-    sitl.run(0.5)
-    sitl.gcs.silent = True
-    restart(sitl)
-    sitl.run(0.8)
-    assert sitl.mode is Mode.HOLD
-    sitl.run(0.4)
-    assert in_mode(sitl, Mode.LAND)
-
-
-@pytest.mark.sitl(airborne=3.0, params={"COM_LOW_BAT_ACT": 1})
-def test_an_overridden_failsafe_does_not_begin_again(sitl: Sitl) -> None:
-    sitl.inject("battery", "wrong", 0, 0.1)
-    sitl.wait_until(lambda: sitl.mode in (Mode.RETURN, Mode.LAND), within=3.0)
-    sitl.select(Mode.HOLD)
-    sitl.run(0.5)
-    restart(sitl)
-    sitl.run(2.0)
-    assert state(sitl) == HOLDING
-
-
 def test_plans_and_home_are_kept_on_the_ground_too(sitl: Sitl) -> None:
     sitl.upload_mission([items.waypoint(5.0, 0.0, 3.0), items.waypoint(0.0, 5.0, 3.0)])
     sitl.upload_rally([items.Item(mav.MAV_CMD_NAV_RALLY_POINT, (), (1.0, 1.0, 3.0))])
@@ -253,24 +192,6 @@ def test_what_was_kept_of_another_flight_is_not_used(sitl: Sitl, late_us: int) -
     sitl.run(0.1)
     assert state(sitl) == HOLDING
     assert not sitl.inside.copter.stations.missions.has_mission
-
-
-@pytest.mark.sitl(airborne=1.0)
-def test_a_vehicle_that_came_down_meanwhile_stays_there(sitl: Sitl) -> None:
-    sitl.run(0.5)
-    kept: list[History] = []
-
-    def remember(history: History) -> History:
-        kept.append(history)
-        return history
-
-    restart(sitl, remember)
-    sitl.land()
-    restart(sitl, lambda _: kept[0])
-    sitl.run(1.0)
-    assert state(sitl) == State(Mode.HOLD, armed=False)
-    assert sitl.inside.copter.pilot.ground.standing
-    sitl.arm()
 
 
 @IN_THE_AIR

@@ -1,10 +1,8 @@
 """What a ground station changes on the ground: parameters, calibration, failures, restarts; and a wrong vehicle."""
 
-from collections.abc import Callable
 from math import inf, nan
 
 import pytest
-from msgspec.structs import replace
 
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.mavlink.wire.dialect import mav
@@ -16,7 +14,7 @@ from tests.support.flying import ACCEPTED, COMPONENT, DENIED, QUICK, SYSTEM, ref
 
 pytestmark = QUICK
 
-INJECT, RESTART = mav.MAV_CMD_INJECT_FAILURE, mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+RESTART = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 STORAGE, CALIBRATE = mav.MAV_CMD_PREFLIGHT_STORAGE, mav.MAV_CMD_PREFLIGHT_CALIBRATION
 
 
@@ -27,16 +25,6 @@ def test_a_law_says_why_it_refuses_a_parameter(sitl: Sitl) -> None:
         "GEO_POSIT_FREQU not changed: position_frequency_rad_s: Expected `float` > 0.0",
         *(sitl.set_param, "GEO_POSIT_FREQU", -4.0),
     )
-
-
-def test_a_heavier_vehicle_than_assumed_flies_and_lands(sitl_fleet: Callable[..., list[Sitl]]) -> None:
-    nominal = load_vehicle("hummingbird")
-    heavy = replace(nominal, body=replace(nominal.body, mass_kg=1.15 * nominal.body.mass_kg))
-    (sitl,) = sitl_fleet(1, vehicle=heavy, believed="hummingbird", params={"COM_DISARM_LAND": 0.1})
-    sitl.takeoff(1.5)
-    sitl.run(1.5)
-    assert sitl.position[2] == pytest.approx(1.5, abs=0.1)
-    sitl.land()
 
 
 def test_calibration_reports_progress_and_needs_rest(sitl: Sitl) -> None:
@@ -56,20 +44,6 @@ def test_calibration_reports_progress_and_needs_rest(sitl: Sitl) -> None:
         assert sitl.command(CALIBRATE, *params) == mav.MAV_RESULT_UNSUPPORTED
     sitl.arm()
     assert sitl.command(CALIBRATE, 1.0) == DENIED
-
-
-@pytest.mark.feedback("sensors")
-@pytest.mark.seed(1)
-def test_failures_are_injected_only_where_allowed(sitl: Sitl) -> None:
-    gps, off, ok = 4.0, 1.0, 0.0
-    assert sitl.command(INJECT, gps, off) == DENIED
-    sitl.set_param("SYS_FAILURE_EN", 1)
-    assert sitl.command(INJECT, gps, off) == ACCEPTED
-    sitl.run(1.2)
-    assert sitl.gcs.latest("GPS_RAW_INT").fix_type == mav.GPS_FIX_TYPE_NO_GPS
-    assert sitl.command(INJECT, gps, ok) == ACCEPTED
-    sitl.run(1.2)
-    assert sitl.gcs.latest("GPS_RAW_INT").fix_type >= mav.GPS_FIX_TYPE_3D_FIX
 
 
 def test_a_restart_is_for_the_ground(sitl: Sitl) -> None:

@@ -1,6 +1,6 @@
 """From the ground and back: arming, take-off, landing, return."""
 
-from math import degrees, hypot, inf, nan
+from math import hypot, nan
 
 import pytest
 
@@ -15,16 +15,6 @@ from tests.support.flying import ACCEPTED, DENIED, QUICK, in_mode, refused, rest
 pytestmark = QUICK
 
 ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
-TAKEOFF = mav.MAV_CMD_NAV_TAKEOFF
-
-
-def put(sitl: Sitl, start: Start) -> None:
-    inside = sitl.inside
-    inside.world = starting_world(start, load_vehicle("hummingbird"))._replace(time_us=sitl.time_us)
-
-
-def takeoff_to(sitl: Sitl, height_m: float, first: float = 0.0) -> int:
-    return sitl.command(TAKEOFF, first, 0.0, 0.0, nan, nan, nan, height_m)
 
 
 def test_rotors_idle_when_armed_and_stop_when_disarmed(sitl: Sitl) -> None:
@@ -44,29 +34,6 @@ def test_rotors_idle_when_armed_and_stop_when_disarmed(sitl: Sitl) -> None:
     assert sitl.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("start", "reason"),
-    [
-        (Start(z=0.2, phi=60.0), "tilted by"),
-        (Start(z=0.4, vx=2.0), "moving at"),
-        (Start(z=0.4, vx=2.0), "not standing on the ground"),
-    ],
-)
-def test_a_failed_check_refuses_arming_and_says_why(sitl: Sitl, start: Start, reason: str) -> None:
-    put(sitl, start)
-    sitl.inside.copter.pilot.ground.take_off(0)
-    sitl.run(0.03)
-    refused(sitl, f"not armed: .*{reason}", sitl.arm)
-    assert sitl.command(mav.MAV_CMD_RUN_PREARM_CHECKS) == mav.MAV_RESULT_FAILED
-    sitl.arm(force=True)
-
-
-def test_an_empty_battery_refuses_arming(sitl: Sitl) -> None:
-    sitl.inject("battery", "wrong", 0, 0.05)
-    sitl.run(1.1)
-    refused(sitl, "battery at 5%", sitl.arm)
-
-
 def test_missing_or_raised_sticks_refuse_arming(sitl: Sitl) -> None:
     sitl.select(Mode.POSITION)  # on the ground it need not be met yet
     refused(sitl, "no MANUAL_CONTROL is heard", sitl.arm)
@@ -78,12 +45,6 @@ def test_missing_or_raised_sticks_refuse_arming(sitl: Sitl) -> None:
         sitl.arm()
 
 
-@pytest.mark.parametrize("mode", [Mode.LAND, Mode.RETURN])
-def test_modes_that_end_on_the_ground_refuse_arming(sitl: Sitl, mode: Mode) -> None:
-    sitl.select(mode)
-    refused(sitl, "choose another mode first", sitl.arm)
-
-
 def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     def landed_state() -> int:
         return int(sitl.gcs.latest("EXTENDED_SYS_STATE").landed_state)
@@ -91,7 +52,7 @@ def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     sitl.run(0.6)
     assert landed_state() == mav.MAV_LANDED_STATE_ON_GROUND
     sitl.arm()
-    assert sitl.command(TAKEOFF, *(nan,) * 7) == ACCEPTED
+    assert sitl.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == ACCEPTED
     assert sitl.mode is Mode.TAKEOFF
     sitl.wait_until(lambda: sitl.position[2] > 0.5, within=3.0)
     sitl.run(0.6)
@@ -113,26 +74,7 @@ def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     sitl.step()
     assert sitl.said("landed, rotors stopped")
     assert sitl.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
-    sitl.arm()
-
-
-@pytest.mark.sitl(params={"COM_DISARM_PRFLT": 3.0})
-def test_rotors_stop_where_no_takeoff_follows(sitl: Sitl) -> None:
-    sitl.arm()
-    assert sitl.wait_until(lambda: not sitl.armed, within=5.0) == pytest.approx(3.0, abs=0.05)
-    sitl.step()
-    assert sitl.said("no take-off, rotors stopped")
-
-
-def test_a_takeoff_height_before_arming_is_flown_once(sitl: Sitl) -> None:
-    """As QGroundControl does: the take-off above sea level first, then the arming."""
-    assert takeoff_to(sitl, sitl.origin.altitude_m + 1.5, first=-1.0) == ACCEPTED
-    sitl.arm()
-    sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=6.0)
-    sitl.run(2.0)
-    assert sitl.position[2] == pytest.approx(1.5, abs=0.03)
-    sitl.land()
-    sitl.arm()  # that height is forgotten
+    sitl.arm()  # the height is forgotten
     sitl.run(1.0)
     assert sitl.position[2] == pytest.approx(0.0, abs=0.01)
 
@@ -140,19 +82,17 @@ def test_a_takeoff_height_before_arming_is_flown_once(sitl: Sitl) -> None:
 def test_a_takeoff_in_the_air_never_sinks(sitl: Sitl) -> None:
     sitl.takeoff(1.5)
     before, since_s = sitl.position[2], sitl.time_s
-    assert takeoff_to(sitl, 1.0) == ACCEPTED
+
+    def climb_to(height_m: float) -> int:
+        return sitl.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m)
+
+    assert climb_to(1.0) == ACCEPTED
     sitl.run(1.0)
     assert sitl.flown(since_s)["z"].min() > before - 0.01
     assert sitl.mode is Mode.HOLD
-    assert takeoff_to(sitl, 2.0) == ACCEPTED
+    assert climb_to(2.0) == ACCEPTED
     sitl.run(3.0)
     assert sitl.position[2] == pytest.approx(2.0, abs=0.02)
-
-
-def test_an_impossible_takeoff_height_is_denied(sitl: Sitl) -> None:
-    for height_m in (0.0, -5.0, 1e6, inf, -1e30):
-        assert takeoff_to(sitl, height_m) == DENIED
-    assert sitl.mode is Mode.HOLD
 
 
 @pytest.mark.parametrize("command", [(ARM, 0.0, FORCE), (mav.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)])
@@ -173,7 +113,8 @@ def test_force_stops_the_rotors_in_the_air(sitl: Sitl, command: tuple[float, ...
 @pytest.mark.sitl(airborne=2.0)
 def test_a_falling_vehicle_armed_by_force_recovers(sitl: Sitl) -> None:
     sitl.disarm(force=True)
-    put(sitl, Start(z=20.0, vx=2.0, vz=-5.0, p=1.0))
+    fallen = starting_world(Start(z=20.0, vx=2.0, vz=-5.0, p=1.0), load_vehicle("hummingbird"))
+    sitl.inside.world = fallen._replace(time_us=sitl.time_us)
     sitl.run(0.2)
     assert sitl.velocity[2] < -6.0
     sitl.arm(force=True)
@@ -214,18 +155,6 @@ def test_close_to_home_return_does_not_climb(sitl: Sitl) -> None:
     assert hypot(*sitl.position[:2]) < 0.1
 
 
-@pytest.mark.sitl(params={"COM_DISARM_LAND": 0.2})
-@pytest.mark.wind("5.8@121")
-def test_in_wind_it_lands_on_the_spot(sitl: Sitl) -> None:
-    sitl.takeoff(1.5)
-    assert hypot(*sitl.position[:2]) < 0.3
-    since_s = sitl.time_s
-    sitl.land()
-    flown = sitl.flown(since_s)
-    assert max(flown["x"] ** 2 + flown["y"] ** 2) < 0.09
-    assert abs(degrees(sitl.euler[0])) < 1.0
-
-
 @pytest.mark.sitl(airborne=1.0)
 def test_an_autopilot_without_memory_holds_in_mid_air(sitl: Sitl) -> None:
     sitl.goto(20.0, 0.0, 1.0, wait=False)
@@ -249,11 +178,3 @@ def test_the_battery_is_counted_across_flights(sitl: Sitl) -> None:
     consumed_mah = sitl.gcs.latest("BATTERY_STATUS").current_consumed
     assert consumed_mah == pytest.approx(1e3 * sitl.inside.world.charge_used_ah, abs=1.0)
     assert consumed_mah > 15
-
-
-def test_a_plant_that_begins_anew_needs_a_new_vehicle(sitl: Sitl) -> None:
-    sitl.takeoff(1.0)
-    sitl.inside.world = starting_world(Start(), load_vehicle("hummingbird"))
-    sitl.run(0.05)
-    assert sitl.inside.copter.pilot.state == FIRST
-    assert not any(sitl.rotors.controls)

@@ -1,32 +1,27 @@
 """Commands to a vehicle in the air: places, orbits, speeds, headings, home, modes; and what a geofence refuses."""
 
-from math import atan2, dist, hypot, inf, isfinite, nan, pi, remainder, tau
+from math import atan2, dist, hypot, inf, nan, pi, remainder, tau
 
 import numpy as np
 import pytest
 
-from colibri.autopilot.commander.rules.modes import Mode, custom_mode
-from colibri.common.types import Vector
+from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import (
     ACCEPTED,
-    COMPONENT,
     DENIED,
     QUICK,
     RELATIVE,
     SYSTEM,
-    UNSUPPORTED,
     degrees_e7,
-    in_mode,
     orbit,
     refused,
 )
 
 pytestmark = [QUICK, pytest.mark.sitl(airborne=5.0)]
-CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 def turned_by(sitl: Sitl, yaw_rad: float) -> float:
@@ -43,52 +38,13 @@ def test_it_goes_to_a_place_without_overshoot(sitl: Sitl) -> None:
     sitl.hold(lambda: dist(sitl.position, (6.0, -2.5, 6.0)) < 0.02, for_=1.0)
 
 
-def test_hold_stops_it_and_it_stays_there(sitl: Sitl) -> None:
-    sitl.goto(50.0, 0.0, 5.0, wait=False)
-    sitl.wait_until(lambda: sitl.velocity[0] > 4.5, within=6.0)
-    began = sitl.position[0]
-    sitl.select(Mode.HOLD)
+def test_a_reposition_without_a_height_keeps_it(sitl: Sitl) -> None:
+    reposition, (x, y) = mav.MAV_CMD_DO_REPOSITION, degrees_e7(sitl, 2.0, 1.0)
+    assert sitl.gcs.order_int(reposition, nan, nan, nan, pi, frame=RELATIVE, x=x, y=y, z=nan) == ACCEPTED
     sitl.run(3.5)
-    assert sitl.position[0] - began < 6.5  # 5 m/s at 3 m/s², and the jerk's time
-    held = sitl.position
-    sitl.hold(lambda: dist(sitl.position, held) < 0.05, for_=1.0)
-
-
-@pytest.mark.parametrize(
-    ("params", "place", "expected"),
-    [
-        ((-1.0, 1.0, 0.0, nan), (2.0, 1.0, 6.0), (2.0, 1.0, 6.0)),
-        ((nan, nan, nan, pi), (2.0, 1.0, nan), (2.0, 1.0, 5.0)),
-        ((-1.0, 1.0, 0.0, nan), (nan, nan, 6.0), (0.0, 0.0, 6.0)),
-        ((-1.0, 0.0, 0.0, 0.5 * pi), (nan, nan, nan), (0.0, 0.0, 5.0)),
-    ],
-    ids=["place", "no height", "height alone", "yaw alone"],
-)
-def test_what_a_reposition_leaves_out_stays(
-    sitl: Sitl, params: tuple[float, ...], place: Vector, expected: Vector
-) -> None:
-    east, north, z = place
-    x, y = degrees_e7(sitl, east, north) if isfinite(east) else (NOT_GIVEN, NOT_GIVEN)
-    reposition = mav.MAV_CMD_DO_REPOSITION
-    assert sitl.gcs.order_int(reposition, *params, frame=RELATIVE, x=x, y=y, z=z) == ACCEPTED
-    sitl.run(3.5)
-    assert sitl.position == pytest.approx(expected, abs=0.05)
-    if isfinite(params[3]):
-        assert turned_by(sitl, 0.5 * pi - params[3]) < 0.1
-    elif not isfinite(east):
-        assert turned_by(sitl, 0.5 * pi) < 0.02
-    half_x, _ = degrees_e7(sitl, 3.0, 3.0)
-    assert sitl.gcs.order_int(reposition, -1.0, 1.0, 0.0, nan, frame=RELATIVE, x=half_x, z=5.0) == DENIED
-
-
-def test_a_reposition_to_nowhere_pauses(sitl: Sitl) -> None:
-    """As QGroundControl's pause button does, in a mission too."""
-    sitl.goto(50.0, 0.0, 5.0, wait=False)
-    sitl.run(2.0)
-    assert sitl.command(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, nan, nan, nan) == ACCEPTED
-    sitl.run(3.0)
-    assert sitl.speed_m_s < 0.1
-    assert sitl.mode is Mode.HOLD
+    assert sitl.position == pytest.approx((2.0, 1.0, 5.0), abs=0.05)
+    assert turned_by(sitl, -0.5 * pi) < 0.1
+    assert sitl.gcs.order_int(reposition, -1.0, 1.0, 0.0, nan, frame=RELATIVE, x=x, z=5.0) == DENIED
 
 
 ORBITS = [
@@ -144,25 +100,6 @@ def test_an_orbit_that_cannot_be_flown_is_denied(sitl: Sitl) -> None:
     with pytest.raises(sitl.Refused):
         sitl.select(Mode.ORBIT)  # no circle is known
     assert sitl.mode is Mode.HOLD
-
-
-def test_speed_changes_in_flight_end_with_the_flight(sitl: Sitl) -> None:
-    sitl.goto(60.0, 0.0, 5.0, wait=False)
-    speed = mav.MAV_CMD_DO_CHANGE_SPEED
-    assert sitl.command(speed, 1.0, 2.0, -1.0) == ACCEPTED
-    sitl.run(3.0)
-    assert sitl.speed_m_s == pytest.approx(2.0, abs=0.05)
-    assert sitl.command(speed, 1.0, -1.0) == ACCEPTED
-    for number in (0.0, -3.0, nan, inf, 100.0):
-        assert sitl.command(speed, 1.0, number) == DENIED
-    sitl.run(0.5)
-    assert sitl.speed_m_s == pytest.approx(2.0, abs=0.05)
-    assert sitl.command(speed, 1.0, -2.0) == ACCEPTED
-    sitl.run(2.5)
-    assert sitl.speed_m_s == pytest.approx(5.0, abs=0.05)
-    assert sitl.command(speed, 1.0, 3.0) == ACCEPTED
-    sitl.disarm(force=True)
-    assert sitl.inside.copter.pilot.speed_m_s is None
 
 
 def test_headings_absolute_and_relative(sitl: Sitl) -> None:
@@ -222,23 +159,6 @@ def test_the_origin_is_set_on_the_ground_to_the_digit(sitl: Sitl) -> None:
     assert pilot.home.position_enu_m == pytest.approx((5.0, 5.0, 2.0), abs=0.02)
 
 
-def test_modes_by_message_and_by_standard_number(sitl: Sitl) -> None:
-    sitl.send("SET_MODE", SYSTEM, CUSTOM, custom_mode(Mode.LAND))
-    sitl.run(0.05)
-    assert sitl.mode is Mode.LAND
-    sitl.send("SET_MODE", SYSTEM, CUSTOM, 99 << 16)
-    sitl.run(0.05)
-    assert sitl.said("this vehicle has no such mode")
-    assert sitl.mode is Mode.LAND
-    standard = mav.MAV_CMD_DO_SET_STANDARD_MODE
-    assert sitl.command(standard, float(mav.MAV_STANDARD_MODE_SAFE_RECOVERY)) == ACCEPTED
-    for number in (0.0, 99.0, 1.5, nan, -1.0):
-        assert sitl.command(standard, number) in (DENIED, UNSUPPORTED, mav.MAV_RESULT_FAILED)
-    for numbers in ((1.0, nan), (nan, 4.0, 3.0), (1.0, 4.5, 3.0), (1.0, 4.0, -1.0)):
-        assert sitl.command(mav.MAV_CMD_DO_SET_MODE, *numbers) in (DENIED, UNSUPPORTED)
-    assert in_mode(sitl, Mode.RETURN)
-
-
 def test_nothing_is_flown_to_outside_the_geofence(sitl: Sitl) -> None:
     sitl.upload_fence(items.polygon([(-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)]))
     refused(sitl, "reposition refused: outside the geofence", sitl.goto, 9.0, 0.0, 5.0)
@@ -265,18 +185,6 @@ def test_return_leads_to_a_home_beyond_the_geofence(sitl: Sitl) -> None:
     sitl.select(Mode.RETURN)
     sitl.wait_until(lambda: not sitl.armed, within=25.0)
     assert hypot(*sitl.position[:2]) < 0.1
-
-
-def test_orders_for_others_are_not_obeyed(sitl: Sitl) -> None:
-    stop = (mav.MAV_CMD_DO_FLIGHTTERMINATION, 0, 1.0, *(0.0,) * 6)
-    for system, component in ((2, COMPONENT), (SYSTEM, 2), (0, 2)):
-        sitl.send("COMMAND_LONG", system, component, *stop)
-    sitl.run(0.1)
-    assert sitl.armed
-    assert not sitl.gcs.acks
-    sitl.send("COMMAND_LONG", SYSTEM, 0, *stop)
-    sitl.run(0.05)
-    assert not sitl.armed
 
 
 def test_a_speed_parameter_acts_at_once(sitl: Sitl) -> None:
@@ -311,10 +219,3 @@ def test_a_parameter_that_changes_in_flight_jolts_nothing(sitl: Sitl, name: str,
     assert jolts.max() < 1.2
     sitl.run(1.0)
     assert sitl.velocity[0] > 3.0
-
-
-@pytest.mark.seeds(1, 2)
-@pytest.mark.wind("4@270", turbulence="light")
-def test_it_holds_its_place_in_turbulence(sitl: Sitl) -> None:
-    sitl.run(2.0)
-    sitl.hold(lambda: sitl.is_at((0.0, 0.0, 5.0), near_m=0.5, slow_m_s=1.0), for_=3.0)

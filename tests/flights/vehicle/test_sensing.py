@@ -54,26 +54,6 @@ def test_a_flight_on_sensors_from_arming_to_landing(sitl: Sitl) -> None:
     assert sitl.inside.copter.pilot.ground.standing
 
 
-@pytest.mark.long
-@pytest.mark.feedback("sensors")
-@pytest.mark.seed(1)
-def test_lost_gps_is_said_and_survived(sitl: Sitl) -> None:
-    """20 s without: it drifts a little, says so, and goes back without a jump."""
-    sitl.takeoff(10.0)
-    sitl.run(20.0)
-    before = sitl.position
-    sitl.inject("gps", "off")
-    sitl.run(20.0)
-    assert sitl.said("GPS lost: position by dead reckoning")
-    assert dist(sitl.position, before) < 20.0
-    assert sitl.mode is Mode.HOLD
-    sitl.inject("gps", "ok")
-    sitl.hold(lambda: sitl.speed_m_s < 1.0, for_=15.0)
-    assert sitl.said("GPS lost: cleared")
-    assert off_m(sitl) < 1.0
-    assert dist(sitl.position, before) < 1.0
-
-
 @pytest.mark.feedback("sensors")
 @pytest.mark.seed(1)
 def test_without_a_position_it_does_not_arm(sitl: Sitl) -> None:
