@@ -1,4 +1,4 @@
-"""Flights by the thousand: which, flown by any engine, kept as they end, tabled and drawn."""
+"""Plan, fly, record and tabulate many flights, on a pool of processes or a cluster."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""A campaign as data: what every flight has in common, what differs, by which seeds, and what is kept."""
+"""A campaign as data: common options, factors, seeds and metrics."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,23 +32,19 @@ from colibri.mavlink.hil.feedback import Feedback
 
 Logs: TypeAlias = Literal["none", "lost", "all"]
 OF_ALL = ("link",)
-"""Options that every flight of a campaign has alike."""
+"""Options that must be equal for all flights of a campaign."""
 _MAX_SEED = 2**63
 
 
 class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every file of many flights has.
+    """Tables shared by the files of campaigns and tunings.
 
     Attributes:
-        FACTORS: Which of its tables have factors.
-        name: In titles.
-        seeds: Of everything random in a flight: one, several, or `1-20`; every combination is flown by each.
-        root_seed: Of the draws.
-        metrics: What is kept of each flight; None for the usual.
-        fly: Options of `colibri fly` that every flight has.
-        grid: Factors with several values; every combination is flown. A factor of another name than an option's or a
-            key's has levels: tables by their names, each with what options and keys are set to together.
-        draw: Factors that are drawn anew for each flight.
+        FACTORS: Tables that hold factors.
+        seeds: One, several, or `1-20`; every combination of the grid is flown with each.
+        root_seed: Seed of the draws.
+        grid: Factors with several values. A factor that is neither option nor key has levels: named tables of settings.
+        draw: Factors drawn at random for each flight.
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")
@@ -65,11 +61,11 @@ Tables = TypeVar("Tables", bound=FlightTables)
 
 
 class CampaignTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is in the file of a campaign; `colibri.campaign` has the same by keywords.
+    """The tables of a campaign's file; also the keywords of `colibri.campaign`.
 
     Attributes:
-        paired: Whether flights of the same seed have the same draws in every combination of the grid.
-        logs: Of which flights the logs are kept.
+        paired: Use the same draws for a seed in every combination of the grid.
+        logs: Flights to keep logs of.
     """
 
     paired: bool = False
@@ -77,14 +73,7 @@ class CampaignTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Point(NamedTuple):
-    """One flight of a campaign.
-
-    Attributes:
-        flight: Its number, which is its place in the table.
-        seed: Of everything random.
-        factors: What differs from flight to flight, by name.
-        folder: Where in the campaign's folder its logs go, if they are kept.
-    """
+    """One flight of a campaign; `folder` is relative to the campaign's."""
 
     flight: int
     seed: int
@@ -93,7 +82,6 @@ class Point(NamedTuple):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What options and keys are set to that differ from flight to flight."""
         found: dict[str, Any] = {}
         for name, value in self.factors.items():
             found |= value.settings if isinstance(value, Level) else {name: value}
@@ -101,7 +89,7 @@ class Point(NamedTuple):
 
 
 class Campaign(NamedTuple):
-    """A campaign, read and checked for what can be checked without flying; attributes as of `CampaignTables`."""
+    """A validated campaign; see `CampaignTables`."""
 
     name: str
     seeds: tuple[int, ...]
@@ -115,27 +103,22 @@ class Campaign(NamedTuple):
 
     @property
     def flights(self) -> int:
-        """How many flights it has."""
         return len(self.seeds) * self.combinations
 
     @property
     def combinations(self) -> int:
-        """How many combinations its grid has."""
         return prod(map(len, self.grid.values()))
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """Names of what differs from flight to flight."""
         return (*self.grid, *self.draw)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns of its table."""
         metrics = (metric.name for metric in self.metrics)
         return ("flight", *self.factors, "seed", *metrics, "verdict", "why", "trajectory_sha256")
 
     def points(self) -> Iterator[Point]:
-        """Return its flights: combination by combination, each by every seed."""
         flight = 0
         for values in product(*self.grid.values()):
             combination = dict(zip(self.grid, values, strict=True))
@@ -145,7 +128,6 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Return flights that have each value of each factor, of numbers the ends, with the first of the others."""
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
@@ -157,7 +139,6 @@ class Campaign(NamedTuple):
                 yield first._replace(factors=first.factors | {factor: value})
 
     def values(self, option: str) -> Iterator[Any]:
-        """Return all that an option is set to somewhere, its draws from ranges apart."""
         draw = self.draw.get(option)
         yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
         yield from self.grid.get(option, ())
@@ -167,7 +148,6 @@ class Campaign(NamedTuple):
         return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
-        """Return what is drawn for a flight, each from the flight's own stream, in the order of the factors."""
         if not self.draw:
             return {}
         chance = Generator(PCG64(SeedSequence(self.root_seed, spawn_key=(stream,))))
@@ -175,13 +155,6 @@ class Campaign(NamedTuple):
 
 
 def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, Any]) -> Tables:
-    """Return the tables of a file with what is `given` in place of its own, factor by factor.
-
-    A file that has no name is called by its own.
-
-    Raises:
-        Error: The file cannot be read, or a table is unknown or impossible.
-    """
     base = kind() if file is None else read_toml(Path(file), kind, CampaignError)
     known = kind.__struct_fields__
     for name in given:
@@ -201,11 +174,6 @@ def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, A
 
 
 def campaign_of(tables: CampaignTables) -> Campaign:
-    """Return the campaign of its tables.
-
-    Raises:
-        CampaignError: A factor or a metric that there is not, or a range that is none.
-    """
     if tables.root_seed < 0:
         raise CampaignError(f"root_seed: must not be below zero, not {tables.root_seed}")
     planned = Campaign(
@@ -227,11 +195,6 @@ def campaign_of(tables: CampaignTables) -> Campaign:
 
 
 def read_seeds(given: Any) -> tuple[int, ...]:
-    """Return seeds by one, several, or `FIRST-LAST`.
-
-    Raises:
-        CampaignError: They are none.
-    """
     try:
         read = tuple(given) if isinstance(given, list | tuple | range) else tuple(seeds(str(given)))
     except ArgumentTypeError:
@@ -243,11 +206,6 @@ def read_seeds(given: Any) -> tuple[int, ...]:
 
 
 def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:
-    """Return the name of what `value` is given for: that of a factor, or one of `others` that are none.
-
-    Raises:
-        CampaignError: There is no such factor.
-    """
     return given if given in others or has_levels(value) else factor_name(given)
 
 
@@ -259,14 +217,12 @@ def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
 
 
 def _values(name: str, given: Any) -> tuple[Any, ...]:
-    """Return the values of a factor of the grid."""
     if has_levels(given):
         return tuple(Level(str(level), _named(settings)) for level, settings in given.items())
     return read_values(name, given)
 
 
 def _check_names(planned: Campaign) -> None:
-    """Check that what is set is set in one place, that a track is among it, and that columns differ."""
     said = [*planned.fly, *planned.draw]
     for name, values in planned.grid.items():
         levels = [each.settings for each in values if isinstance(each, Level)]

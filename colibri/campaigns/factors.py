@@ -1,4 +1,4 @@
-"""Factors: options of `colibri fly`, and numbers of profile and vehicles by their dotted keys, set for one flight."""
+"""Factors: options of `colibri fly`, and dotted keys of profiles and vehicles."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,14 +12,14 @@ from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
 SCALED = "*"
-"""Ends a key whose value multiplies what the file has there, in place of standing for it."""
+"""Suffix of a key whose value multiplies the file's."""
 _TABLES = ("profile", "vehicle", "plant-vehicle")
 _OF_A_PROFILE = tuple(f"{key}." for key in ProfileTables.__struct_fields__)
 _NOT_FACTORS = ("seed", "link", "speed")
 
 
 class Key(NamedTuple):
-    """A number of a file: of which table, where in it, and whether it is multiplied."""
+    """A key of a profile or vehicle; `scaled` if its value is a multiplier."""
 
     table: str
     key: str
@@ -27,11 +27,6 @@ class Key(NamedTuple):
 
 
 def factor_name(given: str) -> str:
-    """Return the name of a factor as tables have it; a key of a profile may go without `profile.`.
-
-    Raises:
-        CampaignError: There is no such factor.
-    """
     options = [name for name in keywords_of(FlightSpec) if name not in _NOT_FACTORS]
     name = given.replace("-", "_")
     if name in options:
@@ -50,7 +45,7 @@ def factor_name(given: str) -> str:
 
 
 def key_of(factor: str) -> Key | None:
-    """Return which number of a file a factor is; None for an option of the flight."""
+    """Parse a factor as a key; `None` for an option of the flight."""
     table, dot, rest = factor.partition(".")
     if not dot:
         return None
@@ -58,11 +53,6 @@ def key_of(factor: str) -> Key | None:
 
 
 def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> Any:
-    """Return a profile or a vehicle with those numbers changed that `factors` have for `table`, in their order.
-
-    Raises:
-        ProfileError, VehicleError: There is no such key, or it cannot have this value.
-    """
     error = ProfileError if isinstance(of, Profile) else VehicleError
     changed: Any = of
     for factor, value in factors.items():
@@ -74,7 +64,6 @@ def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> 
 
 
 def _scaled(had: Any, by: Any, factor: str) -> Any:
-    """Return a number, or each of several, times `by`."""
     if isinstance(had, list):
         return [_scaled(each, by, factor) for each in had]
     if not (is_number(had) and is_number(by)):

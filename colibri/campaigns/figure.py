@@ -1,4 +1,4 @@
-"""The figure of a campaign: a distribution, a line over a factor, or a heat map over two, as its factors suggest."""
+"""The figure of a campaign: strips or scatter, a line over one factor, or a heat map over two."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -16,17 +16,17 @@ from colibri.common.types import Array
 COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
 _LOST = "#D00000"
 _CONTINUOUS = 3
-"""A factor with so many numbers is drawn along an axis."""
+"""Least number of values of a factor that is drawn along an axis."""
 _MAX_CURVES, _MAX_STRIPS, _MAX_DRAWN = len(COLORS), 40, 3
 _CHARACTER_IN = 0.085
-"""Of a row's name, at most."""
+"""Largest width of a character of a row's name."""
 _WIDE_SPREAD = 20.0
-"""Values that differ by such a factor are drawn on a logarithmic axis."""
+"""Ratio of largest to smallest value from which the axis is logarithmic."""
 _PANEL_IN, _MAP_IN = 2.6, 3.4
 
 
 class _Group(NamedTuple):
-    """The flights of one combination, by their places; what it is called, and its numbers along the axes."""
+    """The flights of one combination, by their places, with its coordinates along the axes."""
 
     name: str
     at: tuple[float, ...]
@@ -34,7 +34,6 @@ class _Group(NamedTuple):
 
 
 def draw(table: FlightTable, metric: str | None = None) -> Figure:
-    """Return the figure of a campaign for a metric; without one for the first that most flights have."""
     name = metric or table.usual_metric
     values = table.metric(name)
     grid = table.campaign.grid
@@ -54,7 +53,6 @@ def draw(table: FlightTable, metric: str | None = None) -> Figure:
 
 
 def _groups(table: FlightTable, along: Sequence[str]) -> list[_Group]:
-    """Return the combinations of the grid; their names have what is not `along` an axis."""
     names = list(table.campaign.grid)
     several = [name for name, values in table.campaign.grid.items() if len(values) > 1 and name not in along]
     columns = {name: table.factor(name) for name in along}
@@ -74,14 +72,12 @@ def _title(table: FlightTable) -> str:
 
 
 def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
-    """Return the metric of those flights that came through and have it."""
     found: Array = values[table.through(places)]
     known: Array = found[np.isfinite(found)]
     return known
 
 
 def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
-    """Draw medians over a factor with what lies between the quantiles of 5 and 95 %, and the share lost below."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
     for name, color in zip(names, COLORS, strict=False):
@@ -111,7 +107,6 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
 
 
 def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]) -> Figure:
-    """Draw the median of a metric over two factors, a map a combination of the others; crosses where half are lost."""
     names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
     xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
     figure, grid = axes_grid(len(names), 1, 0.6, row_in=_MAP_IN, share=False)
@@ -141,7 +136,6 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
 
 
 def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
-    """Draw a metric over what was drawn, a dot a flight; flights that were lost at the upper edge."""
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
@@ -162,7 +156,6 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
 
 
 def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
-    """Draw a dot a flight, a row a combination, bars at the medians; how many were lost at the right."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
     make_room_for_names(figure, names)
@@ -186,7 +179,6 @@ def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Gr
 
 
 def make_room_for_names(figure: Figure, names: Iterable[str]) -> None:
-    """Leave room for the names of rows, left of the axes."""
     left_in = 0.3 + _CHARACTER_IN * max(map(len, names))
     figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
 
@@ -197,7 +189,6 @@ def _is_wide(values: Array) -> bool:
 
 
 def scale_values(axes: Axes, values: Array) -> None:
-    """Have an even vertical axis for even ratios, where values differ by large ones."""
     if _is_wide(values):
         axes.set_yscale("log")
     else:
@@ -205,7 +196,6 @@ def scale_values(axes: Axes, values: Array) -> None:
 
 
 def _scale_factor(axes: Axes, at: Sequence[float]) -> None:
-    """Have an even axis for even ratios of a factor."""
     numbers: Any = np.unique(at)
     if (
         len(numbers) > _CONTINUOUS

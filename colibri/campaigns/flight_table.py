@@ -1,4 +1,4 @@
-"""The tables of a campaign: a row a flight, and a summary of each combination of its grid."""
+"""The tables of a campaign: one row per flight, and a summary per combination of the grid."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -18,31 +18,22 @@ _QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
 
 
 class FlightTable:
-    """The flights of a campaign that were flown, in its order.
-
-    Attributes:
-        campaign: Which flights there are.
-        flown: What came of each that was flown.
-    """
+    """The results of a campaign's flights, in its order."""
 
     def __init__(self, campaign: Campaign, flown: Mapping[int, Flown]) -> None:
-        """Be the results of those of a campaign's flights that were `flown`, by their places in the table."""
         self.campaign = campaign
         self.flown = [flown[flight] for flight in sorted(flown)]
         self._points = {point.flight: point for point in campaign.points() if point.flight in flown}
 
     @property
     def headings(self) -> Row:
-        """Names of the table's columns."""
         return self.campaign.columns
 
     def rows(self) -> list[Row]:
-        """Return the table: factors, metrics, verdict and hash of each flight; numbers with ten digits."""
         return [self._row(each) for each in self.flown]
 
     @cached_property
     def flights(self) -> Table:
-        """The table as a structured array with a field a column: numbers as float64, nan for none; else texts."""
         columns: dict[str, Any] = {"flight": [each.flight for each in self.flown]}
         columns |= {name: self.factor(name) for name in self.campaign.factors}
         columns["seed"] = [self._points[each.flight].seed for each in self.flown]
@@ -57,24 +48,15 @@ class FlightTable:
         return table.view(Table)
 
     def to_pandas(self) -> Any:
-        """Return the table as a pandas.DataFrame.
-
-        Raises:
-            PandasError: It is not installed.
-        """
+        """Return the table as a pandas.DataFrame; PandasError if pandas is not installed."""
         return self.flights.to_pandas()
 
     def factor(self, name: str) -> np.ndarray[Any, Any]:
-        """Return a factor of each flight, (n,): numbers, or texts as tables have them."""
         values = [self._points[each.flight].factors[name] for each in self.flown]
         return np.array(values if all(map(is_number, values)) else list(map(shown, values)))
 
     def metric(self, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Return a metric of each flight, (n,); nan where there is none.
-
-        Raises:
-            CampaignError: The campaign has kept no such metric.
-        """
+        """Return a metric of each flight, (n,), nan where missing."""
         names = [metric.name for metric in self.campaign.metrics]
         if name not in names:
             raise CampaignError(f"metric {name} was not kept: there are {', '.join(names)}")
@@ -84,18 +66,15 @@ class FlightTable:
 
     @property
     def usual_metric(self) -> str:
-        """The first metric that most flights have."""
         names = [metric.name for metric in self.campaign.metrics]
         known = [int(np.isfinite(self.metric(name)).sum()) for name in names]
         return names[int(np.argmax(known))]
 
     @property
     def verdicts(self) -> dict[Verdict, int]:
-        """How many flights ended with each verdict."""
         return {verdict: sum(each.verdict is verdict for each in self.flown) for verdict in Verdict}
 
     def groups(self) -> dict[tuple[Any, ...], list[int]]:
-        """Return for each combination of the grid the places, in `flown`, of its flights."""
         found: dict[tuple[Any, ...], list[int]] = {}
         for place, each in enumerate(self.flown):
             factors = self._points[each.flight].factors
@@ -103,7 +82,6 @@ class FlightTable:
         return found
 
     def summary(self) -> tuple[Row, list[Row]]:
-        """Return headings and rows: of each combination the share lost, and quantiles of what was flown."""
         names = [metric.name for metric in self.campaign.metrics]
         headings = (
             *self.campaign.grid,
@@ -126,11 +104,9 @@ class FlightTable:
         return headings, rows
 
     def through(self, places: Sequence[int]) -> list[int]:
-        """Return which of these flights came through."""
         return [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
 
     def lost(self, places: Sequence[int]) -> tuple[int, int, int]:
-        """Return how many of these flights were lost, of how many that were flown, and how many were refused."""
         verdicts = [self.flown[place].verdict for place in places]
         refused = verdicts.count(Verdict.REFUSED)
         return sum(verdict.is_lost for verdict in verdicts), len(verdicts) - refused, refused
@@ -143,7 +119,7 @@ class FlightTable:
 
 
 def wilson(lost: int, of: int) -> tuple[float, float]:
-    """Return between which bounds a share lies with 95 % confidence; nothing is known of none.
+    """Return the Wilson score interval of a share at 95 % confidence.
 
     E. B. Wilson, Probable Inference, the Law of Succession, and Statistical Inference, JASA 22, 1927.
     """
@@ -159,7 +135,6 @@ def wilson(lost: int, of: int) -> tuple[float, float]:
 
 
 def _distribution(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:
-    """Return quantiles and the largest as cells; empty where no flight has the metric."""
     known = values[~np.isnan(values)]
     if not len(known):
         return [""] * (len(_QUANTILES) + 1)

@@ -1,4 +1,4 @@
-"""One flight of a campaign, where it is flown: from its factors to its row."""
+"""Fly one flight of a campaign, from its factors to its row."""
 
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing
@@ -27,39 +27,33 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
 class Verdict(StrEnum):
-    """What came of a flight, in one word."""
+    """The outcome of a flight."""
 
     FLOWN = "flown"
     LOST = "lost"
-    """It came to its end, but not where it should."""
+    """Flown to its end, but away from its track."""
     FAILED = "failed"
-    """It came to an early end: its control law raised, say."""
+    """Ended early, for example because the control law raised."""
     REFUSED = "refused"
-    """Its factors cannot be flown together."""
+    """The factors cannot be combined."""
     KILLED = "killed"
-    """The process that flew it was killed, and killed again when it was flown alone."""
+    """Its process was killed twice, the second time with this flight alone."""
 
     @property
     def is_lost(self) -> bool:
-        """Whether it was flown, and the vehicle did not come through."""
         return self in (Verdict.LOST, Verdict.FAILED, Verdict.KILLED)
 
 
 class MetricError(CampaignError, ForeignError):
-    """A function that makes a metric of a flight raised."""
+    """A user's metric function raised."""
 
 
 class Common(NamedTuple):
-    """What all flights of a campaign need, wherever they are flown: no file of this computer.
+    """Data common to all flights, with the contents of files, which a worker may not have.
 
     Attributes:
-        fly: Options and keys that every flight has.
-        metrics: What is kept of each.
-        logs: Of which flights the logs are kept.
-        profiles: By the names and files that they go by.
-        vehicles: The same.
-        winds: The same.
-        track_files: What is in the files that tracks go through, by the tracks' names.
+        profiles: By name or file; likewise `vehicles` and `winds`.
+        track_files: Contents of the tracks' files, by track.
     """
 
     fly: dict[str, Any]
@@ -72,16 +66,13 @@ class Common(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """What came of one flight.
+    """The result of one flight.
 
     Attributes:
-        flight: Its number, which is its place in the table.
-        verdict: In one word.
-        why: In a line; empty where it was flown.
-        metrics: Those of the campaign; None for what this flight does not have.
-        sha256: Of its trajectory; empty for none.
-        contents: Hash of all that it was made of, as in its provenance; empty where nothing flew.
-        files: What is kept of its logs, by their paths within the campaign's folder.
+        why: Reason of the verdict; empty if flown.
+        sha256: Hash of the trajectory; empty without one.
+        contents: Hash of all inputs, as in the provenance.
+        files: Logs to keep, by path relative to the campaign's folder.
     """
 
     flight: int
@@ -94,11 +85,6 @@ class Flown(NamedTuple):
 
 
 def common_of(campaign: Campaign) -> Common:
-    """Return what the flights of a campaign need, read from its files.
-
-    Raises:
-        Error: One of them cannot be read.
-    """
     profiles = {name: load_profile(name) for name in _names(campaign, "profile", "flight")}
     objects = [value for value in campaign.values("profile") if isinstance(value, Profile)]
     usual = {profile.simulation.vehicle for profile in (*profiles.values(), *objects)}
@@ -116,25 +102,19 @@ def common_of(campaign: Campaign) -> Common:
 
 
 def check(points: Iterable[Point], common: Common) -> None:
-    """Plan flights, and build their control laws.
-
-    Raises:
-        Error: One of them cannot begin.
-    """
+    """Plan flights and build their control laws, to raise errors before the campaign starts."""
     for point in points:
         plan = plan_point(common, point)
         build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
 
 
 def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
-    """Return what comes of each flight, as they end."""
     with closing(engine.each(fly_point, common, points)) as results:
         for point, result in results:
             yield _killed(point, common) if isinstance(result, Killed) else result
 
 
 def fly_point(common: Common, point: Point) -> Flown:
-    """Fly once, in memory; return what came of it."""
     nothing = (None,) * len(common.metrics)
     failure_file = f"{point.folder}/{FAILURE}"
     try:
@@ -156,11 +136,6 @@ def fly_point(common: Common, point: Point) -> Flown:
 
 
 def plan_point(common: Common, point: Point) -> FlightPlan:
-    """Return the plan of a flight, from nothing but `common` and its factors.
-
-    Raises:
-        Error: It cannot begin.
-    """
     factors = common.fly | point.settings
     options = {name: value for name, value in factors.items() if key_of(name) is None} | {"seed": point.seed}
     if options.get("wind") in common.winds:
@@ -186,7 +161,7 @@ def _object(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _names(campaign: Campaign, option: str, usual: str | None = None) -> list[str]:
-    """Return the names that an option is set to, and the usual one where flights may leave it out."""
+    """Return the names and files that an option is set to, with its default where flights may leave it out."""
     always = option in (*campaign.fly, *campaign.grid, *campaign.draw)
     return [value for value in (*campaign.values(option), None if always else usual) if isinstance(value, str)]
 

@@ -1,4 +1,4 @@
-"""What a campaign keeps while it is flown: which it is, and each flight as soon as it has ended."""
+"""The journal of a campaign: its identity, and a line per finished flight."""
 
 import os
 from collections.abc import Mapping
@@ -20,16 +20,14 @@ IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
 
 class Journal:
-    """The folder of a campaign that is being flown."""
+    """The open journal of a campaign."""
 
     def __init__(self, folder: Path, kept: dict[int, Flown], file: str = JOURNAL) -> None:
-        """Go on in `folder`, which has what was `kept`, with lines in `file`."""
         self.kept = kept
         self._folder = folder
         self._file: IO[bytes] = (folder / file).open("ab")
 
     def add(self, flown: Flown) -> None:
-        """Keep a flight, whatever happens next: what is kept of its logs first, then the line that says so."""
         keep_files(self._folder, flown)
         kept = flown._replace(files={})
         self._file.write(msgspec.json.encode(kept[:-1]) + b"\n")
@@ -38,20 +36,14 @@ class Journal:
         self.kept[flown.flight] = kept
 
     def __enter__(self) -> Self:
-        """Begin."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End."""
         self._file.close()
 
 
 def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bool) -> Journal:
-    """Return the journal of a campaign in a folder that is new, empty, or has this campaign and is to go on.
-
-    Raises:
-        CampaignError: The folder has something else.
-    """
+    """Open the journal of a new or resumed campaign; CampaignError if the folder has other contents."""
     there = claim(folder / IDENTITY, identity_of(campaign, common), "campaign")
     kept = {each.flight: each for each in read_journal(folder / JOURNAL)}
     if there and not resume:
@@ -63,11 +55,7 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
 
 
 def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
-    """Make a folder that of one campaign, or tuning, by the file that has its identity; return whether it was already.
-
-    Raises:
-        CampaignError: It has something else.
-    """
+    """Write the identity of a campaign or tuning into its folder; return whether it was there."""
     folder, scratch = path.parent, path.with_suffix(".new")
     now = msgspec.json.encode(identity)
     try:
@@ -91,7 +79,6 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
 
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
-    """Return in plain data which campaign it is: all that its table depends on, files by their contents."""
     objects = (value for value in campaign.values("profile") if isinstance(value, Profile))
     own = {profile.controller for profile in (*common.profiles.values(), *objects)}
     laws = [*filter(None, campaign.values("controller")), *own.intersection(controller_names())]
@@ -121,7 +108,6 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
 
 
 def _origin(law: Any) -> Any:
-    """Return where code comes from that was handed over, with its source where that can be read."""
     try:
         return [*origin_of_factory(law), getsource(law)]
     except (OSError, TypeError):
@@ -129,7 +115,6 @@ def _origin(law: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return profiles and vehicles by their contents, and what else has no plain form as tables show it."""
     if isinstance(value, dict):
         return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -142,11 +127,6 @@ def _hash(content: Any) -> str:
 
 
 def read_journal(path: Path) -> list[Flown]:
-    """Return the flights that a journal has, in their order; a last line that was cut off is cut off there, too.
-
-    Raises:
-        CampaignError: A line is none of a journal.
-    """
     if not path.exists():
         return []
     with path.open("r+b") as file:
@@ -165,7 +145,6 @@ def read_journal(path: Path) -> list[Flown]:
 
 
 def keep_files(folder: Path, flown: Flown) -> None:
-    """Write what is kept of a flight's logs to the folder of its campaign."""
     for name, content in flown.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

@@ -1,4 +1,4 @@
-"""What is kept of each flight: numbers of its report, by their names there, or what functions make of a flight."""
+"""Metrics: numbers of a flight's report, or functions of a flight."""
 
 from collections.abc import Callable, Mapping
 from math import isfinite
@@ -18,33 +18,23 @@ _OUTCOMES = ("qp_failures", "fallbacks", "lost_at_s")
 
 
 class Metric(NamedTuple):
-    """A column of the table.
-
-    Attributes:
-        name: Of the column.
-        of: Makes it of a flight; None where it is the number of that name in the report.
-    """
+    """A column of the table; without a function `of`, the number of that name in the report."""
 
     name: str
     of: "Callable[[Flight], float | None] | None" = None
 
     def value(self, flight: "Flight") -> float | None:
-        """Return the metric of a flight; None where that has none, or none that is finite."""
         found = of_report(flight.report, self.name) if self.of is None else self.of(flight)
         return None if found is None or not isfinite(found) else float(found)
 
 
 def usual(*, sensors: bool) -> tuple[Metric, ...]:
-    """Return the metrics of a campaign that names none: those that are the same whenever the flight is."""
+    """Return the default metrics, which are deterministic."""
     return tuple(map(Metric, (*_ALWAYS, *(_ON_SENSORS if sensors else ()), *_OUTCOMES)))
 
 
 def read_metrics(given: Any) -> tuple[Metric, ...]:
-    """Return metrics by names of the report, by functions of a flight, or by names of such functions.
-
-    Raises:
-        CampaignError: There is no such metric.
-    """
+    """Read metrics from names of the report, functions, or a mapping of names to functions."""
     if isinstance(given, Mapping):
         return tuple(Metric(str(name), of) for name, of in given.items())
     if isinstance(given, str) or callable(given):

@@ -1,4 +1,4 @@
-"""What came of a campaign: its tables, their figure, and the folder that has them."""
+"""The results of a campaign: tables, figure and folder."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,11 +14,6 @@ if TYPE_CHECKING:
 
 
 def parquet_writer() -> tuple[Any, Any]:
-    """Return pyarrow, and its function that writes Parquet.
-
-    Raises:
-        CampaignError: It is not installed.
-    """
     try:
         import pyarrow
         from pyarrow.parquet import write_table
@@ -28,24 +23,15 @@ def parquet_writer() -> tuple[Any, Any]:
 
 
 class CampaignResults(FlightTable):
-    """What came of a campaign, as `colibri.campaign` returns it."""
+    """The results of a campaign."""
 
     def plot(self, metric: str | None = None) -> "Figure":
-        """Return a figure that suits the factors: distribution, line over a factor, or heat map over two.
-
-        Raises:
-            CampaignError: The campaign has kept no such metric.
-        """
         from colibri.campaigns.figure import draw
 
         return draw(self, metric)
 
     def save(self, folder: str | Path, *, parquet: bool = False) -> Path:
-        """Write `flights.csv`, `summary.csv` and `campaign.png` into a folder, and return it; `parquet`: that, too.
-
-        Raises:
-            CampaignError: There is nothing installed that writes Parquet.
-        """
+        """Write `flights.csv`, `summary.csv`, `campaign.png` and optionally `flights.parquet`; return the folder."""
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)
         if parquet:
@@ -61,6 +47,5 @@ class CampaignResults(FlightTable):
         return path
 
     def _repr_html_(self) -> str:
-        """Return the summary and the figure, as a notebook shows them."""
         headings, rows = self.summary()
         return table_html(self.campaign.name, (headings, *rows)) + figure_html(self.plot())

@@ -1,4 +1,4 @@
-"""`colibri.campaign`: all flights of a campaign, by any engine, kept as they end."""
+"""`colibri.campaign`: fly a campaign with any engine and record each flight as it ends."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -29,24 +29,23 @@ def campaign(
     progress: Callable[[Flown], object] = lambda _flown: None,
     **tables: Any,
 ) -> CampaignResults:
-    """Fly a campaign and return what came of it.
+    """Fly a campaign.
 
     Args:
-        file: TOML file of the campaign; keywords take precedence over what is in it.
-        out: Folder for the table, its summary, the figure, and what it takes to go on; None: nothing is written.
-        workers: Processes; None: one a core. From a script, call this under `if __name__ == "__main__":`, for they
-            load the script, too.
-        executor: In their place, a `distributed.Client` or the address of a scheduler of Dask.
-        resume: Go on with what `out` has of this campaign.
-        yes: Also if it has more than 10⁶ flights.
-        parquet: Write `flights.parquet`, too.
-        progress: Is given each flight as it ends.
+        file: TOML file of the campaign; keywords take precedence.
+        out: Folder for tables, figure and journal; by default no files are written.
+        workers: Processes; default one per core. In a script, call this under `if __name__ == "__main__":`, as each
+            process imports the script.
+        executor: A `distributed.Client` or the address of a Dask scheduler, instead of processes.
+        resume: Continue the campaign in `out`.
+        yes: Allow more than 10⁶ flights.
+        progress: Called with each flight as it ends.
         tables: As in the file: `fly={"duration": 30}, grid={"track": ["spiral"]}, draw={...}, seeds="1-20"`, `metrics`,
-            `logs`, `name`, `root_seed`, `paired`. Values may be what `colibri.fly` takes: profiles, vehicles, laws;
-            metrics may be functions of a `Flight`.
+            `logs`, `name`, `root_seed`, `paired`. Values may be objects, as in `colibri.fly`; metrics may be functions
+            of a `Flight`.
 
     Raises:
-        Error: What the command line would say in one line.
+        Error: An input is invalid.
     """
     planned = campaign_of(tables_of(CampaignTables, file, tables))
     engine = engine_of(workers, executor)
@@ -55,11 +54,6 @@ def campaign(
 
 
 def engine_of(workers: int | None, executor: Any) -> Engine:
-    """Return the engine that is asked for: a pool of processes, or Dask.
-
-    Raises:
-        CampaignError: Both are asked for, or it cannot be had.
-    """
     if executor is None:
         if workers is not None and workers < 1:
             raise CampaignError(f"workers: must be at least 1, not {workers}")
@@ -82,12 +76,9 @@ def fly_campaign(
     progress: Callable[[Flown], object] = lambda _flown: None,
     begun: Callable[[int], object] = lambda _kept: None,
 ) -> CampaignResults:
-    """Fly those flights of a campaign that `out` does not have yet, and write its tables; see `campaign`.
+    """Fly the flights missing in `out` and write the tables, also if interrupted.
 
-    Interrupted, it writes the tables of what was flown. `begun` is given how many flights `out` has already.
-
-    Raises:
-        Error: A flight cannot begin, or `out` has something else.
+    `begun` is called with the number of flights found in `out`.
     """
     if planned.flights > MAX_UNASKED and not yes:
         raise CampaignError(f"{planned.flights} flights are many: say --yes if you mean it")

@@ -1,4 +1,4 @@
-"""What a factor is set to: each of several values, or a draw from a distribution."""
+"""Values of factors: lists, ranges, levels and random distributions."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,81 +15,73 @@ _MAX_SPAN = 1_000_000
 
 
 class CampaignError(Error):
-    """A campaign that cannot be flown; the message names the key."""
+    """A campaign is invalid; the message names the key."""
 
 
 class Draw(Protocol):
-    """A distribution that a factor's value is drawn from."""
+    """A distribution; `value` is reproducible on every computer."""
 
-    def value(self, chance: Generator) -> Any:
-        """Return one value; the same for the same stream, on every computer."""
+    def value(self, chance: Generator) -> Any: ...
 
     @property
     def typical(self) -> tuple[Any, ...]:
-        """Values that show whether the factor can take what is drawn: the ends, or what lies far out."""
+        """Values to test a factor with: the ends of a range, or mean ± one deviation."""
 
 
 class Uniform(NamedTuple):
-    """Each value between `low` and `high` as likely."""
+    """Uniform between `low` and `high`."""
 
     low: float
     high: float
 
     def value(self, chance: Generator) -> float:
-        """Return one value."""
         return self.low + (self.high - self.low) * float(chance.random())
 
     @property
     def typical(self) -> tuple[float, ...]:
-        """The ends."""
         return self
 
 
 class LogUniform(NamedTuple):
-    """Each ratio as likely, between `low` and `high`, both above zero."""
+    """Log-uniform between `low` and `high`, both positive."""
 
     low: float
     high: float
 
     def value(self, chance: Generator) -> float:
-        """Return one value."""
         low, high = elementary.log(self.low), elementary.log(self.high)
         return min(max(elementary.exp(low + (high - low) * float(chance.random())), self.low), self.high)
 
     @property
     def typical(self) -> tuple[float, ...]:
-        """The ends."""
         return self
 
 
 class Normal(NamedTuple):
-    """Normally distributed, with a mean and a standard deviation."""
+    """Normal distribution."""
 
     mean: float
     deviation: float
 
     def value(self, chance: Generator) -> float:
-        """Return one value; of the normal number the bits that every computer agrees on."""
+        """Round the normal number to float32, in which all computers agree."""
         return self.mean + self.deviation * float(np.float32(chance.standard_normal()))
 
     @property
     def typical(self) -> tuple[float, ...]:
-        """One deviation to both sides."""
         return (self.mean - self.deviation, self.mean + self.deviation)
 
 
 class Choice(NamedTuple):
-    """Each of several values as likely."""
+    """One of several values, with equal probability."""
 
     values: tuple[Any, ...]
 
     def value(self, chance: Generator) -> Any:
-        """Return one value."""
         return self.values[int(chance.integers(len(self.values)))]
 
     @property
     def typical(self) -> tuple[Any, ...]:
-        """All of them."""
         return self.values
 
 
@@ -99,11 +91,6 @@ _SPANS = ("linspace", "logspace")
 
 
 def read_draw(key: str, given: Any) -> Draw:
-    """Return the distribution that a campaign has for a factor, `{ uniform = [0.6, 0.8] }` say.
-
-    Raises:
-        CampaignError: It is none.
-    """
     name, values = _only(key, given, _DISTRIBUTIONS)
     if name == "choice":
         return Choice(read_values(key, values))
@@ -123,23 +110,18 @@ def read_draw(key: str, given: Any) -> Draw:
 
 
 class Level(NamedTuple):
-    """A value of a factor of one's own: a name for what several options and keys are set to together."""
+    """A named set of options and keys: one value of a user's own factor."""
 
     name: str
     settings: dict[str, Any]
 
 
 def has_levels(given: Any) -> bool:
-    """Tell whether what a campaign has for a factor are levels: tables by their names."""
     return isinstance(given, Mapping) and bool(given) and all(isinstance(each, Mapping) for each in given.values())
 
 
 def read_values(key: str, given: Any) -> tuple[Any, ...]:
-    """Return the values that a campaign has for a factor: a list, `{ linspace = [2, 20, 10] }`, or `2:20:10`.
-
-    Raises:
-        CampaignError: They are none, or one is there twice.
-    """
+    """Read the values of a factor: a list, `{ linspace = [2, 20, 10] }`, or `2:20:10`."""
     if isinstance(given, Mapping):
         name, span = _only(key, given, _SPANS)
         return _span(key, name, span)
@@ -154,12 +136,12 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
 
 
 def first_twice(names: Iterable[str]) -> str:
-    """Return the first name that is there twice; empty if none is."""
+    """Return the first duplicate; empty if names are unique."""
     return next((name for name, count in Counter(names).items() if count > 1), "")
 
 
 def shown(value: Any) -> str:
-    """Return a value as tables have it: what has a name by its name."""
+    """Format a value for tables; an object by its name."""
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, bool):
@@ -172,7 +154,6 @@ def shown(value: Any) -> str:
 
 
 def _only(key: str, given: Any, known: Sequence[str]) -> tuple[str, Any]:
-    """Return name and value of what has one of the `known` names."""
     if isinstance(given, Mapping) and len(given) == 1:
         ((name, value),) = given.items()
         if name in known:
@@ -182,7 +163,7 @@ def _only(key: str, given: Any, known: Sequence[str]) -> tuple[str, Any]:
 
 
 def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
-    """Return numbers from the first to the last, at even distances or even ratios."""
+    """Return evenly spaced numbers, or evenly spaced logarithms."""
     if not isinstance(span, Sequence) or len(span) != 3 or not all(map(is_number, span)):
         raise CampaignError(f"{key}: {name}: expected [first, last, how many], not {span}")
     first, last, count = float(span[0]), float(span[1]), float(span[2])
@@ -199,7 +180,6 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 

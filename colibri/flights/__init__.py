@@ -1,4 +1,4 @@
-"""A flight, described once, and how it is flown: in this process, as two, as a fleet, or again from its log."""
+"""Describe a flight once; fly it in one process, two processes or a fleet, or replay its log."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until interrupted."""
+"""`colibri sitl`: vehicles for ground stations, each a plant and an autopilot process, until interrupted."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -27,7 +27,7 @@ from colibri.plant.vehicle.description import load_vehicle
 
 MAX_FLEET = 100
 _MAX_DEATHS, _LOOP_S = 3, 60.0
-"""A vehicle whose processes die more often than that in that time is not started again."""
+"""A vehicle with more deaths of its processes in this time ends the fleet."""
 
 
 @dataclass(slots=True, eq=False)
@@ -35,13 +35,11 @@ class Member:
     """One vehicle of the fleet.
 
     Attributes:
-        instance: Its number; its ports and system id follow from it.
-        east_m: How far it stands east of `--home`.
-        links: The URLs that its autopilot serves; once it has opened them, with the ports that it has got.
-        children: Its processes, as far as they are started.
-        plant_url: Where its plant listens.
-        boot_unix_us: Unix time when its plant was started, which dates its telemetry logs.
-        deaths_s: When a process of it has died, by the wall clock.
+        instance: Ports and system id follow from it.
+        links: URLs that its autopilot serves; once open, with actual ports.
+        plant_url: Address of its plant.
+        boot_unix_us: Start of its plant, which dates telemetry logs.
+        deaths_s: Wall-clock times when a process died.
     """
 
     instance: int
@@ -54,12 +52,10 @@ class Member:
 
     @property
     def system_id(self) -> int:
-        """MAVLink system id."""
         return self.instance + 1
 
 
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
-    """Fly vehicles until interrupted; return the exit code."""
     _check(spec)
     instances = range(spec.instance, spec.instance + spec.count)
     fleet = [Member(it, number * spec.spacing, spec.links(it)) for number, it in enumerate(instances)]
@@ -81,7 +77,6 @@ def sitl(spec: FleetSpec, *, quiet: bool) -> int:
 
 
 def _check(spec: FleetSpec) -> None:
-    """End with one line where the options cannot be flown."""
     try:
         profile, assumed = spec.load()
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
@@ -116,7 +111,7 @@ def _plant_url(spec: FleetSpec, instance: int) -> str:
 
 
 def place_of(member: Member, spec: FleetSpec) -> HomePlace:
-    """Return where a vehicle stands: in a row to the east, each with an origin of its own."""
+    """Return a vehicle's home: a row to the east, each with its own origin."""
     home = spec.home
     if not member.east_m:
         return home
@@ -152,7 +147,6 @@ def _start_autopilot(member: Member, spec: FleetSpec) -> None:
 
 
 def _common(member: Member, spec: FleetSpec) -> dict[str, Any]:
-    """Return what plant and autopilot of a vehicle have alike, and no other vehicle."""
     return {
         "home": place_of(member, spec),
         "system_id": member.system_id,
@@ -178,7 +172,6 @@ def _watch(fleet: Sequence[Member], spec: FleetSpec, stop: Stop, lines: StatusLi
 
 
 def _hear(fleet: Sequence[Member], spec: FleetSpec, lines: StatusLines) -> None:
-    """Read the events of the processes of `fleet`."""
     members = {child: member for member in fleet for child in member.children}
     for child, event in events_of(members):
         member = members[child]
@@ -194,9 +187,9 @@ def _hear(fleet: Sequence[Member], spec: FleetSpec, lines: StatusLines) -> None:
 
 
 def start_again(member: Member, spec: FleetSpec, lines: StatusLines) -> None:
-    """Start again what has died of a vehicle: the autopilot, which goes on; or the plant, and with it both.
+    """Restart a dead process: the autopilot alone, or with the plant both.
 
-    Where a process cannot begin, or dies again and again, everything ends.
+    Everything ends if a process cannot begin or dies repeatedly.
     """
     child, code = next((child, code) for child in member.children if (code := child.code()))
     if code == EXIT_BAD_INPUT:  # it has said why

@@ -1,4 +1,4 @@
-"""Vehicles that ground stations connect to: the options of `colibri sitl`."""
+"""The options of `colibri sitl`."""
 
 from dataclasses import dataclass
 from math import inf
@@ -18,7 +18,7 @@ SDK_PORT = 14540
 
 @dataclass(frozen=True, kw_only=True)
 class FleetSpec(VehiclesSpec, GroundSpec):
-    """Vehicles that ground stations connect to."""
+    """Vehicles for ground stations to connect to."""
 
     instance: Annotated[int, Option("number of the (first) vehicle: its system id is N + 1", "N", least=0)] = 0
     count: Annotated[int, Option("how many vehicles", "N", least=0)] = 1
@@ -45,9 +45,8 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
 
     def folder(self, instance: int) -> Path | None:
-        """Return the folder of a vehicle's logs; None where none are written."""
         return None if self.out is None else self.out / str(instance)
 
     def links(self, instance: int) -> list[str]:
-        """Return the URLs that a vehicle serves: those of the options, or the two that clients listen on."""
+        """Return the URLs of a vehicle's links: those of the options, or the two ports of clients."""
         return list(self.gcs) or [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]

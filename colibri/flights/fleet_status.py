@@ -1,4 +1,4 @@
-"""What `colibri sitl` shows: one live line a vehicle on a terminal, and a line for each thing that happens."""
+"""The output of `colibri sitl`: a live line per vehicle on a terminal, and a line per event."""
 
 import sys
 from typing import Any, Literal
@@ -9,7 +9,7 @@ from rich.table import Table
 
 _REDRAW_EVERY_S = 0.5
 _SHOWN = ("compiling", "ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
-"""Events that get a line of their own."""
+"""Events with a line of their own."""
 _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("id", 3, "right"),
     ("time", 6, "right"),
@@ -22,19 +22,18 @@ _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("speed", 8, "right"),
     ("solver", 6, "right"),
 )
-"""Heading, least width, and where the text stands; as wide as what is common needs, so that columns stay in place."""
+"""Heading, least width and alignment; wide enough for usual values, so that columns stay in place."""
 _FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real", "solver")
-"""What a narrow terminal shows of it: as many of these as there is room for."""
+"""Columns by priority, for a narrow terminal."""
 _LINKS_WIDTH = 66
-"""Narrower than this, links are shown without their scheme and rates."""
+"""Below this width, links are shown without scheme and rates."""
 _LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "right", "right")
 
 
 class StatusLines:
-    """Collects the events of the processes, and draws them."""
+    """Collects and draws the events of the processes."""
 
     def __init__(self, *, quiet: bool) -> None:
-        """Draw on standard error; `quiet`: only what happens, no live line."""
         self._console = Console(stderr=True, highlight=False, soft_wrap=True)
         self._facts: dict[int, dict[str, Any]] = {}
         self._quiet = quiet
@@ -42,23 +41,21 @@ class StatusLines:
         self._live: Live | None = None
 
     def begin(self, vehicles: int) -> None:
-        """Say to a terminal that processes are being started: they load for seconds before their first line."""
+        """Print a first line on a terminal: the processes take seconds to load."""
         if self._console.is_terminal and not self._quiet:
             self._console.print("starting" + (f" {vehicles} vehicles" if vehicles > 1 else ""), markup=False)
 
     def add(self, instance: int, name: str, event: dict[str, Any]) -> None:
-        """Add one event of a process of vehicle `instance`."""
         if event["event"] == "status":
             self._facts[instance] = event
         elif event["event"] in _SHOWN and event.get("functions", 1) == 1 and not self._quiet:
             self._console.print(f"{instance + 1:3d} {name}: {event['text']}", markup=False)
 
     def died(self, instance: int, name: str, how: str) -> None:
-        """Say that a process of vehicle `instance` has died, also where nothing else is said."""
+        """Print a death, even if quiet."""
         self._console.print(f"{instance + 1:3d} {name} {how}", markup=False)
 
     def show(self, now_s: float) -> None:
-        """Draw the live lines, if it is time to and there is a terminal."""
         if self._quiet or not self._console.is_terminal or not self._facts or now_s < self._drawn_s + _REDRAW_EVERY_S:
             return
         self._drawn_s = now_s
@@ -68,20 +65,18 @@ class StatusLines:
         self._live.update(status_table(self._facts, self._console.width), refresh=True)
 
     def forget(self, instance: int) -> None:
-        """Show vehicle `instance` no more."""
         self._facts.pop(instance, None)
 
     def close(self) -> None:
-        """Leave the terminal as it was."""
         if self._live is not None:
             self._live.stop()
         sys.stderr.flush()
 
 
 def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
-    """Return a row for each vehicle: what it does, where it is, how long its QP takes; and one for each of its links.
+    """Return a row per vehicle and a row per link; in a fleet, only links with a ground station.
 
-    Of a fleet, links without a ground station are left out. It fits 80 columns; where there are fewer, less is shown.
+    It fits 80 columns; on a narrower terminal, columns are left out.
     """
     shown = _shown(width)
     vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
@@ -102,7 +97,6 @@ def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
 
 
 def _shown(width: int) -> set[str]:
-    """Return the columns that fit; the first always."""
     least = {heading: width for heading, width, _ in _COLUMNS}
     shown: list[str] = []
     for heading in _FIRST:
@@ -113,7 +107,6 @@ def _shown(width: int) -> set[str]:
 
 
 def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
-    """Return the columns of a vehicle behind its id."""
     x, y, z = (round(value, 1) + 0.0 for value in fact["position_enu_m"])  # + 0.0: no minus before a zero
     return (
         f"{fact['sim_time_s']:.0f} s",
@@ -127,7 +120,6 @@ def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _link_texts(link: dict[str, Any], width: int) -> tuple[str, ...]:
-    """Return the columns of a link: its URL, the ground stations on it, messages a second in and out."""
     who = " ".join(link["heard"]) or "nobody"
     if width < _LINKS_WIDTH:
         return (link["url"].partition(":")[2], f"hears {who}")

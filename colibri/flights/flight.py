@@ -31,10 +31,8 @@ class Answered(NamedTuple):
     """The answer to a frame, as it reached the plant.
 
     Attributes:
-        step: The autopilot's step.
-        command: The command.
         faults: Faults and changes of the world that come with it.
-        datagram: The frame as the autopilot received it; None on a wire without datagrams.
+        datagram: The frame as the autopilot received it; `None` on a wire without datagrams.
     """
 
     step: Step
@@ -47,22 +45,15 @@ class Wire(Protocol):
     """Carries a frame of the plant to the autopilot, and the answer back."""
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
-        """Return the answer to the plant's next frame.
-
-        Raises:
-            DecisionError: The control law gave what no rotor can follow.
-        """
+        """Return the answer to the plant's next frame; DecisionError if the control law's is invalid."""
 
 
 class Sample(NamedTuple):
     """A frame that was flown.
 
     Attributes:
-        step: The autopilot's step.
-        command: The command that reached the plant.
-        world: The world that it led to, at the time of the next frame.
-        datagram: The frame as the autopilot received it; None on a wire without datagrams.
-        to_stations: What goes to ground stations.
+        world: The world at the time of the next frame.
+        datagram: The frame as the autopilot received it; `None` on a wire without datagrams.
     """
 
     step: Step
@@ -73,27 +64,20 @@ class Sample(NamedTuple):
 
 
 class Flight(Generic[StagesT]):
-    """A flight within this process.
-
-    Attributes:
-        plant: The vehicle in its world.
-        autopilot: The autopilot.
-        wire: What lies between them.
-    """
+    """A flight within this process."""
 
     def __init__(self, plant: Plant, autopilot: Autopilot[StagesT], wire: Wire) -> None:
         self.plant, self.autopilot, self.wire = plant, autopilot, wire
 
     @property
     def time_us(self) -> int:
-        """Simulated time."""
         return self.plant.world.time_us
 
     def step(self, inbox: Iterable[Received] = ()) -> Sample:
         """Fly a frame, and serve ground stations, which sent `inbox`.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
+            DecisionError: The control law's decision is invalid.
             IntegrationError: The state cannot be integrated any further.
         """
         step, command, faults, datagram = self.wire.exchange(self.plant, self.autopilot)
@@ -101,50 +85,38 @@ class Flight(Generic[StagesT]):
         return Sample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
 
     def samples(self, duration_s: float) -> Iterator[Sample]:
-        """Fly frame by frame, for as long as a whole frame is left of `duration_s` since time 0.
-
-        Raises:
-            DecisionError, IntegrationError: As `step`.
-        """
+        """Fly frame by frame, for as long as a whole frame is left of `duration_s` since time 0."""
         end_us = duration_s * 1e6 - self.plant.interval_us
         while self.plant.world.time_us <= end_us:
             yield self.step()
 
     def snapshot(self) -> Snapshot:
-        """Return the flight as it is now: plant, autopilot and wire, and nothing of what records it.
+        """Keep the state of plant, autopilot and wire, without logs.
 
-        Vehicle, profile and track never change, and are shared; see `colibri.flights.snapshots` for what is copied.
-
-        Raises:
-            SnapshotError: A control law or a track of the user's has a state that cannot be read.
+        Vehicle, profile and track never change, and are shared; see `colibri.flights.snapshots`.
         """
         return Snapshot((self.plant, self.autopilot, self.wire))
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this flight: it goes on with the same bits."""
+        """Go back to a snapshot of this flight; it continues bit for bit."""
         snapshot.restore()
 
 
 class Direct:
-    """Hands frame and command over in double precision, without the codec."""
+    """Passes frame and command in double precision, without the codec."""
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
-        """Return the autopilot's answer as it is."""
         step = autopilot.step(*plant.measure())
         return Answered(step, step.command, step.faults, None)
 
 
 class InMemory:
-    """Carries the datagrams that two processes would send, in the same conversation.
-
-    Attributes:
-        plant_end, autopilot_end: Its two ends.
-    """
+    """Carries the datagrams of two processes in memory."""
 
     def __init__(
         self, frame_interval_us: int, feedback: Feedback, system_id: int = SYSTEM_ID, traffic: Traffic | None = None
     ) -> None:
-        """Have the autopilot call the plant and request `feedback`; `traffic` records all frames."""
+        """Connect the autopilot and request `feedback`; `traffic` records all frames."""
         self._traffic = traffic
         self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
         self.autopilot_end = AutopilotEnd(
@@ -154,7 +126,6 @@ class InMemory:
         self._to_plant(0)
 
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
-        """Return the autopilot's answer as the plant decoded it."""
         now_us = plant.world.time_us
         frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
         self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
@@ -165,11 +136,11 @@ class InMemory:
         return Answered(step, command, self.plant_end.take_faults(), datagram)
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return what reaches the autopilot of the plant's datagrams."""
+        """Return the datagrams of the plant that reach the autopilot."""
         return datagrams
 
     def carried_down(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return what reaches the plant of the autopilot's datagrams."""
+        """Return the datagrams of the autopilot that reach the plant."""
         return datagrams
 
     def _to_autopilot(self, now_us: int, autopilot: Autopilot[Any]) -> tuple[Step | None, bytes]:

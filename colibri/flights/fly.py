@@ -1,4 +1,4 @@
-"""A planned flight, flown over whichever link."""
+"""Fly a plan over its link."""
 
 from collections.abc import Callable
 
@@ -18,15 +18,15 @@ def fly_plan(
     compiling: Callable[[int], None] = unseen,
     topics: TopicLog | None = None,
 ) -> Summary:
-    """Fly a plan over its link, and note in its folder what it is made of; return what was measured meanwhile.
+    """Fly a plan over its link, and write its provenance; a flight in this process with `topics` writes no files.
 
-    A flight in this process that is recorded in `topics` writes nothing.
-
-    `progress` is called with the simulated time, s; `say` with a line for each ground link and each ground station that
-    connects; `compiling` with the number of functions compiled so far.
+    Args:
+        progress: Called with the simulated time, s.
+        say: Called with a line per ground link and per ground station that connects.
+        compiling: Called with the number of functions compiled so far.
 
     Raises:
-        FlightError: It came to an early end; why is also in `FAILURE`, with the traceback where foreign code raised.
+        FlightError: The flight ended early; the reason is also in `FAILURE`, with the traceback of foreign code.
     """
     if topics is None:
         write_provenance(plan)

@@ -1,4 +1,4 @@
-"""The folder of a flight: what is in it, emptied for the next one, kept from other commands meanwhile."""
+"""The folder of a flight: its files and its lock."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "roto
 
 
 def prepare(out: Path) -> None:
-    """Make the folder of a flight, and leave nothing of an earlier one in it."""
+    """Make the folder of a flight and delete the files of an earlier one."""
     make_folder(out)
     try:
         for name in (*LOGS, *FIGURES):
@@ -26,7 +26,7 @@ def prepare(out: Path) -> None:
 
 @contextmanager
 def occupied(out: Path) -> Iterator[None]:
-    """Keep other commands from writing to a folder meanwhile, or end with one line where one of them does."""
+    """Lock a folder against other commands; end with one line if it is locked."""
     make_folder(out)
     try:
         lock = FolderLock(out, "--out")
@@ -37,7 +37,7 @@ def occupied(out: Path) -> Iterator[None]:
 
 
 def make_folder(out: Path) -> None:
-    """Make a folder that can be written to, or end with one line."""
+    """Make a writable folder, or end with one line."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):

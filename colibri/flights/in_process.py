@@ -1,4 +1,4 @@
-"""A flight within this process: through the codec but without sockets (`memory`), or without either (`direct`)."""
+"""A flight in this process: with the codec but without sockets (`memory`), or without both (`direct`)."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -24,16 +24,9 @@ from colibri.plant.simulation.plant import Plant, PlantBuilder
 def fly_locally(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
 ) -> Summary:
-    """Fly `plan` in this process, and record it in `topics`, or else in the plan's folder.
+    """Fly in this process and record in `topics`, or else in the plan's folder.
 
-    `progress` is called with the simulated time, s.
-
-    Raises:
-        ControllerError: The control law cannot be used.
-        DecisionError: The control law decided what no rotor can follow.
-        ProfileError: The control law's table in the profile is wrong.
-        SolverError: The solver cannot be used.
-        IntegrationError: The state cannot be integrated any further.
+    `progress` is called with the simulated time, s. Errors are those of the control law, the solver and the integrator.
     """
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
@@ -66,11 +59,7 @@ def fly_locally(
 
 
 def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages], Plant]:
-    """Return the autopilot and the plant of a flight as it begins; `clock` only measures.
-
-    Raises:
-        ControllerError, ProfileError, SolverError: As `fly_locally`.
-    """
+    """Build the autopilot and the plant of a flight; `clock` only measures."""
     estimator = estimator_for(plan.spec.feedback, plan.vehicle, DEFAULT_ORIGIN)
     autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.spec.law)
     starts = {plan.spec.feedback: nudged(plan.start)}

@@ -1,11 +1,10 @@
-"""Plant and autopilot as child processes: started, their output read, watched, ended.
+"""Start, watch and end plant and autopilot as child processes.
 
-A child is forked where this process may be: that spares it the loading, which takes longer than most flights. Else it
-is started anew, and reads its specification as JSON from standard input.
+A child is forked if this process may be: loading takes longer than most flights. Otherwise it is started as a command,
+and reads its specification as JSON from standard input.
 
-Each is in a process group of its own, out of reach of the terminal's Ctrl-C: that is for this process, which then ends
-its children in order. It does so by SIGTERM, which a child that is still loading obeys without a traceback; a child
-that takes too long is killed. If this process dies, they end, too: each watches its parent.
+Each has a process group of its own, so that Ctrl-C in the terminal reaches only this process, which ends its children
+in order: SIGTERM, then SIGKILL after the grace period. Each also ends if this process dies.
 """
 
 import json
@@ -33,15 +32,11 @@ _GRACE_S = 5.0
 
 
 def name_of(spec: ProcessSpec) -> str:
-    """Return which of the two processes a specification describes."""
     return "plant" if isinstance(spec, PlantSpec) else "autopilot"
 
 
 def can_fork() -> bool:
-    """Whether this process may be forked: on Linux, with one thread, as others would hold their locks forever.
-
-    Elsewhere libraries of the system keep threads of their own.
-    """
+    """Whether this process may be forked: on Linux with one thread, as locks of others would stay held."""
     return _TASKS.is_dir() and len(list(_TASKS.iterdir())) == 1 and not current_process().daemon
 
 
@@ -49,36 +44,27 @@ class Running(Protocol):
     """A process that was started."""
 
     @property
-    def number(self) -> int:
-        """Its process id."""
+    def number(self) -> int: ...
 
     def code(self) -> int | None:
-        """Return its exit code, negative for a signal; None while it runs."""
+        """Return the exit code, negative for a signal; `None` while it runs."""
 
-    def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
+    def kill(self) -> None: ...
 
 
 class Child:
-    """A plant or an autopilot, as a child of this process.
+    """A plant or an autopilot as a child of this process, which ends with it.
 
     Attributes:
-        name: Which of the two.
-        forked: Whether it was forked.
-        number: Its process id.
-        stdout: What it writes; None where that goes into a file.
+        number: Process id.
+        stdout: The pipe from it, unless its output goes to a file.
     """
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
-        """Start it; its output goes into file `log`, or can be read here. It ends when this process does.
-
-        Args:
-            spec: What it is.
-            fork: Whether to fork this process where that may be.
-            log: Takes standard output and error; None to read standard output here.
+        """Start it: forked if requested and possible, with its output to file `log` or to a pipe.
 
         Raises:
-            SpecError: It is started anew, and holds an object, a control law say, that JSON cannot.
+            SpecError: It is not forked, and JSON cannot hold an object in its specification.
         """
         self.name = name_of(spec)
         self.forked = fork and can_fork()
@@ -93,62 +79,52 @@ class Child:
         self.stdout = None if read is None else os.fdopen(read, "rb", buffering=0)
 
     def code(self) -> int | None:
-        """Return its exit code, negative for a signal; None while it runs."""
+        """Return the exit code, negative for a signal; `None` while it runs."""
         return self._process.code()
 
     def read(self) -> list[dict[str, Any]]:
-        """Return the events that it has printed since the last time; waits for the first."""
+        """Return the events printed since the last time; wait for the first."""
         assert self.stdout is not None, "read only where it is piped"
         *lines, self._rest = (self._rest + os.read(self.stdout.fileno(), 65536)).split(b"\n")
         return [json.loads(line) for line in lines]
 
     def terminate(self) -> None:
-        """Ask it to end."""
         if self.code() is None:
             os.kill(self.number, signal.SIGTERM)
 
     def wait(self, timeout_s: float | None = None) -> int | None:
-        """Return its exit code when it has ended; None where it has not in `timeout_s`."""
+        """Return the exit code once it has ended; `None` after the timeout."""
         return self._process.wait(timeout_s)
 
     def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
         if self.code() is None:
             os.kill(self.number, signal.SIGKILL)
             self.wait()
 
     def close(self) -> None:
-        """Let go of its output."""
         if self.stdout is not None:
             self.stdout.close()
 
 
 class Fork:
-    """A process forked from this one: it begins with what is loaded here.
-
-    Attributes:
-        number: Its process id.
-    """
+    """A process forked from this one, with its modules loaded; `stdout` and `stderr` are file descriptors."""
 
     def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
-        """Fork it; it writes to the files of the numbers `stdout` and `stderr`."""
         self._process = get_context("fork").Process(target=_fly, args=(spec, stdout, stderr, os.getpid()), daemon=True)
         self._process.start()
         assert self._process.pid is not None, "it was started"
         self.number = self._process.pid
 
     def code(self) -> int | None:
-        """Return its exit code, negative for a signal; None while it runs."""
         return self._process.exitcode
 
     def wait(self, timeout_s: float | None = None) -> int | None:
-        """Return its exit code when it has ended; None where it has not in `timeout_s`."""
         self._process.join(timeout_s)
         return self._process.exitcode
 
 
 class _Anew:
-    """A process started as a user does; with -P, so that no module of the working directory shadows one of Python's."""
+    """A process started as a command; -P keeps modules of the working directory from shadowing Python's."""
 
     def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
         import subprocess
@@ -176,7 +152,6 @@ class _Anew:
 
 
 def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:
-    """Be the process that `spec` describes."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_DFL)
     os.setpgid(0, 0)
@@ -197,10 +172,7 @@ def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:
 
 
 def _use_safe_path() -> None:
-    """Take off the path what -P leaves off: modules of the working directory shadow none that are still to be loaded.
-
-    It need not be the first any more: a script may have put folders before it.
-    """
+    """Remove the path that -P leaves out; a script may have put others before it."""
     if not sys.flags.safe_path:
         unsafe = ("", os.getcwd(), os.path.dirname(os.path.abspath(sys.argv[0])))
         place = next((place for place, folder in enumerate(sys.path) if folder in unsafe), None)
@@ -218,7 +190,6 @@ def events_of(children: Iterable[Child]) -> Iterator[tuple[Child, dict[str, Any]
 
 
 def how_it_ended(code: int) -> str:
-    """Return an exit code in words."""
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 

@@ -1,4 +1,4 @@
-"""A flight with all that it is made of, read and checked before anything starts."""
+"""A flight with its inputs read and checked."""
 
 from dataclasses import dataclass
 from math import degrees, inf
@@ -22,11 +22,11 @@ from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicl
 
 
 def unseen(_what: object) -> None:
-    """Show nothing: neither simulated time, s, nor a line of text."""
+    """Ignore progress: simulated time, s, or a line of text."""
 
 
 class Summary(NamedTuple):
-    """What only the run itself can give: wall-clock time of the flight, frames exchanged and sent again."""
+    """Measurements of the run: wall-clock time, frames exchanged, and frames sent again."""
 
     wall_time_s: float
     frames: int
@@ -34,17 +34,17 @@ class Summary(NamedTuple):
 
 
 class PlanError(Error):
-    """Options that cannot be combined; the message is the one line that a user needs."""
+    """Options that cannot be combined."""
 
 
 class Contents(NamedTuple):
-    """What the names in a specification stand for.
+    """The contents of the files named in a specification.
 
     Attributes:
         profile: With the law, solver and delay of the options.
         vehicle: The vehicle that the autopilot controls.
-        plant_vehicle: The vehicle that the plant flies, its parts left out.
-        track_file: The text of the track's file; None for a track without one.
+        plant_vehicle: The vehicle that the plant flies, without the parts left out.
+        track_file: Text of the track's file, if it has one.
     """
 
     profile: Profile
@@ -54,13 +54,6 @@ class Contents(NamedTuple):
 
 
 def contents_of(spec: FlightSpec) -> Contents:
-    """Read the files that a specification names.
-
-    Raises:
-        ProfileError: The profile cannot be read.
-        VehicleError: A vehicle cannot be read.
-        TrackError: The file of the track cannot be read.
-    """
     profile, vehicle = spec.load()
     plant_vehicle = load_vehicle(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
     return Contents(profile, vehicle, plant_vehicle.without(spec.without), file_text(spec.track))
@@ -71,11 +64,11 @@ class FlightPlan:
     """A flight that can begin.
 
     Attributes:
-        spec: The flight as it was described.
-        contents: What the names in it stand for.
-        start: How the plant begins.
-        track: The track to fly, changed where the vehicle could not fly it.
-        track_note: What was changed, or which limit the track exceeds; empty for nothing.
+        spec: The flight as described.
+        contents: Contents of the files it names.
+        start: Initial state of the plant.
+        track: Track to fly, adapted to the vehicle's limits.
+        track_note: Changes of the track, or the limit that it exceeds; else empty.
     """
 
     spec: FlightSpec
@@ -86,14 +79,13 @@ class FlightPlan:
 
     @classmethod
     def of(cls, spec: FlightSpec, contents: Contents | None = None) -> "FlightPlan":
-        """Return the plan of a flight; without `contents` what it names is read from files.
+        """Return the plan of a flight; without `contents`, files are read.
 
         Raises:
-            PlanError: Ground stations are invited to a flight without links to them; or the flight is to be flown by
-                sensors, and a vehicle has none, or no ground to stand on.
-            LinkError: The URL of a ground station names no link, or would let anybody on the network fly the vehicle.
-            ProfileError: The profile cannot be read.
-            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            PlanError: Options cannot be combined, or a vehicle has no sensors or ground for feedback from sensors.
+            LinkError: The URL of a ground station is invalid, or reachable from the network without a key.
+            ProfileError: The profile is invalid.
+            VehicleError: A vehicle is invalid, or cannot start as the profile requires.
             TrackError: The track is unknown, leads below the floor, or its file cannot be flown.
         """
         if spec.gcs and spec.link != "udp":
@@ -127,7 +119,7 @@ class FlightPlan:
 
     @property
     def plant_vehicle(self) -> Vehicle:
-        """The vehicle that the plant flies, its parts left out."""
+        """The vehicle that the plant flies, without the parts left out."""
         return self.contents.plant_vehicle
 
     @property
@@ -147,27 +139,27 @@ class FlightPlan:
 
     @property
     def integrator(self) -> Any:
-        """How the plant integrates: `rk4` or `adaptive`."""
+        """The plant's integrator: `rk4` or `adaptive`."""
         return self.spec.integrator or self.profile.simulation.integrator
 
     @property
     def floor_m(self) -> float:
-        """Height below which no track may lead, z of ENU; -inf for anywhere."""
+        """Least height of the track, z of ENU; -inf without a floor."""
         return _floor_m(self.spec, self.plant_vehicle)
 
     @property
     def flown_by(self) -> str:
-        """Profile, and control law if it is not the profile's, as tables and figures have them."""
+        """Profile, and control law unless it is the profile's, for tables and figures."""
         law = self.spec.law_name
         return f"profile {self.profile.name}" + (f", controller {law}" if law else "")
 
     @property
     def start_yaw_rad(self) -> float:
-        """The first yaw reference, with which the vehicle starts unless the options have another."""
+        """The first yaw reference, which is also the default initial yaw."""
         return start_yaw(self.track, self.profile.references)
 
     def plant_spec(self, link: str) -> PlantSpec:
-        """Return the plant of the flight, which waits at a link."""
+        """Return the specification of the plant, which listens at a link."""
         spec = self.spec
         vehicle = spec.plant_vehicle or spec.vehicle or self.profile.simulation.vehicle
         return part_of(
@@ -182,12 +174,11 @@ class FlightPlan:
         )
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
-        """Return the autopilot of the flight, which calls the plant at a link."""
+        """Return the specification of the autopilot, which calls the plant at a link."""
         return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m)
 
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
-    """Return the names of the vehicles of autopilot and plant."""
     vehicle = name_of(spec.vehicle or profile.simulation.vehicle)
     return vehicle, name_of(spec.plant_vehicle or vehicle)
 
@@ -197,7 +188,6 @@ def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:
 
 
 def _check_sensors(name: str, vehicle: Vehicle) -> None:
-    """Check that a flight on sensors can begin, at rest."""
     if vehicle.sensors is None:
         raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
     if vehicle.ground is None:
@@ -205,7 +195,7 @@ def _check_sensors(name: str, vehicle: Vehicle) -> None:
 
 
 def _usual_start(profile: Profile, flown: Track, feedback: Feedback) -> Start:
-    """Return how the flights of a profile begin: at rest, with the first yaw of the track; on sensors on the ground."""
+    """Return the default start: at rest with the first yaw of the track; with sensors on the ground."""
     x, y, z = profile.simulation.position_enu_m
     yaw_deg = degrees(start_yaw(flown, profile.references))
     if feedback is Feedback.SENSORS:

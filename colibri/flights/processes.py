@@ -1,4 +1,4 @@
-"""A flight as two processes over UDP: started, watched, ended."""
+"""A flight as two processes over UDP."""
 
 from collections.abc import Callable, Iterable
 
@@ -8,19 +8,18 @@ from colibri.flights.launcher import Child, end_children, events_of, how_it_ende
 from colibri.flights.plan import FlightPlan, Summary, unseen
 
 _SHOWN = ("ground", "heard", "said")
-"""Events of the autopilot that are shown to a user with ground stations."""
+"""Events of the autopilot shown to a user with ground stations."""
 
 
 class FlightError(InFlightError):
     """A process ended before its flight did.
 
     Attributes:
-        code: What the exit code shall be.
-        said: Whether the process has already printed why.
+        code: Exit code to return.
+        said: Whether the process has already printed the reason.
     """
 
     def __init__(self, message: str, code: int, *, said: bool) -> None:
-        """Fail with `message`."""
         super().__init__(message)
         self.code = code
         self.said = said
@@ -32,11 +31,7 @@ def fly_processes(
     say: Callable[[str], None] = unseen,
     compiling: Callable[[int], None] = unseen,
 ) -> Summary:
-    """Fly `plan` as two processes on a free port, as `fly_plan` does. Both are gone when this returns or raises.
-
-    Raises:
-        FlightError: One of them ended before the flight did.
-    """
+    """Fly on a free port, as `fly_plan` does; both processes have ended when this returns or raises."""
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     try:
@@ -64,7 +59,6 @@ def fly_processes(
 
 
 def _failure(children: Iterable[Child], plan: FlightPlan) -> FlightError:
-    """Return what is wrong with children of whom one has ended."""
     for child in children:
         code = child.code()
         if code:

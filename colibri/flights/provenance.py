@@ -1,4 +1,4 @@
-"""`provenance.json` in the folder of a flight: all that it is made of, by content; its files may change after it."""
+"""`provenance.json`: all inputs of a flight by content, as their files may change later."""
 
 from dataclasses import replace
 from hashlib import sha256
@@ -22,27 +22,26 @@ from colibri.plant.environment.weather import RecordedWind
 from colibri.plant.vehicle.description import Vehicle
 
 _NOT_KEPT = ("out", "tlog", "gcs", "signing_key", "insecure", "speed")
-"""No flight depends on them."""
+"""Options without effect on the flight."""
 _NAMES = ("track", "profile", "controller", "solver", "delay", "vehicle", "plant_vehicle", "without")
-"""What they stand for is kept by content."""
+"""Options that are recorded by the contents they name."""
 
 
 class ProvenanceError(Error):
-    """A folder that does not say what was flown in it."""
+    """A folder without a valid record of its flight."""
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """All that a flight is made of.
+    """The inputs of a flight.
 
     Attributes:
         colibri: Version that flew it.
-        spec: The flight as it was described, with the names of what follows by content.
-        profile: With controller, solver and delay of the options.
-        law: Where the control law comes from.
-        vehicle: That the autopilot controlled.
-        plant_vehicle: That the plant flew, its parts left out.
-        track_file: What was in the file of the track, if there was one.
-        sha256: Of each of these but the names, and as `all` of all of them.
+        spec: The flight as described.
+        profile: With the law, solver and delay of the options.
+        law: Origin of the control law.
+        plant_vehicle: Without the parts left out.
+        track_file: Text of the track's file, if it had one.
+        sha256: Hash of each of these without names, and of all of them as `all`.
     """
 
     colibri: str
@@ -56,11 +55,6 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 def provenance_of(plan: FlightPlan) -> Provenance:
-    """Return what a flight is made of.
-
-    Raises:
-        ControllerError: There is no such control law.
-    """
     values = plain_values(_named(plan), whole=True)
     values = {name: value for name, value in values.items() if name not in _NOT_KEPT}
     contents: dict[str, Any] = {
@@ -84,7 +78,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
 
 
 def _named(plan: FlightPlan) -> FlightSpec:
-    """Return the specification of a flight with names for what is kept by content, and with what follows from it."""
+    """Return the specification with names for objects and with defaults resolved."""
     return replace(
         plan.spec,
         profile=name_of(plan.spec.profile),
@@ -98,12 +92,10 @@ def _named(plan: FlightPlan) -> FlightSpec:
 
 
 def encoded_provenance(plan: FlightPlan) -> bytes:
-    """Return what a flight is made of, as it is written to its folder."""
     return msgspec.json.format(msgspec.json.encode(provenance_of(plan)), indent=1) + b"\n"
 
 
 def write_provenance(plan: FlightPlan) -> None:
-    """Write what a flight is made of to its folder, or end with one line."""
     content = encoded_provenance(plan)
     try:
         (plan.out / PROVENANCE).write_bytes(content)
@@ -112,11 +104,6 @@ def write_provenance(plan: FlightPlan) -> None:
 
 
 def read_provenance(folder: Path) -> Provenance:
-    """Return what the flight of a folder is made of.
-
-    Raises:
-        ProvenanceError: The folder does not say.
-    """
     path = folder / PROVENANCE
     try:
         return msgspec.json.decode(path.read_bytes(), type=Provenance)
@@ -129,11 +116,11 @@ def read_provenance(folder: Path) -> Provenance:
 
 
 def plan_of(folder: Path) -> FlightPlan:
-    """Return the plan of the flight of a folder, from what is kept there alone.
+    """Return the plan of a recorded flight from its folder alone.
 
     Raises:
-        ProvenanceError: The folder does not say what was flown.
-        TrackError: This version knows no such track.
+        ProvenanceError: The record is missing or invalid.
+        TrackError: This version has no such track.
     """
     kept = read_provenance(folder)
     spec = from_values(FlightSpec, {**kept.spec, "out": folder}, ProvenanceError)

@@ -1,4 +1,4 @@
-"""`colibri replay`: the frames of a recorded flight, fed to the autopilot alone: is each command what it was?"""
+"""`colibri replay`: feed the frames of a recorded flight to the autopilot and compare its commands."""
 
 import argparse
 import json
@@ -36,19 +36,13 @@ from colibri.mavlink.wire.dialect import Codec
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 _CUT_OFF_US = 1_000_000
-"""Processes that are killed leave logs that end less apart than this."""
+"""Largest difference of the logs' ends if the processes are killed."""
 _NO_CLOCK_S = 0.0
-"""What is decided must not depend on it."""
+"""The wall clock of a replay; decisions must not depend on it."""
 
 
 class Recorded(NamedTuple):
-    """A frame of the plant, and the command that answered it.
-
-    Attributes:
-        time_us: Simulated time.
-        datagram: What the autopilot received.
-        command: What it answered.
-    """
+    """A frame as the autopilot received it, and the command that answered it."""
 
     time_us: int
     datagram: bytes
@@ -56,14 +50,11 @@ class Recorded(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the autopilot made of a frame when it was asked again.
+    """The autopilot's answer in the replay.
 
     Attributes:
-        time_us: Of the frame.
-        command: What it had answered.
-        autopilot: That answered.
-        step: Its answer.
-        known: Its state estimate; None before the first estimate.
+        command: The recorded answer.
+        known: State estimate; `None` before the first one.
     """
 
     time_us: int
@@ -74,13 +65,11 @@ class Answer(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """The first command that is not what it was.
+    """The first command that differs.
 
     Attributes:
-        recorded: What it was.
-        replayed: What it is.
-        mode: Of the autopilot, at that moment.
-        known: Its state estimate; None before the first estimate.
+        mode: Flight mode at that time.
+        known: State estimate; `None` before the first one.
     """
 
     recorded: ActuatorCommand
@@ -89,7 +78,6 @@ class Difference(NamedTuple):
     known: StateFrame | None
 
     def __str__(self) -> str:
-        """Return it as lines for a user."""
         return "\n".join(
             (
                 f"first difference at t = {self.recorded.time_us * 1e-6:.3f} s, in mode {self.mode}",
@@ -101,13 +89,7 @@ class Difference(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """What came of a replay.
-
-    Attributes:
-        commands: How many were compared, up to the difference if there is one.
-        last_us: Time of the last of them.
-        difference: The first; None if all are what they were.
-    """
+    """The result of a replay; `commands` counts those compared up to a difference, `last_us` is the last time."""
 
     commands: int
     last_us: int
@@ -115,11 +97,10 @@ class Replayed(NamedTuple):
 
 
 class ReplayError(Error):
-    """A recording that cannot be replayed; the message is the one line that a user needs."""
+    """A recording that cannot be replayed."""
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Replay as the command line says; return the exit code."""
     log = args.log / FILE if args.log.is_dir() else args.log
     try:
         flight = _read(log)
@@ -141,27 +122,17 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def replay_flight(path: Path) -> Replayed:
-    """Replay a flight from its log, or the folder with it.
-
-    Profile, vehicle and waypoints are those of the log, whatever their files are by now.
-
-    Raises:
-        ReplayError: They cannot be replayed.
-    """
+    """Replay a flight from its log or folder, with the profile, vehicle and waypoints in the log."""
     return _compare(_read(path))
 
 
 def answers_of(path: Path) -> Iterator[Answer]:
-    """Yield the answers of the autopilot to the frames of a flight, one after the other; `path` as of `replay_flight`.
-
-    Raises:
-        ReplayError: They cannot be replayed.
-    """
+    """Yield the autopilot's answers to the frames of a recorded flight."""
     yield from _answers(_read(path))
 
 
 class _Flight(NamedTuple):
-    """A recorded flight: its log, and what the autopilot received."""
+    """A recorded flight: its log, and the inputs of the autopilot."""
 
     path: Path
     log: FlightFile
@@ -187,7 +158,7 @@ def _read(path: Path) -> _Flight:
 
 
 def _recorded(flight: _Flight) -> Iterator[Recorded]:
-    """Yield each frame that was answered, with its command; up to the first frame that the log lacks."""
+    """Yield each answered frame with its command, up to the first frame missing in the log."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
@@ -208,7 +179,6 @@ def _recorded(flight: _Flight) -> Iterator[Recorded]:
 
 
 def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:
-    """Yield the frames of state feedback."""
     for block in log.blocks(TRUTH):
         for time_s, u, v, w, p, q, r, x, y, z, qw, qx, qy, qz, *_ in block.tolist():
             attitude = (qw, qx, qy, qz)
@@ -217,7 +187,6 @@ def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:
 
 
 def _compare(flight: _Flight) -> Replayed:
-    """Compare answers with what was commanded, until one differs."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
     commands = last_us = 0
@@ -236,7 +205,7 @@ def _compare(flight: _Flight) -> Replayed:
 
 
 def _answers(flight: _Flight) -> Iterator[Answer]:
-    """Answer each frame as the autopilot did that was started last before it."""
+    """Answer each frame with the autopilot that was running, as set up at its last start."""
     setups, inbox = flight.inputs.setups, flight.inputs.datagrams
     autopilot: Autopilot[Any] | None = None
     known: StateFrame | None = None
@@ -261,7 +230,7 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
 
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
-    """Return what arrives of a command: the link rounds it."""
+    """Round a command as the link does."""
     (message,) = codec.decode(encode_actuators(codec, command))
     arrived = decode_actuators(message)
     assert arrived is not None, "what an autopilot commands can be flown"
@@ -269,7 +238,7 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
 
 
 def _changed(setups: Iterable[Setup]) -> list[str]:
-    """Return the profiles and vehicles of a log that are others under their names by now; none that is gone."""
+    """Return the profiles and vehicles whose files differ from the log by now."""
     changed = []
     for setup in setups:
         with suppress(Error):
@@ -283,7 +252,7 @@ def _changed(setups: Iterable[Setup]) -> list[str]:
 
 
 def _ended_us(flight: _Flight) -> int:
-    """Return when the flight ended, by its truth or the report beside the log."""
+    """Return the end of the flight, from its truth or the report beside the log."""
     ended_s = max((float(block[-1, 0]) for block in flight.log.blocks(TRUTH)), default=0.0)
     with suppress(OSError, ValueError, KeyError):
         ended_s = max(ended_s, json.loads((flight.path.parent / "report.json").read_text("utf-8"))["sim_time_s"])
@@ -291,7 +260,6 @@ def _ended_us(flight: _Flight) -> int:
 
 
 def _begun(setup: Setup) -> Autopilot[Any]:
-    """Return an autopilot that begins as it did then."""
     tables = setup.profile_tables or load_profile(setup.profile)
     profile = tables.with_choices(setup.controller, setup.solver, setup.delay_s)
     vehicle = setup.vehicle_tables or load_vehicle(setup.vehicle)
@@ -308,7 +276,6 @@ def _begun(setup: Setup) -> Autopilot[Any]:
 
 
 def _track(setup: Setup, vehicle: Vehicle, profile: Profile) -> Track | None:
-    """Return the track that was flown, through the points that its file had then."""
     if setup.track is None:
         return None
     if setup.track_file is None:

@@ -1,12 +1,11 @@
 """Snapshots of running objects: their state is copied, and written back into the same objects.
 
-A snapshot follows every reference from its roots: attributes, containers, arrays, closures, bound methods. Of each
-object that can change it keeps a shallow copy; of arrays the numbers, of random generators the state. What cannot
-change (numbers, texts, frozen records, classes, compiled code) is shared, not copied. Restoring writes into the same
-objects, so that every reference to one of them, as in a callback, stays right.
+A snapshot follows every reference from its roots: attributes, containers, arrays, closures, bound methods. It keeps a
+shallow copy of each mutable object, the numbers of arrays, and the state of random generators. Immutable objects are
+shared. Restoring writes into the same objects, so that references to them, as in a callback, stay valid.
 
-Not part of a snapshot: files, sockets, and what modules or classes remember. An object whose state cannot be read, such
-as a running generator, is refused.
+Files, sockets and the state of modules and classes are left out. SnapshotError if a state cannot be read, as of a
+running generator.
 """
 
 from collections import deque
@@ -26,28 +25,24 @@ from colibri.common.errors import Error
 
 
 class SnapshotError(Error):
-    """An object whose state cannot be kept."""
+    """An object's state cannot be kept."""
 
 
 Restore: TypeAlias = Callable[[], object]
 Kept: TypeAlias = tuple[Restore | None, Iterable[Any]]
-"""What restores an object, None where it cannot change; and what it refers to."""
+"""A function that restores an object, `None` if it cannot change; and its references."""
 Keep: TypeAlias = Callable[[Any], Kept]
 
 
 class Snapshot:
-    """The state of some objects, and of all that they refer to, at one instant.
+    """The state of some objects and of all their references at one instant.
 
     Attributes:
-        objects: How many objects were copied.
+        objects: Number of objects copied.
     """
 
     def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:
-        """Keep the state of `roots`; objects that are `shared` never change, and are not looked into.
-
-        Raises:
-            SnapshotError: An object's state cannot be kept.
-        """
+        """Keep the state of `roots`; `shared` objects are assumed constant and not followed."""
         restores: list[Restore] = []
         seen = {id(each): each for each in shared}
         todo: list[Any] = [*roots]
@@ -68,7 +63,6 @@ class Snapshot:
         self.objects = len(restores)
 
     def restore(self) -> None:
-        """Write the state back, as often as needed."""
         for restore in self._restores:
             restore()
 
@@ -217,16 +211,11 @@ _STATELESS_PACKAGES = (
     "_thread",
 )
 _HEAP_TYPE = 1 << 9
-"""Flag of a class that is written in Python."""
+"""Flag of a class written in Python."""
 _KINDS: dict[type, Keep] = {}
 
 
 def _kind(cls: type) -> Keep:
-    """Return how objects of a class are kept.
-
-    Raises:
-        SnapshotError: Their state cannot be read.
-    """
     if issubclass(cls, _SHARED) or cls is object:
         return _share
     if issubclass(cls, _FOLLOWED) or (cls.__module__ == "functools" and cls.__name__ == "partial"):

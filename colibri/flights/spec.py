@@ -1,4 +1,4 @@
-"""A flight, described once: all options of a plant, an autopilot and the link between them."""
+"""All options of a flight: plant, autopilot and the link between them."""
 
 from dataclasses import dataclass
 from math import inf
@@ -20,12 +20,12 @@ TRACK_HELP = (
 
 
 class OptionError(Error):
-    """An unknown option of a flight, or a value that it cannot have."""
+    """An option is unknown or has an invalid value."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehiclesSpec(WorldSpec, LawSpec):
-    """The law, its vehicle, and the vehicle and world that the plant flies in its place."""
+    """The law and its vehicle, and the vehicle and world of the plant."""
 
     plant_vehicle: Annotated[
         str | Vehicle | None,
@@ -35,7 +35,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
 
 @dataclass(frozen=True, kw_only=True)
 class FlightSpec(VehiclesSpec, GroundSpec):
-    """A flight: each attribute is an option of `colibri fly`, and a keyword of `colibri.fly`."""
+    """A flight: each attribute is an option of `colibri fly` and a keyword of `colibri.fly`."""
 
     track: Annotated[str, Option(TRACK_HELP, "TRACK")]
     integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
@@ -53,14 +53,14 @@ class FlightSpec(VehiclesSpec, GroundSpec):
 
     @classmethod
     def of(cls, track: str, **options: Any) -> "FlightSpec":
-        """Return the flight of a track with options by name: Python's values, or texts as the command line has them.
+        """Return the flight of a track with options by name, as Python values or as texts of the command line.
 
         Raises:
-            OptionError: An option is unknown, or cannot have its value.
+            OptionError: An option is unknown or has an invalid value.
         """
         return from_values(cls, {"track": track, **options}, OptionError)
 
     @property
     def pace(self) -> float:
-        """How many times real time to fly."""
+        """Times real time to fly."""
         return self.speed or (1.0 if self.gcs else inf)

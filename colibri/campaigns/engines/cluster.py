@@ -1,4 +1,4 @@
-"""The engine of a cluster: Dask distributed, whose workers come and go."""
+"""Run jobs on a Dask cluster whose workers may come and go."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from importlib.metadata import version
@@ -14,25 +14,21 @@ from colibri.campaigns.values import CampaignError
 _PACKAGE = "colibri-sitl"
 CONNECT_S = 10.0
 _AHEAD = 3
-"""So many batches a core are handed out, so that none waits for the scheduler."""
+"""Batches submitted per core, so that no worker waits for the scheduler."""
 _BATCH_S = 2.0
-"""A batch takes about so long: below a second, the scheduler's 200 µs or so a task would begin to count."""
+"""Target duration of a batch: the scheduler takes about 200 µs a task."""
 _MAX_BATCH = 500
 
 
 class Cluster:
-    """A cluster of Dask.
+    """A Dask cluster.
 
-    A job whose worker goes is done by another. One that several workers went with is done alone when the others are
-    done, and given up if it takes several more with it.
+    If a worker is lost, its jobs are repeated by others. A job lost with several workers is repeated alone at the end,
+    and given up if it is lost again.
     """
 
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
-        """Use a `distributed.Client`, or the scheduler at an address; `batch` jobs a task, None: by how long they take.
-
-        Raises:
-            CampaignError: Dask is not installed, the scheduler cannot be reached, or its workers have another colibri.
-        """
+        """Connect to a scheduler, or use a `distributed.Client`; without `batch`, the jobs per task adapt."""
         try:
             from distributed import Client
         except ImportError as error:
@@ -53,14 +49,12 @@ class Cluster:
             raise CampaignError(f"--dask: workers have colibri {', '.join(others)}, this is {version(_PACKAGE)}")
 
     def close(self) -> None:
-        """Leave the cluster, if it was not entered by somebody else."""
         if self._ours:
             self._client.close()
 
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:
-        """Return each job with its result, as they end; see `Engine`."""
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
 
@@ -99,10 +93,7 @@ class Cluster:
             self.close()
 
     def _batches(self, left: Iterator[Job], size: int, waiting: int) -> list[list[Job]]:
-        """Return as many batches as the cluster can do beside those that are `waiting`; none while it has enough.
-
-        Many at once cost the scheduler a tenth of what they cost one by one.
-        """
+        """Return batches for the free capacity. Submitting many at once takes the scheduler a tenth of the time."""
         if waiting > _AHEAD * self._cores / 2:
             return []
         self._cores = sum(self._client.nthreads().values()) or 1  # asks the scheduler: not for every result
@@ -117,11 +108,6 @@ class Cluster:
 
 
 def _do(jobs: list[Any], given: tuple[Callable[[Any, Any], Any], Any], wanted: str) -> tuple[float, list[Any]]:
-    """Do a batch of jobs; return how long it took, s, and the results.
-
-    Raises:
-        CampaignError: This worker, come later than the others, has another version.
-    """
     if version(_PACKAGE) != wanted:
         raise CampaignError(f"--dask: a worker has colibri {version(_PACKAGE)}, the campaign is of {wanted}")
     work, common = given

@@ -1,4 +1,4 @@
-"""What every engine does, and what a job is that kills whoever does it."""
+"""The interface of the engines that run jobs in parallel."""
 
 from collections.abc import Callable, Generator, Iterable
 from typing import Any, Protocol, TypeVar
@@ -8,19 +8,13 @@ Result = TypeVar("Result")
 
 
 class Killed:
-    """In place of a result: whoever did the job was killed, and killed again when it had nothing else to do."""
+    """Replaces the result of a job that killed its worker twice, the second time on its own."""
 
 
 class Engine(Protocol):
-    """Does many jobs at once."""
+    """Runs many jobs at once."""
 
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:
-        """Return each job with its result, as they end.
-
-        Args:
-            work: (common, job) -> result; a function at module level, or one that cloudpickle can send.
-            common: What all jobs need.
-            jobs: Taken as they are needed.
-        """
+        """Yield each job with its result, in order of completion; `work` and `common` are sent by cloudpickle."""

@@ -1,4 +1,4 @@
-"""The engine on this computer: a pool of processes of the standard library."""
+"""Run jobs in a pool of processes on this computer."""
 
 import os
 import signal
@@ -14,24 +14,22 @@ import cloudpickle
 from colibri.campaigns.engines.engine import Job, Killed, Result
 
 _AHEAD = 2
-"""So many jobs a worker are handed out, so that none waits for the next."""
+"""Jobs submitted per worker, so that no worker waits."""
 
 
 class Pool:
-    """A pool of processes, which end with this one however it ends.
+    """A pool of processes that end with this one.
 
-    Which job it was that killed its worker nobody can say: a pool breaks as a whole. So those that were handed out are
-    done again, one by one; one that kills its worker then, too, is given up.
+    If a worker is killed, the whole pool breaks. All submitted jobs are then repeated one by one; a job that kills its
+    worker again is given up.
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        """Have `workers` processes; None: one a core that this process may use."""
         self._workers = workers or len(os.sched_getaffinity(0))
 
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:
-        """Return each job with its result, as they end; see `Engine`."""
         packed = cloudpickle.dumps((work, common))
         left = iter(jobs)
         while broken := (yield from self._done(packed, left, self._workers)):
@@ -40,7 +38,7 @@ class Pool:
                     yield job, Killed()
 
     def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
-        """Yield jobs with their results until there are none, or the pool breaks; return those it broke with."""
+        """Yield jobs with their results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
         pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (packed,))
         waiting: dict[Future[Any], Job] = {}
@@ -77,11 +75,10 @@ class Pool:
 
 
 _given: tuple[Callable[[Any, Any], Any], Any]
-"""In a worker: what to do, and what all jobs have in common."""
+"""In a worker: the function and its common argument."""
 
 
 def _begin(packed: bytes) -> None:
-    """Prepare a worker: it is for its parent to be interrupted, and it does not outlive it."""
     global _given
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()

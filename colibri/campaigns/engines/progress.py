@@ -1,4 +1,4 @@
-"""Jobs on every core of this computer, with a bar that shows how many are done."""
+"""Run jobs on all cores of this computer with a progress bar."""
 
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
@@ -19,17 +19,9 @@ def in_order(
     quiet: bool,
     keep: Callable[[Result], object] = lambda _result: None,
 ) -> list[Result]:
-    """Do every job in a pool of processes; return the results in the order of the jobs.
+    """Run jobs in a pool of processes; return the results in the order of the jobs.
 
-    Args:
-        work: Does one job; cloudpickle can send it.
-        jobs: Its arguments.
-        title: Of the progress bar.
-        quiet: Show no bar.
-        keep: Is given each result as soon as it is there.
-
-    Raises:
-        CampaignError: A job killed the process that did it, and again when that did nothing else.
+    `keep` is called with each result as soon as it is available.
     """
     found: dict[int, Result] = {}
     with closing(Pool().each(_numbered, work, enumerate(jobs))) as done:
@@ -42,7 +34,6 @@ def in_order(
 
 
 def with_bar(done: Iterable[Done], title: str, total: int, *, quiet: bool) -> Generator[Done, None, None]:
-    """Return what is done, as it comes, and show on standard error how much of the total that is."""
     from rich.console import Console
     from rich.progress import Progress
 
