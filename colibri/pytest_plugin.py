@@ -1,6 +1,7 @@
-"""The pytest plugin: fixture `sitl`, its marks and options, what a failed flight leaves, and the sum of a run.
+"""The pytest plugin: fixture `sitl`, its marks and options, the files of a failed flight, and the summary of a run.
 
-It is loaded by every run of pytest where this package is installed. What flies is loaded by the first test that does.
+Every run of pytest loads it where this package is installed; modules that fly are loaded by the first test that needs
+them.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ MARKS = {
     "seeds": "seeds(first, last): one flight for each seed",
 }
 _MAX_NAME = 120
-"""Characters of a folder's name; of a longer one the end, and a hash that tells it from others with that end."""
+"""Characters of a folder's name; a longer one is shortened, with a hash."""
 _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
@@ -42,7 +43,6 @@ _UNWRITTEN = pytest.StashKey[str]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options."""
     group = parser.getgroup("sitl", "flights in software in the loop")
     add = group.addoption
     add(
@@ -72,14 +72,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the marks known."""
     for line in MARKS.values():
         config.addinivalue_line("markers", line)
     config.stash[_SUMMARY] = Summary(perf_counter())
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make one test for each seed of mark `seeds`."""
     mark = metafunc.definition.get_closest_marker("seeds")
     if mark is None or "sitl_seed" not in metafunc.fixturenames:
         return
@@ -93,7 +91,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def sitl_seed(request: pytest.FixtureRequest) -> int | None:
-    """Return the seed of the flight of mark `seeds` or `seed`, if there is one."""
+    """Return the seed of mark `seeds` or `seed`."""
     mark = request.node.get_closest_marker("seed")
     seed: int | None = getattr(request, "param", None if mark is None else _values(mark)["number"])
     return seed
@@ -101,7 +99,7 @@ def sitl_seed(request: pytest.FixtureRequest) -> int | None:
 
 @pytest.fixture
 def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., Fleet]]:
-    """Return what begins fleets: each vehicle with the marks of the test and a system id of its own."""
+    """Return a function that begins fleets: each vehicle with the marks of the test and its own system id."""
     from colibri.sitl.fleet import begin_fleet
 
     with ExitStack() as stack:
@@ -116,7 +114,7 @@ def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterato
 
 @pytest.fixture
 def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl]:
-    """Return a vehicle that waits for orders, as the marks of the test describe it."""
+    """Return a vehicle that waits for commands, as the marks of the test describe it."""
     with ExitStack() as stack:
         flights = _flights(request, sitl_seed, stack)
         with _in_one_line():
@@ -149,7 +147,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tuple[list[Path], str]:
-    """Keep the flights of a test that has failed; return where each is, and what to say of it."""
+    """Keep the flights of a failed test; return their folders, and a text for the report."""
     link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
     again = f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
     folder, crash = _folder(item), getattr(report.longrepr, "reprcrash", None)
@@ -164,12 +162,10 @@ def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tup
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Collect what each test has flown, over all workers."""
     session.config.pluginmanager.register(_Collector(session.config.stash[_SUMMARY]), "sitl-collector")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the hashes, if an option names a file for them."""
     config = session.config
     path = config.getoption("--sitl-hashes")
     if not path or hasattr(config, "workerinput"):
@@ -183,13 +179,11 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """End what starts processes."""
     if _LAUNCHER in config.stash:
         config.stash[_LAUNCHER].close()
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Say how much was flown, how fast, and with which verdict."""
     summary = config.stash[_SUMMARY]
     if summary.flights:
         terminalreporter.write_line(summary.line(perf_counter()))
@@ -198,18 +192,17 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 class _Collector:
-    """Hears every report of the run, those of other workers too."""
+    """Adds up the reports of all workers."""
 
     def __init__(self, summary: Summary) -> None:
         self._summary = summary
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take in a report."""
         self._summary.add(report.nodeid, report.outcome, getattr(report, FLOWN, None))
 
 
 def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack) -> Flights:
-    """Return what the test flies with, ended with `stack`."""
+    """Return the flights of the test, which end with `stack`."""
     from colibri.sitl.backends.setting import setting_of
     from colibri.sitl.session import Flights
 
@@ -227,7 +220,7 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """Have a flight that cannot begin fail its test in one line."""
+    """Fail a test in one line if its flight cannot begin."""
     try:
         yield
     except SitlError as error:
@@ -235,9 +228,9 @@ def _in_one_line() -> Iterator[None]:
 
 
 def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
-    """Return what starts the processes of this run, or of this worker; None where flights need none.
+    """Return the launcher of this run or worker, if flights use processes.
 
-    As long as `stack`, this process and those keep to one core where there is a worker for each.
+    While `stack` is open, a worker's processes share one core if there is a worker for each core.
     """
     if config.getoption("--sitl-link") == "memory":
         return None
@@ -252,7 +245,7 @@ def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
 
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
-    """Return the keywords of the marks of a test, the closest last."""
+    """Return the keywords of a test's marks, the closest last."""
     said: list[Mapping[str, Any]] = [_values(mark) for mark in reversed(list(node.iter_markers("sitl")))]
     for name, key in (("vehicle", "name"), ("feedback", "kind")):
         mark = node.get_closest_marker(name)
@@ -267,10 +260,7 @@ def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
 
 
 def _values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
-    """Return the values of a mark by their names, or fail in one line where it has not what `MARKS` says.
-
-    `of` begins the line, where pytest does not say which test it is.
-    """
+    """Return the values of a mark by name; fail in one line, which begins with `of`, if it does not match `MARKS`."""
     names = [name.strip() for name in MARKS[mark.name].partition("(")[2].partition(")")[0].split(",")]
     if mark.name == "sitl":
         needed, names = set(), []
@@ -285,12 +275,10 @@ def _values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
 
 
 def _written(mark: pytest.Mark) -> str:
-    """Return a mark as it is written."""
     return f"{mark.name}({', '.join([*map(repr, mark.args), *(f'{k}={v!r}' for k, v in mark.kwargs.items())])})"
 
 
 def _folder(item: pytest.Item) -> Path:
-    """Return where the flights of a test are kept."""
     name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"))
     if len(name) > _MAX_NAME:
         name = f"{name[9 - _MAX_NAME :]}-{sha256(item.nodeid.encode()).hexdigest()[:8]}"
@@ -299,13 +287,13 @@ def _folder(item: pytest.Item) -> Path:
 
 
 def _as_given(config: pytest.Config, place: Path) -> Path:
-    """Return a place below the folder of option `--sitl-keep` as that has it."""
+    """Return a folder relative to the working directory if option `--sitl-keep` is."""
     keep = Path(config.getoption("--sitl-keep"))
     return keep / place.relative_to(config.invocation_params.dir / keep)
 
 
 def _forget(folder: Path) -> None:
-    """Remove the flights that an earlier run of a test has left, and folders that are empty then."""
+    """Remove the flights that an earlier run of a test left."""
     from colibri.sitl.flight_record import KEPT
 
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""`colibri export`: its options, and its call."""
+"""`colibri export`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -8,7 +8,6 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri export`."""
     add = parser.add_argument
     add("log", type=Path, metavar="DIR|FILE.ulg", help="a flight by its folder, or any ULog, PX4's too")
     add("--mcap", action="store_true", help="write flight.mcap beside it, for Foxglove")
@@ -18,7 +17,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Write the topics of a ULog in other formats; return the exit code."""
     from colibri.analysis.export import log_file, read_log, write_csv, write_flight_tables, write_mcap, write_parquet
     from colibri.common.errors import Error
 

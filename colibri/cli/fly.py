@@ -1,4 +1,4 @@
-"""`colibri fly`: its options, and its call."""
+"""`colibri fly`."""
 
 from argparse import Namespace
 
@@ -11,7 +11,6 @@ from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri fly`."""
     start = "the profile's, and the track's first yaw"
     add_spec(parser, FlightSpec, defaults={"link": "udp"}, shown={"start": start})
     add = parser.add_argument
@@ -30,7 +29,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Fly as the command line says; return the exit code."""
     with loading():
         from colibri.cli.shared.fly_and_report import fly
 

@@ -1,4 +1,4 @@
-"""`colibri`: the one command. Loads only what the subcommand needs."""
+"""`colibri`: the command. Loads only modules of the subcommand."""
 
 import os
 import signal
@@ -26,7 +26,6 @@ _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a subcommand; return the exit code."""
     given = sys.argv[1:] if argv is None else argv
     escape_what_no_stream_encodes()
     _check_encoding(given)
@@ -61,7 +60,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _drop_what_cannot_be_printed() -> None:
-    """Print the rest into the void where standard output takes no more: Python would report it again at its end."""
+    """Discard output that standard output no longer takes; Python would report it again at exit."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -69,7 +68,7 @@ def _drop_what_cannot_be_printed() -> None:
 
 
 def _check_encoding(given: Sequence[str]) -> None:
-    """End with one line where a word cannot be written to a log, which is UTF-8."""
+    """Reject words that UTF-8, and so the log, cannot encode."""
     for word in given:
         try:
             word.encode()

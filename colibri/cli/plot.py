@@ -1,4 +1,4 @@
-"""`colibri plot`: its options, and its call."""
+"""`colibri plot`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -8,14 +8,12 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri plot`."""
     add = parser.add_argument
     add("folder", type=Path, metavar="DIR", help="as `colibri fly` leaves it, however the flight ended")
     add("--quiet", action="store_true", help="say nothing but errors")
 
 
 def run(args: Namespace) -> int:
-    """Draw the figures of a flight from what is in its folder; return the exit code."""
     from colibri.analysis.figures import draw_flight
     from colibri.analysis.recording import FlightReader
     from colibri.analysis.series.figure_series import FigureSeries

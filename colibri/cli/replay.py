@@ -1,4 +1,4 @@
-"""`colibri replay`: its options, and its call."""
+"""`colibri replay`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -7,7 +7,6 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri replay`."""
     add = parser.add_argument
     add(
         "log",
@@ -19,7 +18,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Replay as the command line says; return the exit code."""
     from colibri.flights.replay import replay
 
     return replay(args)

@@ -1,4 +1,4 @@
-"""`colibri sitl`: its options, and its call."""
+"""`colibri sitl`."""
 
 from argparse import Namespace
 
@@ -11,7 +11,6 @@ from colibri.flights.fleet_spec import FleetSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri sitl`."""
     shown = {"gcs": "udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N", "start": "standing at home"}
     add_spec(parser, FleetSpec, leave_out=("floor",), shown=shown)
     add = parser.add_argument
@@ -20,7 +19,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Serve ground stations as the command line says; return the exit code."""
     from colibri.flights.fleet import sitl
 
     if args.view and args.count > 1:

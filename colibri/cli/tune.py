@@ -1,4 +1,4 @@
-"""`colibri tune`: its options, its call, how far it is, and what came of it."""
+"""`colibri tune`."""
 
 from argparse import SUPPRESS, Namespace
 from collections.abc import Iterator
@@ -19,7 +19,6 @@ _TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri tune`."""
     add = parser.add_argument
     add("file", type=Path, metavar="FILE.toml", help="the tuning; options take precedence over it")
     add("--trials", type=int, default=SUPPRESS, metavar="N", help="how many, the profile as it is among them")
@@ -45,7 +44,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Tune as the command line says; return the exit code."""
     with loading():
         from colibri.tuning.run import tune
 
@@ -72,7 +70,7 @@ def run(args: Namespace) -> int:
 
 @contextmanager
 def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
-    """Show on standard error how many trials have ended, how good the best is, and the flights."""
+    """Show the number of trials, the best objective and the flights on standard error."""
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

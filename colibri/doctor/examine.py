@@ -1,4 +1,4 @@
-"""`colibri doctor`: every check in its order, and the table of what they found."""
+"""`colibri doctor`: run the checks and print their findings."""
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator
@@ -16,12 +16,11 @@ from colibri.mavlink.links.open import open_ground_link
 Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]
 
 CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)
-"""What is looked at, in this order."""
+"""In order."""
 _COLORS = {Verdict.FINE: "green", Verdict.NOTE: "yellow", Verdict.FAILED: "bold red"}
 
 
 def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
-    """Yield what each check finds."""
     for check in checks:
         found = check()
         if isinstance(found, Finding):
@@ -31,11 +30,7 @@ def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
 
 
 def examine_as_told(args: argparse.Namespace) -> int:
-    """Examine as the command line says, each finding shown as it comes; return the exit code.
-
-    Raises:
-        LinkError: The link to a ground station cannot be opened.
-    """
+    """Run the checks and print each finding as it comes; return the exit code."""
     link = None if args.gcs is None else open_ground_link(args.gcs)
     asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
     failed = 0
@@ -48,7 +43,6 @@ def examine_as_told(args: argparse.Namespace) -> int:
 
 
 def show(finding: Finding) -> None:
-    """Print a finding, and what to do below it."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -1,28 +1,21 @@
-"""What a check of this computer found."""
+"""The finding of a check."""
 
 from enum import StrEnum
 from typing import NamedTuple
 
 
 class Verdict(StrEnum):
-    """What a finding means for a flight."""
+    """The meaning of a finding for a flight."""
 
     FINE = "fine"
     NOTE = "note"
-    """A flight works; what is said may be worth knowing."""
+    """Flights work, with a remark."""
     FAILED = "failed"
-    """No flight could work, or none that a ground station sees."""
+    """Flights cannot work, or not with a ground station."""
 
 
 class Finding(NamedTuple):
-    """What a check found.
-
-    Attributes:
-        checked: What was looked at.
-        verdict: What it means.
-        found: What is there.
-        advice: What to do about it; empty where there is nothing to do.
-    """
+    """The finding of a check, with advice unless all is well."""
 
     checked: str
     verdict: Verdict

@@ -1,4 +1,4 @@
-"""A flight as a user would fly it: whether it works, how fast, and whether its machine code is kept."""
+"""Fly as a user would, and locate the cache of machine code."""
 
 import os
 import platform
@@ -12,7 +12,6 @@ _CPU_INFO = Path("/proc/cpuinfo")
 
 
 def machine_code() -> Finding:
-    """Return where compiled kernels are kept."""
     from colibri.common.machine_code.on_disk import MachineCode
     from colibri.common.rotations import rotation_matrix
 
@@ -27,7 +26,7 @@ def machine_code() -> Finding:
 
 
 def flight() -> Finding:
-    """Return how fast two processes fly over loopback; the first flight there is compiles, which is not counted."""
+    """Measure the speed of two processes over loopback, without compilation."""
     from colibri.experiments.flight import fly
 
     try:
@@ -39,7 +38,6 @@ def flight() -> Finding:
 
 
 def processor() -> str:
-    """Return what the processor is called."""
     if _CPU_INFO.exists():
         for line in _CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines():
             name, _, value = line.partition(":")

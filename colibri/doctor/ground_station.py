@@ -1,4 +1,4 @@
-"""A ground station waited for: called as a vehicle calls it, until its heartbeat comes."""
+"""Call a ground station as a vehicle does, and wait for its heartbeat."""
 
 from collections.abc import Sequence
 from time import perf_counter
@@ -13,7 +13,6 @@ _EVERY_S = 1.0
 
 
 def ground_station(link: GroundLink, within_s: float) -> Finding:
-    """Return whether a ground station's heartbeat comes over a link."""
     answers = called(link, within_s)
     if answers is not None:
         return Finding("ground station", Verdict.FINE, answers)
@@ -22,7 +21,7 @@ def ground_station(link: GroundLink, within_s: float) -> Finding:
 
 
 def called(link: GroundLink, within_s: float) -> str | None:
-    """Send a vehicle's heartbeats; return in words who answers with a ground station's, None if nobody does."""
+    """Send a vehicle's heartbeats; describe the first ground station that answers."""
     codec = Codec(1, mav.MAV_COMP_ID_AUTOPILOT1)
     beat = (mav.MAV_TYPE_QUADROTOR, mav.MAV_AUTOPILOT_GENERIC, 0, 0, mav.MAV_STATE_STANDBY, 3)
     stations: set[Address] = set()
@@ -44,7 +43,7 @@ def called(link: GroundLink, within_s: float) -> str | None:
 
 
 def _station(codec: Codec, datagram: bytes) -> int | None:
-    """Return the system id of a ground station whose heartbeat is in a datagram."""
+    """Return the system id of a ground station whose HEARTBEAT is in a datagram."""
     kinds: Sequence[int] = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER)
     beats = (it for it in codec.decode(datagram) if it.name == "HEARTBEAT" and it.fields.type in kinds)
     return next((it.source[0] for it in beats), None)

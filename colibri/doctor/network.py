@@ -1,4 +1,4 @@
-"""The network as flights need it: loopback, free ports, and where a ground station outside of here is."""
+"""Check the network: loopback, free ports, and the host outside a container or WSL."""
 
 import os
 import socket
@@ -17,7 +17,6 @@ _CONTAINERS = (Path("/.dockerenv"), Path("/run/.containerenv"))
 
 
 def loopback() -> Finding:
-    """Return whether a datagram arrives where it is sent on loopback."""
     with _udp() as here, _udp() as there:
         try:
             there.bind((HOST, 0))
@@ -31,7 +30,6 @@ def loopback() -> Finding:
 
 
 def ports() -> Iterator[Finding]:
-    """Yield who has each port that a vehicle uses."""
     for port, whose, ours in (
         (GROUND_PORT, "ground station", False),
         (SDK_PORT, "SDK", False),
@@ -49,7 +47,7 @@ def ports() -> Iterator[Finding]:
 
 
 def beyond() -> Finding | None:
-    """Return where a ground station outside of this container or WSL is; None where this is neither."""
+    """Return the host's address as seen from a container or WSL, if this is one."""
     what = "WSL" if _in_wsl() else "container" if any(path.exists() for path in _CONTAINERS) else None
     if what is None:
         return None
@@ -61,7 +59,7 @@ def beyond() -> Finding | None:
 
 
 def gateway(routes: str) -> str | None:
-    """Return the address of the default gateway in the text of `/proc/net/route`; None where there is none."""
+    """Read the address of the default gateway from the text of `/proc/net/route`."""
     for line in routes.splitlines()[1:]:
         _, destination, through, *_ = line.split()
         if int(destination, 16) == 0 and int(through, 16):
@@ -78,7 +76,7 @@ def _in_wsl() -> bool:
 
 
 def _who_has(port: int) -> str | None:
-    """Return in words which program receives on a UDP port of loopback; None if any may."""
+    """Return the program that has a UDP port of loopback, if it is taken."""
     with _udp() as tried:
         try:
             tried.bind((HOST, port))

@@ -1,4 +1,4 @@
-"""Python and the packages: whether they are what Colibri asks for, and what the lock names."""
+"""Check Python and the installed packages against requirements and lock."""
 
 import platform
 import re
@@ -14,19 +14,17 @@ from colibri.doctor.finding import Finding, Verdict
 
 PACKAGE = "colibri-sitl"
 FOR_DEVELOPERS = ("bench", "clients", "dev")
-"""Extras that nobody needs to fly."""
+"""Extras that flights do not require."""
 _LOCK = "requirements.lock"
 _PINNED = re.compile(r"^[\w.-]+==[^\\\n]+", re.MULTILINE)
 _SHOWN = 3
 
 
 def python() -> Finding:
-    """Return which Python this is."""
     return Finding("Python", Verdict.FINE, f"{platform.python_version()}, {sys.executable}")
 
 
 def packages() -> Finding:
-    """Return whether every package is there, in a version that Colibri can use."""
     wrong = [words for asked in _asked() if (words := _wrong(asked))]
     if wrong:
         return Finding("packages", Verdict.FAILED, ", ".join(wrong), f"pip install --upgrade {PACKAGE}")
@@ -34,7 +32,7 @@ def packages() -> Finding:
 
 
 def lock() -> Finding | None:
-    """Return whether the packages are those of the lock; None where there is none, as beside what pip installed."""
+    """Compare versions with the lock, which exists only in a checkout."""
     path = Path(colibri.__file__).resolve().parents[1] / _LOCK
     if not path.is_file():
         return None
@@ -47,7 +45,6 @@ def lock() -> Finding | None:
 
 
 def extras() -> Iterator[Finding]:
-    """Yield each optional part, and whether it is installed."""
     for extra in distribution(PACKAGE).metadata.get_all("Provides-Extra") or []:
         if extra in FOR_DEVELOPERS:
             continue
@@ -63,19 +60,19 @@ def _how(extra: str) -> str:
 
 
 def _asked(extra: str = "") -> list[Requirement]:
-    """Return what is asked for on this computer; of an extra, what it alone asks for."""
+    """Return the requirements on this computer; with an extra, its additional ones."""
     every = [Requirement(line) for line in distribution(PACKAGE).requires or []]
     always = _here(every)
     return [asked for asked in _here(every, extra) if asked not in always] if extra else always
 
 
 def _here(every: Iterable[Requirement], extra: str = "") -> list[Requirement]:
-    """Return the requirements that count on this computer."""
+    """Return the requirements that apply on this computer."""
     return [asked for asked in every if asked.marker is None or asked.marker.evaluate({"extra": extra})]
 
 
 def _wrong(asked: Requirement) -> str:
-    """Return in words how a package is not what is asked for; empty if it is."""
+    """Describe how a package differs from its requirement; empty if it satisfies it."""
     has = version_of(asked.name)
     if has is None:
         return f"{asked.name} is missing"
@@ -83,7 +80,6 @@ def _wrong(asked: Requirement) -> str:
 
 
 def version_of(name: str) -> str | None:
-    """Return the version of a package that is installed; None if it is not."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Flights from a script or a notebook: options as keywords, a flight as an object."""
+"""Flights from a script or notebook."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""`colibri.fly`: one flight from Python, and what came of it as an object."""
+"""`colibri.fly`: fly from Python; the flight is an object."""
 
 from functools import cached_property
 from pathlib import Path
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 class Flight:
-    """A flight that was flown, in memory; `save` writes its log and tables.
+    """A finished flight in memory.
 
     Attributes:
-        plan: What was flown.
+        plan: The plan flown.
         report: The numbers of `report.json`.
         log: Its topics.
     """
@@ -38,36 +38,36 @@ class Flight:
 
     @property
     def sha256(self) -> str:
-        """Of the plant's states at every frame: the same for the same flight, on every computer."""
+        """Hash of the plant's states at all frames, reproducible on every computer."""
         return str(self.report["trajectory_sha256"])
 
     @property
     def lost(self) -> str | None:
-        """Why the vehicle was lost; None if it was not."""
+        """Why the vehicle was lost, or `None`."""
         lost: str | None = self.report["lost"]
         return lost
 
     @cached_property
     def samples(self) -> Table:
-        """`flight.csv`, a row a control sample: state, inputs, references; m, s, rad, N."""
+        """`flight.csv`, one row per control sample: state, inputs, references; m, s, rad, N."""
         return table_of(COLUMNS, (part.table for part in FlightReader(self.plan, self.log)))
 
     @cached_property
     def frames(self) -> Table:
-        """A row a frame: the true state, rotors, battery and wind."""
+        """One row per frame: true state, rotors, battery and wind."""
         return table_of(TRUTH.names, self.log.blocks(TRUTH))
 
     @cached_property
     def estimate(self) -> Table | None:
-        """A row a control sample: the autopilot's estimate from its sensors; None without them."""
+        """One row per control sample: the state estimate; `None` with feedback of the true state."""
         table = table_of(ESTIMATE.names, self.log.blocks(ESTIMATE))
         return table if self.plan.spec.feedback is Feedback.SENSORS else None
 
     def plot(self, what: str = "error") -> "Figure":
-        """Return a figure of the flight: `error`, `position`, `attitude`, `inputs`, `rotors` or `trajectory`.
+        """Return a figure: `error`, `position`, `attitude`, `inputs`, `rotors` or `trajectory`.
 
         Raises:
-            OptionError: There is no such figure.
+            OptionError: The name is unknown.
         """
         from colibri.analysis.figures import figures_of
 
@@ -82,10 +82,10 @@ class Flight:
         raise OptionError(unknown("figure", what, known))
 
     def save(self, folder: str | Path) -> Path:
-        """Write log, table, report and provenance of the flight into a folder that is new or empty; return it.
+        """Write log, table, report and provenance into a new or empty folder; return it.
 
         Raises:
-            OptionError: It holds something, or cannot be written.
+            OptionError: The folder is not empty, or cannot be written.
         """
         path = Path(folder)
         try:
@@ -99,23 +99,22 @@ class Flight:
         return path
 
     def _repr_html_(self) -> str:
-        """Return the report as a table, and the error over time, as a notebook shows them."""
         title = f"{self.plan.spec.track}, {self.plan.flown_by}"
         return table_html(title, report_rows(self.report).items()) + figure_html(self.plot())
 
 
 def fly(track: str, **options: Any) -> Flight:
-    """Fly a track, in this process and writing nothing that stays; return what came of it.
+    """Fly a track in this process, without permanent files.
 
     Args:
-        track: As `colibri fly` has it, with its options: `lemniscate:lap=5`.
-        options: Those of `colibri fly`, by their names with underscores and as Python's values or as its texts:
-            `seed=3, wind="5@270", start={"x": 1.0}, link="udp"`. In place of a name, `profile` takes a `Profile`,
-            `vehicle` and `plant_vehicle` take a `Vehicle`, and `controller` a class, or what else makes a control law
-            of the profile's table, the vehicle and a clock; its table is `controllers.NAME`, NAME being the class's.
+        track: As in `colibri fly`, with its options: `lemniscate:lap=5`.
+        options: Those of `colibri fly`, with underscores, as Python values or texts: `seed=3, wind="5@270", start={"x":
+            1.0}, link="udp"`. `profile` also takes a `Profile`, `vehicle` and `plant_vehicle` a `Vehicle`, and
+            `controller` a class or another factory of (table of the profile, vehicle, clock); its table is
+            `controllers.NAME`, with the name of the class.
 
     Raises:
-        Error: What the command line would say in one line.
+        Error: An input is invalid, or the flight failed.
     """
     spec = from_values(FlightSpec, {"track": track, **options}, OptionError, keywords_of(FlightSpec))
     plan = FlightPlan.of(spec)

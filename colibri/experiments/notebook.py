@@ -1,4 +1,4 @@
-"""What a notebook shows of flights, campaigns and checks: tables and figures as HTML."""
+"""HTML of tables and figures, for notebooks."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
@@ -11,13 +11,12 @@ if TYPE_CHECKING:
 
 
 def table_html(title: str, rows: Iterable[Sequence[str]]) -> str:
-    """Return a title and, below it, a table."""
     cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
     return f"<b>{escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def figure_html(figure: "Figure") -> str:
-    """Return a figure as a picture that the page itself contains."""
+    """Return a figure as an embedded PNG."""
     png = BytesIO()
     figure.savefig(png, format="png", dpi=80)
     return f'<img src="data:image/png;base64,{b64encode(png.getvalue()).decode()}">'

@@ -1,4 +1,4 @@
-"""Tables of a flight as NumPy has them: one structured array, a field a column."""
+"""Tables of a flight as structured arrays, one field per column."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -10,23 +10,19 @@ from colibri.common.types import Array
 
 
 class PandasError(Error):
-    """There is no pandas."""
+    """pandas is not installed."""
 
 
 class Table(np.ndarray[Any, np.dtype[np.void]]):
-    """A structured array, (n,), of float64 by the names of its columns: `table["x"]`."""
+    """A structured array, (n,), of float64 by column name: `table["x"]`."""
 
     def __getitem__(self, key: Any) -> Any:
-        """Return a column as an array of its own, and rows as a table."""
+        """Return a column as a plain array, rows as a table."""
         found = super().__getitem__(key)
         return found.view(np.ndarray) if isinstance(found, Table) and found.dtype.names is None else found
 
     def to_pandas(self) -> Any:
-        """Return the same as a pandas.DataFrame.
-
-        Raises:
-            PandasError: It is not installed.
-        """
+        """Return a pandas.DataFrame; PandasError if pandas is not installed."""
         try:
             from pandas import DataFrame
         except ImportError as error:
@@ -35,6 +31,5 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
 
 
 def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> Table:
-    """Return blocks of rows as one table."""
     rows = np.concatenate([np.empty((0, len(columns))), *blocks])
     return rows.view([(name, np.float64) for name in columns])[:, 0].view(Table)

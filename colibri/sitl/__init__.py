@@ -1,4 +1,4 @@
-"""Flight tests in pytest: a vehicle, its plant, its ground stations and the links between, all in simulated time."""
+"""Flight tests in pytest: a vehicle, its plant, its ground stations and the links between, in simulated time."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Several vehicles at once, each with a plant, an autopilot and ground stations of its own, in one simulated time."""
+"""Several vehicles in one simulated time, each with its own plant, autopilot and ground stations."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -10,16 +10,15 @@ from colibri.sitl.vehicle import Sitl
 
 
 class Fleet(tuple[Sitl, ...], Stepped):
-    """Vehicles that share one simulated time: none is ever more than a frame ahead.
+    """Vehicles that share one simulated time: each is at most one frame ahead.
 
-    Whichever of them is flown, by `run`, `step` or an order that waits, all fly as long; so they do by the fleet's own
-    `run`, `wait_until` and `hold`.
+    Flying one of them, or the fleet, by `run`, `step`, or a command that waits, flies all.
     """
 
     __slots__ = ()
 
     def __new__(cls, vehicles: Iterable[Sitl] = ()) -> "Fleet":
-        """Bind the time of `vehicles` together; those that are behind fly until they have caught up."""
+        """Bind the time of vehicles together; those behind fly until they catch up."""
         fleet = super().__new__(cls, vehicles)
         for sitl in fleet:
             sitl.fleet = fleet
@@ -29,7 +28,7 @@ class Fleet(tuple[Sitl, ...], Stepped):
 
     @property
     def time_us(self) -> int:
-        """Simulated time of the vehicle that is behind, µs; others differ only where frames are of unequal length."""
+        """Simulated time of the last vehicle, µs; others differ only if frames have unequal lengths."""
         return min(sitl.time_us for sitl in self)
 
     def step(self) -> None:
@@ -37,7 +36,6 @@ class Fleet(tuple[Sitl, ...], Stepped):
         min(self, key=lambda sitl: sitl.time_us).step()
 
     def __str__(self) -> str:
-        """Return the state of each vehicle, for the message of a failed test."""
         return "; ".join(f"vehicle {sitl.system}: {sitl}" for sitl in self)
 
 
@@ -52,14 +50,9 @@ def begin_fleet(
     """Begin the flights of a fleet.
 
     Args:
-        flights: Of the test.
-        count: How many vehicles.
-        spacing: How far each stands east of the one before, m.
-        places: In its stead: where each stands, east and north of where a vehicle stands by itself, m.
-        changes: Of the test's setting, for all of them.
-
-    Raises:
-        SettingError: They cannot begin so.
+        spacing: Distance from each vehicle to the next one to the east, m.
+        places: East and north of each vehicle from the default start, m; replaces `spacing`.
+        changes: Applied to the test's setting, for all vehicles.
     """
     if count < 1:
         raise SettingError(f"a fleet has at least one vehicle, not {count}")

@@ -1,4 +1,4 @@
-"""Figure of a flight that failed: where it was, from the side and from above, its tilt and mode, and what it said."""
+"""The figure of a failed flight: position, tilt, mode and status texts."""
 
 from collections.abc import Sequence
 from math import inf
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MAX_TEXTS = 18
-"""So many lines fit under the view from above; of more, the last."""
+"""Lines that fit below the view from above; the last ones are shown."""
 _ROOM_FOR_LEGEND = 0.15
 _END_COLOUR = "tab:red"
 
@@ -22,16 +22,7 @@ _END_COLOUR = "tab:red"
 def draw(
     flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, failed_s: float, title: str, reason: str
 ) -> None:
-    """Draw a flight that failed at its end into file `path`.
-
-    Args:
-        flown: Its record.
-        texts: What the vehicle said, each with its time, s.
-        path: Of the PNG.
-        failed_s: When it ended, s.
-        title: What was flown.
-        reason: Why it failed.
-    """
+    """Draw a flight that failed at `failed_s` into a PNG; `texts` have times in s."""
     use_writable_folders()
     from matplotlib.figure import Figure
 
@@ -104,7 +95,7 @@ def _draw_plan(axes: "Axes", flown: Columns) -> None:
 
 
 def _write_texts(axes: "Axes", timeline: "Axes", numbered: Sequence[tuple[int, tuple[float, str]]]) -> None:
-    """Write what was said, by number, and the numbers over the timeline."""
+    """Write numbered texts, and the numbers over the timeline."""
     axes.axis("off")
     lines = [f"{number:>3}  {time_s:8.3f} s  {_line(text, 54)}" for number, (time_s, text) in numbered]
     axes.text(0.0, 1.0, "\n".join(lines or ["it said nothing"]), va="top", family="monospace", fontsize=8.5)
@@ -117,6 +108,6 @@ def _write_texts(axes: "Axes", timeline: "Axes", numbered: Sequence[tuple[int, t
 
 
 def _line(text: str, width: int) -> str:
-    """Return a text as one line of a width, without formulas."""
+    """Shorten a text to one line; a $ would start a formula."""
     line = " ".join(text.split())
     return (line if len(line) <= width else f"{line[: width - 1]}…").replace("$", r"\$")

@@ -1,4 +1,4 @@
-"""Record of a flight: every frame with its command, every message; in memory, and in files only on request."""
+"""The record of a flight: each frame with its command, and each message; written to files on request."""
 
 import csv
 from hashlib import sha256
@@ -17,11 +17,11 @@ COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
     *("control1", "control2", "control3", "control4", "armed", "custom_mode"),
 )
-"""Truth in SI, ENU and FLU; controls are parts of the largest rotor speed; the mode is HEARTBEAT's number."""
+"""Truth in SI, ENU and FLU; controls as fractions of the largest rotor speed; HEARTBEAT's custom mode."""
 PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT = (
     *("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json"),
 )
-"""The files that are kept of a flight."""
+"""Files of a flight."""
 
 _ROW = Struct(f"<{len(COLUMNS)}d")
 _FLOWN = Struct("<Q13d4d?")
@@ -33,11 +33,10 @@ class Record:
     """The frames and messages of a flight.
 
     Attributes:
-        frames: How many were flown.
+        frames: Number of frames flown.
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self.frames = 0
         self._rows = bytearray()
         self._plant: list[tuple[int, bytes]] = []
@@ -45,7 +44,7 @@ class Record:
         self._hash = sha256()
 
     def add(self, instant: Instant) -> None:
-        """Take in a frame."""
+        """Record a frame."""
         began, command, custom_mode = instant.began, instant.command, instant.to_stations.custom_mode
         place, moves = began.position_enu_m, began.velocity_enu_m_s
         state = (*place, *moves, *began.attitude, *began.rate_flu_rad_s)
@@ -55,16 +54,16 @@ class Record:
         self.frames += 1
 
     def note(self, time_us: int, datagram: bytes) -> None:
-        """Take in what passed on a link to a ground station."""
+        """Record a datagram on a link to a ground station."""
         self._ground.append((time_us, datagram))
 
     @property
     def sha256(self) -> str:
-        """Of each frame's truth and the command that answered it; the same wherever the flight is flown."""
+        """Hash of truth and command of each frame; the same on all links."""
         return self._hash.hexdigest()
 
     def columns(self, since_s: float = 0.0) -> Columns:
-        """Return what `COLUMNS` names from a time on, one value a frame; also `mode` is there by number."""
+        """Return `COLUMNS` from a time on, one array each."""
         table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(COLUMNS))
         return dict(zip(COLUMNS, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
@@ -84,11 +83,10 @@ class Record:
 
 
 def mode_name(number: float) -> str:
-    """Return the mode of HEARTBEAT's number by its name; what has none stays a number."""
+    """Return the name of a custom mode; unknown ones as a number."""
     return str(mode_of_custom(int(number)) or int(number))
 
 
 def tilt_deg(flown: Columns) -> NDArray[np.float64]:
-    """Return how far the thrust points from straight up, degrees, at each frame."""
     upright = 1.0 - 2.0 * (flown["qx"] ** 2 + flown["qy"] ** 2)
     return np.asarray(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))

@@ -1,4 +1,4 @@
-"""A ground station, or whatever else speaks MAVLink to the vehicle: what it sends and what it has received."""
+"""A ground station or another MAVLink component that tests control."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -18,7 +18,7 @@ from colibri.sitl.errors import SitlError
 from colibri.sitl.stepping import NotInTimeError, Stepped
 
 AGAIN_AFTER_S = 0.5
-"""What stays unanswered is requested again, as ground stations do."""
+"""Interval of repeated requests, as in ground stations."""
 ANSWER_WITHIN_S = 15.0
 UPLOAD_WITHIN_S = 60.0
 _AGAIN_AFTER_US = round(AGAIN_AFTER_S * 1e6)
@@ -35,32 +35,30 @@ class RefusedError(SitlError):
     """
 
     def __init__(self, what: str, result: int, text: str) -> None:
-        """Name what was refused, with which number and text."""
         super().__init__(f"{what} was refused: {text or 'without a word'} (result {result})")
         self.result = result
         self.text = text
 
 
 class SteppedVehicle(Stepped, Protocol):
-    """A vehicle in a flight that can go on."""
+    """A vehicle in a flight that can be stepped."""
 
     @property
-    def system(self) -> int:
-        """The vehicle's system id."""
+    def system(self) -> int: ...
 
 
 class Station(Inbox):
-    """A component on a link of its own; what it has received is in `Inbox`.
+    """A component on a link of its own; received messages are in `Inbox`.
 
-    What it sends goes out with the next frame; what waits for an answer lets simulated time go on, and repeats the
-    request every half second until the answer comes; a `RefusedError` is raised where the vehicle refuses, a
-    `NotInTimeError` where it does not answer within `ANSWER_WITHIN_S`. Its methods are the vocabulary of tests.
+    Messages are sent with the next frame. A method that waits for an answer advances simulated time and repeats its
+    request
+    every half second; it raises `RefusedError` if the vehicle refuses, and `NotInTimeError` after `ANSWER_WITHIN_S`.
 
     Attributes:
         system, component: Its ids.
-        number: Of its link.
-        silent: Whether it sends nothing, no HEARTBEAT either, while it still receives.
-        dropped: What came and was no message, by reason.
+        number: Number of its link.
+        silent: Set it to stop all sending, HEARTBEAT included.
+        dropped: Number of invalid frames received, by reason.
     """
 
     def __init__(
@@ -74,7 +72,7 @@ class Station(Inbox):
         seed: int,
         beats: bool,
     ) -> None:
-        """Be component `component` of `system` on link `number`; one that `beats` sends a HEARTBEAT a second."""
+        """Connect as `component` of `system` on link `number`; `beats` sends a HEARTBEAT a second."""
         super().__init__()
         self._flight = flight
         self.number = number
@@ -101,17 +99,17 @@ class Station(Inbox):
         return self._up.due(now_us)
 
     def arriving(self, datagram: bytes, now_us: int) -> None:
-        """Take in a datagram that the vehicle sends now: it arrives when the link lets it."""
+        """Put a datagram of the vehicle on the link."""
         self._down.put(datagram, now_us)
 
     def listen(self, now_us: int) -> None:
-        """Receive what has arrived."""
+        """Receive the datagrams due."""
         for datagram in self._down.due(now_us):
             for message in self._client.receive(datagram, now_us):
                 self.add(message)
 
     def add(self, message: Message) -> None:
-        """Add a message of the vehicle."""
+        """Record a message of the vehicle."""
         super().add(message)
         if message.name == "PARAM_VALUE":
             self._kinds[message.fields.param_id] = message.fields.param_type
@@ -128,30 +126,30 @@ class Station(Inbox):
             self._up.put(datagram, self._flight.time_us)
 
     def order(self, number: int, *params: float) -> int:
-        """Send a COMMAND_LONG and return the MAV_RESULT, whatever it is; parameters that are left out are 0."""
+        """Send a COMMAND_LONG and return any MAV_RESULT; missing parameters are 0."""
         return self._acknowledged(Command(self._vehicle, number, *params, repeat=_REPEAT))
 
     def order_int(
         self, number: int, *params: float, frame: int, x: int = NOT_GIVEN, y: int = NOT_GIVEN, z: float = 0.0
     ) -> int:
-        """Send a COMMAND_INT and return the MAV_RESULT, whatever it is."""
+        """Send a COMMAND_INT and return any MAV_RESULT."""
         return self._acknowledged(
             CommandInt(self._vehicle, number, *params, frame=frame, x=x, y=y, z=z, repeat=_REPEAT)
         )
 
     def command(self, number: int, *params: float, what: str = "") -> None:
-        """Send a COMMAND_LONG."""
+        """Send a COMMAND_LONG that must be accepted."""
         said = len(self.texts)
         result = self.order(number, *params)
         self.check(result, said, what or f"command {number}")
 
     def check(self, result: int, said: int, what: str) -> None:
-        """See that a result is ACCEPTED; `said` is how many texts had been received before."""
+        """Raise unless a result is ACCEPTED; `said` is the number of texts received before the request."""
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
     def request(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Send a request, and repeat it every half second until it is answered; `send` gets how many came before."""
+        """Send a request every half second until it is answered; `send` is called with the number of tries before."""
         for tries in range(_REPEAT.tries):
             send(tries)
             again_us = self._flight.time_us + _AGAIN_AFTER_US
@@ -168,7 +166,7 @@ class Station(Inbox):
         return self._parameter(ReadParameter(self._vehicle, name, repeat=_REPEAT))
 
     def set_param(self, name: str, value: Value) -> Value:
-        """Set a parameter; return the value that it has then."""
+        """Set a parameter; return its new value."""
         change = SetParameter(self._vehicle, name, value, kind=self._kinds.get(name), repeat=_REPEAT)
         taken = self._parameter(change)
         if change.result == DIFFERS:
@@ -188,7 +186,7 @@ class Station(Inbox):
             raise RefusedError(what + item, upload.result or 0, "; ".join(self.texts[said:]))
 
     def begin_upload(self, items: Sequence[MissionItem], plan: int = MISSION) -> Upload:
-        """Begin an upload, which goes on by itself while the flight does."""
+        """Begin an upload, which continues with the flight."""
         return self._client.begin(Upload(self._vehicle, items, plan, repeat=_UPLOAD_REPEAT))
 
     def _acknowledged(self, command: Command) -> int:
@@ -206,7 +204,7 @@ class Station(Inbox):
         return conversation.held.value
 
     def _converse(self, conversation: Conversation, what: str) -> None:
-        """Fly until a conversation has ended; what it sends goes out before whatever else this frame sends."""
+        """Fly until a conversation has ended; its messages precede others in the frame."""
         self._client.begin(conversation)
         try:
             while conversation.result is None:

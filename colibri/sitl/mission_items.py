@@ -1,4 +1,4 @@
-"""Items of missions and fences with places in metres, ENU, from where the flight's ENU frame begins."""
+"""Items of missions and fences with places in metres, ENU, from the flight's origin."""
 
 from collections.abc import Iterable, Sequence
 from math import nan
@@ -17,8 +17,8 @@ class Item(NamedTuple):
 
     Attributes:
         command: MAV_CMD.
-        params: The first four parameters; what is left out is 0.
-        place: East, north, m, and height above home, m; None where the item has no place.
+        params: The first parameters; others are 0.
+        place: East, north, and height above home, m; `None` for an item without a place.
     """
 
     command: int
@@ -26,7 +26,6 @@ class Item(NamedTuple):
     place: Place | None = None
 
     def on_wire(self, origin: Geodetic) -> MissionItem:
-        """Return the item as it is uploaded."""
         p1, p2, p3, p4 = (*self.params, *(0.0,) * (4 - len(self.params)))
         if self.place is None:
             return MissionItem(mav.MAV_FRAME_MISSION, self.command, 1, p1, p2, p3, p4, 0, 0, 0.0)
@@ -38,22 +37,20 @@ class Item(NamedTuple):
 
 
 def on_wire(items: Iterable[Item | MissionItem], origin: Geodetic) -> list[MissionItem]:
-    """Return items as they are uploaded; what is on the wire already stays as it is."""
+    """Convert items for upload; MissionItem are kept."""
     return [item.on_wire(origin) if isinstance(item, Item) else item for item in items]
 
 
 def waypoint(east: float, north: float, up: float, *, stay_s: float = 0.0, within_m: float = 0.3) -> Item:
-    """Fly to a place, and stay there for a while."""
+    """Fly to a place and stay there."""
     return Item(mav.MAV_CMD_NAV_WAYPOINT, (stay_s, within_m, 0.0, nan), (east, north, up))
 
 
 def takeoff(up: float, east: float = 0.0, north: float = 0.0) -> Item:
-    """Take off to a height above home."""
     return Item(mav.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, nan), (east, north, up))
 
 
 def land(east: float, north: float) -> Item:
-    """Land at a place."""
     return Item(mav.MAV_CMD_NAV_LAND, (0.0, 0.0, 0.0, nan), (east, north, 0.0))
 
 
@@ -63,23 +60,23 @@ def return_home() -> Item:
 
 
 def change_speed(speed_m_s: float) -> Item:
-    """Fly faster or slower from here on."""
+    """Change the speed from here on."""
     return Item(mav.MAV_CMD_DO_CHANGE_SPEED, (1.0, speed_m_s, -1.0))
 
 
 def jump(to: int, times: int) -> Item:
-    """Go on at another item, so often."""
+    """Continue at item `to`, so many `times`."""
     return Item(mav.MAV_CMD_DO_JUMP, (float(to), float(times)))
 
 
 def polygon(corners: Sequence[Corner], *, keep_out: bool = False) -> list[Item]:
-    """Return the items of a polygon that must not be left, or not be entered."""
+    """Return the items of a polygon to stay inside of, or to `keep_out` of."""
     inside, outside = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
     command = outside if keep_out else inside
     return [Item(command, (float(len(corners)),), (east, north, 0.0)) for east, north in corners]
 
 
 def circle(radius_m: float, centre: Corner = (0.0, 0.0), *, keep_out: bool = False) -> list[Item]:
-    """Return the item of a circle that must not be left, or not be entered."""
+    """Return the item of a circle to stay inside of, or to `keep_out` of."""
     inside, outside = mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
     return [Item(outside if keep_out else inside, (radius_m,), (*centre, 0.0))]

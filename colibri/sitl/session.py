@@ -1,4 +1,4 @@
-"""The flights of one test: begun by its marks, on the link that the command line chose, and ended with it."""
+"""The flights of one test."""
 
 import json
 from contextlib import ExitStack
@@ -23,15 +23,15 @@ from colibri.sitl.vehicle import Sitl
 
 
 class Flights:
-    """All that a test flies.
+    """All flights of a test; they end with it.
 
     Attributes:
-        setting: What each begins with, but for changes.
-        flown: The flights, in the order in which they were begun.
+        setting: The setting of the test's marks.
+        flown: The flights in order of their begin.
     """
 
     def __init__(self, setting: Setting, launcher: Launcher | None) -> None:
-        """Fly by `setting`, in processes of a `launcher`, or in this one."""
+        """Fly in processes of a `launcher`, or in this process without one."""
         self.setting = setting
         self._launcher = launcher
         freeze_once()  # a run of tests has a lot that is there to stay
@@ -40,11 +40,7 @@ class Flights:
         self.flown: list[Sitl] = []
 
     def begin(self, **changes: Any) -> Sitl:
-        """Begin a flight that differs from the test's setting by `changes`; their `params` add up.
-
-        Raises:
-            SettingError: It cannot begin so.
-        """
+        """Begin a flight that differs from the test's setting by `changes`; `params` add up."""
         setting = setting_of([values_of(self.setting), changes])
         state = self._folder / f"vehicle-{len(self.flown)}"
         sitl = Sitl(setting, self._lockstep(setting, state), setting.home.origin)
@@ -74,13 +70,11 @@ class Flights:
         return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
-        """Write all that is known of the flights below `folder`; return where each is.
+        """Write records, figures and facts below `folder`; return the folder of each flight.
 
         Args:
-            folder: Made where it is missing.
-            figures: Whether to draw them, too.
-            title: Of the figures: what was flown.
-            reason: Why it ended, said beside the mark at the end.
+            title: Title of the figures.
+            reason: Why the test failed, shown at the end of the figure.
         """
         places = []
         for number, sitl in enumerate(self.flown):
@@ -104,7 +98,7 @@ class Flights:
         return places
 
     def summary(self) -> dict[str, Any]:
-        """Return their number, simulated time, s, and hashes, for the summary of the run."""
+        """Return number, simulated time in s, and hashes, for the summary of the run."""
         return {
             "flights": len(self.flown),
             "simulated_s": sum(sitl.time_s for sitl in self.flown),
@@ -112,9 +106,7 @@ class Flights:
         }
 
     def __enter__(self) -> Self:
-        """Begin."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End every flight."""
         self._ends.close()

@@ -1,4 +1,4 @@
-"""Every STATUSTEXT that a vehicle sends to one ground station, read where it is sent: no link loses it."""
+"""The STATUSTEXT messages of a vehicle, read before the link, so that none is lost."""
 
 from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.wire.dialect import Codec, mav
@@ -7,11 +7,7 @@ _STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
 
 
 class StatusTexts(Inbox):
-    """The texts, and when each was sent.
-
-    Attributes:
-        times_us: When each text was sent.
-    """
+    """The texts of a vehicle with the times of sending."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -19,7 +15,7 @@ class StatusTexts(Inbox):
         self.times_us: list[int] = []
 
     def add_datagram(self, datagram: bytes, now_us: int) -> None:
-        """Add a datagram that is sent now."""
+        """Read a datagram sent now."""
         if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
             return
         for message in self._codec.decode(datagram):

@@ -1,4 +1,4 @@
-"""What tests can do with any flight in simulated time: step it, wait for a condition, send sticks and setpoints."""
+"""Methods of all flights in simulated time: step, wait, send sticks and setpoints."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ class NotInTimeError(SitlError, AssertionError):
 
 
 class Stepped(Protocol):
-    """A flight whose simulated time passes frame by frame, when `step` is called and never otherwise."""
+    """A flight whose simulated time passes only in `step`."""
 
     __slots__ = ()
 
@@ -32,11 +32,7 @@ class Stepped(Protocol):
         return self.time_us * 1e-6
 
     def run(self, seconds: float, each_frame: Callable[[], object] | None = None) -> None:
-        """Fly for so many seconds of simulated time; call `each_frame` before each frame.
-
-        Raises:
-            ValueError: Time does not run back.
-        """
+        """Fly for `seconds` of simulated time; call `each_frame` before each frame."""
         if not seconds >= 0.0:
             raise ValueError(f"seconds to fly must be from 0 on, not {seconds!r}")
         end_us = self.time_us + round(seconds * 1e6)
@@ -46,11 +42,7 @@ class Stepped(Protocol):
             self.step()
 
     def wait_until(self, predicate: Callable[[], object], *, within: float, what: str = "") -> float:
-        """Fly until `predicate()`; return how long that took, s.
-
-        Raises:
-            NotInTimeError: It is not so `within` that many seconds of simulated time.
-        """
+        """Fly until `predicate()` and return the time it took, s; NotInTimeError after `within` s."""
         began_us = self.time_us
         end_us = began_us + round(within * 1e6)
         while not predicate():
@@ -60,11 +52,7 @@ class Stepped(Protocol):
         return (self.time_us - began_us) * 1e-6
 
     def hold(self, predicate: Callable[[], object], *, for_: float, what: str = "") -> None:
-        """Fly for so many seconds, at each frame of which `predicate()` must hold.
-
-        Raises:
-            NotInTimeError: It does not.
-        """
+        """Fly for `for_` seconds; NotInTimeError if `predicate()` fails at any frame."""
         began_us = self.time_us
         end_us = began_us + round(for_ * 1e6)
         while True:
@@ -77,17 +65,16 @@ class Stepped(Protocol):
 
 
 class Steered(Protocol):
-    """A vehicle that is sent sticks and setpoints, which no message answers."""
+    """A vehicle that takes sticks and setpoints, which are not acknowledged."""
 
     @property
-    def system(self) -> int:
-        """The vehicle's system id."""
+    def system(self) -> int: ...
 
     def send(self, name: str, *fields: Any) -> None:
-        """Send a message from the first ground station, with its fields as MAVLink defines them."""
+        """Send a message from the first ground station."""
 
     def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
-        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
+        """Send sticks once: forward, right, up (0..1, neutral 0.5), clockwise; each -1..1."""
         self._send(manual_control(self.system, pitch, roll, thrust, yaw))
 
     def setpoint(
@@ -98,7 +85,7 @@ class Steered(Protocol):
         yaw: float | None = None,
         yaw_rate: float | None = None,
     ) -> None:
-        """Send an offboard setpoint once, ENU, SI; what is None is masked."""
+        """Send an offboard setpoint once, ENU, SI; omitted quantities are masked."""
         target = (self.system, AUTOPILOT_COMPONENT)
         self._send(position_target(target, position, velocity, acceleration, yaw, yaw_rate))
 

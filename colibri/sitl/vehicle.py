@@ -28,52 +28,46 @@ from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
 
 FORCE = 21196.0
-"""What a command to arm or disarm needs to pass over every check."""
+"""Parameter of arming and disarming that overrides all checks."""
 READY_WITHIN_S = 40.0
 CALM = "0@0"
 STICKS_EVERY_US = 40_000
-"""25 times a second, as QGroundControl sends those of a joystick."""
+"""25 Hz, as QGroundControl sends a joystick's."""
 _SETTABLE = ("payload_kg", "wind")
-"""What tests may assign to."""
+"""Attributes that tests may assign."""
 _FIRST_STICKS_S = 0.2
-"""How long sticks are sent over a bad link until some have come through."""
+"""Time to get first sticks through a faulty link."""
 
 
 class Links(NamedTuple):
-    """Faults of the links.
+    """Link faults.
 
     Attributes:
-        ground: Between the vehicle and every ground station, by simulated time.
-        plant: Between plant and autopilot, while simulated time stands still: in lockstep the plant repeats its frame
-            until it has received the answer, and nothing of it changes a flight.
+        ground: Between the vehicle and all ground stations, in simulated time.
+        plant: Between plant and autopilot. It leaves the flight unchanged: the plant repeats its frame until it is
+            answered.
     """
 
     ground: Trouble
     plant: Trouble
 
     def __getattr__(self, name: str) -> Any:
-        """Refuse what is no link.
-
-        Raises:
-            AttributeError: Always.
-        """
         raise AttributeError(f"there is no link {name}: choose {', '.join(self._fields)}")
 
 
 class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
-    What can be read of it is in `View`, waiting in `Stepped`, sticks and setpoints in `Steered`. Its methods are the
-    vocabulary of tests: that is why they are many. Each command, upload or parameter that the vehicle refuses raises a
-    `RefusedError`.
+    State is in `View`, waiting in `Stepped`, sticks and setpoints in `Steered`. Commands, uploads and parameters raise
+    a `RefusedError` if the vehicle refuses.
 
     Attributes:
-        items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
-        Refused: Raised where the vehicle refuses.
-        NotInTime: Raised where a condition is not met in time, an AssertionError.
-        gcs: The first ground station; what `Sitl` does itself it does through it.
-        link: Faults of the links, which may be changed at any time.
-        fleet: The vehicles that share its simulated time, itself among them; empty where it flies alone.
+        items: Functions for items of missions and fences, such as `items.waypoint(3.0, 0.0, 5.0)`.
+        Refused: The error if the vehicle refuses.
+        NotInTime: The error if a condition is not met in time, an AssertionError.
+        gcs: The first ground station, which sends the commands of `Sitl`.
+        link: Link faults, which may be changed at any time.
+        fleet: The vehicles in the same simulated time, with this one; empty if it flies alone.
     """
 
     items = items
@@ -81,7 +75,6 @@ class Sitl(View, Stepped, Steered):
     NotInTime = NotInTimeError
 
     def __init__(self, setting: Setting, lockstep: LockstepSession, origin: Geodetic) -> None:
-        """Begin a flight in a lockstep session; `origin` is that of the ENU frame."""
         self.setting = setting
         self.origin = origin
         self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
@@ -99,35 +92,26 @@ class Sitl(View, Stepped, Steered):
     if not TYPE_CHECKING:  # checkers know what there is
 
         def __setattr__(self, name: str, value: Any) -> None:
-            """Refuse what no vehicle has, once it is made: a typo would change nothing.
-
-            Raises:
-                AttributeError: There is no such attribute.
-            """
             if name[0] != "_" and "fleet" in self.__dict__ and not hasattr(self, name):
                 raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
             super().__setattr__(name, value)
 
     def begin(self) -> None:
-        """Fly until the first HEARTBEAT of the vehicle, if the setting has it so."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 
     # Time.
 
     def step(self) -> None:
-        """Fly one frame; whoever shares its time flies as long."""
         self.fly_frame()
         self.have_others_catch_up()
 
     def have_others_catch_up(self) -> None:
-        """Fly each vehicle of the fleet that is behind this one until it is not."""
         for other in self.fleet:
             while other.time_us < self.time_us:
                 other.fly_frame()
 
     def fly_frame(self) -> None:
-        """Fly one frame of this vehicle alone."""
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
@@ -151,19 +135,12 @@ class Sitl(View, Stepped, Steered):
     # Commands.
 
     def arm(self, *, force: bool = False) -> None:
-        """Let the rotors turn."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0, what="arming")
 
     def disarm(self, *, force: bool = False) -> None:
-        """Stop the rotors; in the air only by force."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
     def takeoff(self, height_m: float | None = None, *, wait: bool = True, within: float | None = None) -> None:
-        """Arm, climb so high above home, by default as high as MIS_TAKEOFF_ALT says, and stay there: see `is_at`.
-
-        Raises:
-            NotInTimeError: It is not up there `within` s; if None, 8 s and 2 s a metre.
-        """
         height_m = self.get_param("MIS_TAKEOFF_ALT") if height_m is None else height_m
         east, north, from_m = self.position
         if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
@@ -177,11 +154,6 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
-        """Land here, and wait until the rotors have stopped.
-
-        Raises:
-            NotInTimeError: They do not stop `within` s; if None, 8 s and 2 s a metre.
-        """
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
         if wait:
@@ -198,20 +170,6 @@ class Sitl(View, Stepped, Steered):
         wait: bool = True,
         within: float | None = None,
     ) -> None:
-        """Fly to a place, ENU, by a reposition command, and be there: see `is_at`.
-
-        Args:
-            east: m.
-            north: m.
-            up: m.
-            yaw: Counter-clockwise from east, rad; nan for as it is.
-            speed: m/s; -1 for the parameters'.
-            wait: Whether to fly until it is there.
-            within: Simulated seconds; if None, 10 s and 1 s a metre.
-
-        Raises:
-            NotInTimeError: It is not there in time.
-        """
         there = geodetic_of((east, north, up), self.origin)
         x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
         heading = yaw if yaw != yaw else 0.5 * pi - yaw
@@ -231,51 +189,41 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(lambda: self.is_at(goal), within=max_s, what=f"the way to {goal}")
 
     def fly_track(self, name: str) -> None:
-        """Fly a track of parameter TRACK: arm if need be, and go there first."""
         self.set_param("TRACK", TRACKS.index(_chosen("track", name, TRACKS)))
         self.select(Mode.TRACK)
         if not self.armed:
             self.arm()
 
     def select(self, mode: Mode | str) -> None:
-        """Choose a mode."""
         number = custom_mode(Mode(_chosen("mode", mode, tuple(Mode))))
         params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
         self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
 
     def command(self, number: int, *params: float) -> int:
-        """Send a COMMAND_LONG and return the MAV_RESULT, whatever it is; parameters that are left out are 0."""
         return self.gcs.order(number, *params)
 
     def start_mission(self) -> None:
-        """Begin the mission, or go on with it; arm if need be."""
         self.select(Mode.MISSION)
         if not self.armed:
             self.arm()
 
     def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload a mission."""
         self.gcs.upload(on_wire(plan, self.origin), MISSION)
 
     def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload a geofence, of `items.polygon` and `items.circle`."""
         self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
 
     def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload rally points."""
         self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
-        """Request a parameter."""
         return self.gcs.get_param(name)
 
     def set_param(self, name: str, value: Value) -> Value:
-        """Set a parameter; return the value that it has then, which is one of 32 bits."""
         return self.gcs.set_param(name, value)
 
     @contextmanager
     def sticks_held(self, **axes: float) -> Iterator[None]:
-        """Hold the sticks so, see `stick`, whatever else is done meanwhile: they are sent 25 times a second."""
         before, self._sticks = self._sticks, axes
         self._send_sticks()  # now, so that they are heard before whatever else is sent
         if before is None and self.link.ground.any:
@@ -292,22 +240,18 @@ class Sitl(View, Stepped, Steered):
     # Messages that are not answered.
 
     def send(self, name: str, *fields: Any) -> None:
-        """Send a message from the first ground station."""
         self.gcs.send(name, *fields)
 
     # What goes wrong.
 
     def inject(self, unit: str | int, kind: str | int, instance: int = 0, *values: float) -> None:
-        """Have the plant fail from the next frame on, as by MAV_CMD_INJECT_FAILURE, without the autopilot.
+        """Inject a failure into the plant, like MAV_CMD_INJECT_FAILURE but not through the autopilot.
 
         Args:
-            unit: FAILURE_UNIT by number, or by name: "motor", "gps", "battery".
-            kind: FAILURE_TYPE by number, or by name: "off", "stuck", "ok".
-            instance: Which one, from 1 on; 0 for all.
+            unit: FAILURE_UNIT by number or name: "motor", "gps", "battery".
+            kind: FAILURE_TYPE by number or name: "off", "stuck", "ok".
+            instance: From 1; 0 for all.
             values: Parameters 4 to 7.
-
-        Raises:
-            RefusedError: This plant cannot fail so.
         """
         numbers = (_number("FAILURE_UNIT", unit), _number("FAILURE_TYPE", kind))
         params = (*map(float, numbers), float(instance), *values)
@@ -321,7 +265,6 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def wind(self) -> str:
-        """The mean wind, as mark `wind` has it; it may be changed, from the next frame on, to a constant one."""
         return self._wind
 
     @wind.setter
@@ -335,7 +278,6 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def payload_kg(self) -> float:
-        """What the vehicle carries beside its own mass, kg; it may be changed, from the next frame on."""
         return self._payload_kg
 
     @payload_kg.setter
@@ -346,18 +288,15 @@ class Sitl(View, Stepped, Steered):
         self._injected += self._lockstep.change_of_world(PayloadChange(mass_kg))
 
     def kill_autopilot(self) -> None:
-        """Kill the autopilot as `kill -9` does, and start it again at once, with the files that it has written."""
         self._lockstep.kill_autopilot()
 
     @property
     def inside(self) -> Inside:
-        """Plant and autopilot as objects, for what no message shows; only in memory."""
         return Inside(self._lockstep)
 
     # Who else is there.
 
     def client(self, system: int = 254, component: int = 190, *, beats: bool = True) -> Station:
-        """Connect another ground station, or companion, on a link of its own; one that `beats` sends a HEARTBEAT."""
         number = len(self._stations) + 1
         trouble, seed = self.link.ground, self.setting.seed
         station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)
@@ -380,5 +319,4 @@ def _number(kind: str, of: str | int) -> int:
 
 
 def _without_kind(unit: str) -> str:
-    """Return the name of a unit without what says of which kind it is: system_motor is motor, sensor_gps is gps."""
     return unit.lower().removeprefix("system_").removeprefix("sensor_")

@@ -1,4 +1,4 @@
-"""What a test sees of a vehicle: its true state, and what the autopilot reports."""
+"""The observable state of a vehicle: truth, and the autopilot's reports."""
 
 from collections.abc import Sequence
 from math import dist, hypot
@@ -23,14 +23,14 @@ _SLOW_M_S = 0.3
 
 
 class View:
-    """What can be read of a vehicle in flight: a property each, which is why they are many.
+    """The observable state of a vehicle in flight.
 
-    Positions and velocities are true, ENU, m and m/s; the origin is where the vehicle stood, or what `home` says.
+    Positions and velocities are true, ENU, m and m/s; the origin is the initial position, or `home` of the setting.
 
     Attributes:
-        setting: What the flight began with.
+        setting: The setting of the flight.
         gcs: The first ground station.
-        record: All that was flown.
+        record: The record of the flight.
     """
 
     setting: Setting
@@ -46,7 +46,7 @@ class View:
 
     @property
     def near_m(self) -> float:
-        """Closer than this it is there, m: an estimate is as far from the truth as GPS is."""
+        """Default tolerance of `is_at`, m; larger with sensors, by the error of GPS."""
         return _NEAR_M[self.setting.feedback]
 
     @property
@@ -81,27 +81,27 @@ class View:
 
     @property
     def tilt_deg(self) -> float:
-        """How far its thrust points from straight up, degrees."""
+        """Angle between thrust and vertical, degrees."""
         return tilt_deg(self._lockstep.truth.attitude)
 
     @property
     def mode(self) -> Mode | None:
-        """The flight mode, as the autopilot has it at this frame, whatever the links do."""
+        """The autopilot's flight mode at this frame, independent of links."""
         return mode_of_custom(self._lockstep.flown.to_stations.custom_mode)
 
     @property
     def armed(self) -> bool:
-        """Whether its rotors may turn, as the autopilot has it at this frame."""
+        """Whether the autopilot is armed at this frame, independent of links."""
         return self._lockstep.flown.to_stations.armed
 
     @property
     def rotors(self) -> ActuatorCommand:
-        """What the autopilot has commanded at this frame."""
+        """The autopilot's command at this frame."""
         return self._lockstep.flown.command
 
     @property
     def home(self) -> Vector | None:
-        """Where home is by the last HOME_POSITION, ENU, m; None before the first."""
+        """Home by the last HOME_POSITION, ENU, m; `None` before the first."""
         if not self.gcs.heard["HOME_POSITION"]:
             return None
         home = self.gcs.latest("HOME_POSITION")
@@ -109,24 +109,24 @@ class View:
 
     @property
     def texts(self) -> list[str]:
-        """Every STATUSTEXT that the vehicle has sent to the first ground station, whatever the links do."""
+        """All STATUSTEXT sent to the first ground station, independent of links."""
         return self._texts.texts
 
     @property
     def timed_texts(self) -> list[tuple[float, str]]:
-        """Each of `texts` with the simulated time when it was sent, s."""
+        """Each of `texts` with its time of sending, s."""
         return [(time_us * 1e-6, text) for time_us, text in zip(self._texts.times_us, self.texts, strict=True)]
 
     def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT with `part` in it was sent, whatever the links do; those received are in `gcs.texts`."""
+        """Whether a STATUSTEXT containing `part` was sent; received ones are in `gcs.texts`."""
         return self._texts.said(part)
 
     def heard(self, name: str) -> list[Any]:
-        """Return all messages of a name that the first ground station has received, as their fields."""
+        """Return the messages of a name that the first ground station has received, as their fields."""
         return self.gcs.heard[name]
 
     def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:
-        """Whether it is near a place, ENU, and hardly moves; near is 0.3 m, or 2 m on sensors."""
+        """Whether it is near a place, ENU, and slow; near is 0.3 m, with sensors 2 m."""
         near_m = self.near_m if near_m is None else near_m
         return dist(place, self.position) < near_m and self.speed_m_s < slow_m_s
 
@@ -136,22 +136,21 @@ class View:
 
     @property
     def path(self) -> NDArray[np.float64]:
-        """Where it was at each frame, ENU, (n, 3)."""
+        """Positions of all frames, ENU, (n, 3)."""
         flown = self.flown()
         return np.stack([flown["x"], flown["y"], flown["z"]], axis=1)
 
     @property
     def processes(self) -> dict[str, int]:
-        """Numbers of the processes "plant" and "autopilot"; empty in memory."""
+        """Process ids of "plant" and "autopilot"; empty in memory."""
         return self._lockstep.processes()
 
     @property
     def sha256(self) -> str:
-        """Of the whole flight: truth and command at each frame. The same on every machine of a kind, on every link."""
+        """Hash of truth and command of all frames; the same on all links and on machines of a kind."""
         return self.record.sha256
 
     def __repr__(self) -> str:
-        """Return the same, as pytest shows it beside an assertion."""
         return f"<vehicle {self.system}: {self}>"
 
     def __str__(self) -> str:

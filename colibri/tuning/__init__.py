@@ -1,4 +1,4 @@
-"""Numbers of a profile, tried by Optuna on many flights: which are best, and what that is worth on seeds never seen."""
+"""Tune numbers of a profile with Optuna over many flights, and test the result with other seeds."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""A tuning as data: which numbers of a profile, within which ranges, by which flights, towards which objectives."""
+"""A tuning as data: numbers with ranges, flights, and objectives."""
 
 from collections.abc import Mapping
 from math import ceil
@@ -20,17 +20,17 @@ _MIN_SEEDS = 3
 
 
 class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is in the file of a tuning; `colibri.tune` has the same by keywords.
+    """The tables of a tuning's file; also the keywords of `colibri.tune`.
 
-    Seeds, draws and the grid are those of every trial; metrics are shown beside the objectives.
+    Seeds, draws and grid are those of every trial; metrics are shown beside the objectives.
 
     Attributes:
-        check_seeds: By which the best is flown beside the profile as it is; None: not at all.
-        trials: How many, the profile as it is among them.
-        prune_after: Seeds after which, again and again, a trial may end that is clearly worse than the best; 0: never;
-            None: a quarter of them, but three at least.
-        tune: Numbers of the profile, and their ranges.
-        objectives: Metrics that are to become small, and how they are pooled over a trial's flights.
+        check_seeds: Seeds to compare the best profile with the original by; by default no comparison.
+        trials: Number of trials, including the original profile.
+        prune_after: Seeds between decisions to end a trial clearly worse than the best; 0 never. Default a quarter of
+            the seeds, at least three.
+        tune: Numbers of the profile and their ranges.
+        objectives: Metrics to minimize, and how to pool them over a trial's flights.
     """
 
     FACTORS: ClassVar[tuple[str, ...]] = (*FlightTables.FACTORS, "tune")
@@ -44,18 +44,14 @@ class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Tuning(NamedTuple):
-    """A tuning, read and checked.
+    """A validated tuning.
 
     Attributes:
-        campaign: What each trial flies.
-        common: What its flights need.
-        check_seeds: Those that no trial flies; none for no verdict.
-        trials: How many.
-        prune_after: Seeds between two judgements; 0 for none.
-        space: Ranges by the names of the numbers.
-        objectives: What is to become small.
-        base: The profile as it is.
-        text: Its file; None for a profile that has none.
+        campaign: The flights of each trial.
+        check_seeds: Seeds of the comparison; may be empty.
+        prune_after: Seeds between decisions to prune; 0 never.
+        base: The original profile.
+        text: Its file, if it has one.
     """
 
     campaign: Campaign
@@ -70,15 +66,10 @@ class Tuning(NamedTuple):
 
     @property
     def begins(self) -> dict[str, Any]:
-        """What the profile as it is has, as Optuna has it."""
+        """The original values, for Optuna."""
         return {name: as_optuna(values, _had(self.base, name)) for name, values in self.space.items()}
 
     def tuned(self, params: Mapping[str, Any]) -> Profile:
-        """Return the profile with the numbers of a trial.
-
-        Raises:
-            ProfileError: They cannot be together.
-        """
         profile: Profile = with_keys(self.flown(params), "profile", self.base)
         return profile
 
@@ -87,7 +78,7 @@ class Tuning(NamedTuple):
         return {name: as_flown(self.space[name], value) for name, value in params.items()}
 
     def steps(self) -> list[list[Point]]:
-        """Return what a trial flies, step by step: of several seeds each, every combination."""
+        """Return the flights of a trial in steps, between which it may be pruned."""
         seeds = self.campaign.seeds
         by_seed: dict[int, list[Point]] = {seed: [] for seed in seeds}
         for point in self.campaign.points():
@@ -100,11 +91,7 @@ class Tuning(NamedTuple):
 
 
 def tuning_of(tables: TuningTables) -> Tuning:
-    """Return the tuning of its tables, all of whose ranges can be flown.
-
-    Raises:
-        Error: A number, a range or a metric that there is not, or what can never be flown.
-    """
+    """Read a tuning; the ends of all ranges are planned, to raise errors before it starts."""
     space = _space(tables)
     campaign = campaign_of(
         CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})
@@ -148,7 +135,7 @@ def _space(tables: TuningTables) -> dict[str, Range]:
 
 
 def _had(base: Profile, name: str) -> Any:
-    """Return what a profile has for a number; one that is multiplied is multiplied by one."""
+    """Return a profile's value of a number; 1 for a multiplier."""
     key = key_of(name)
     if key is None:
         raise KeyError(name)
@@ -202,7 +189,7 @@ def _text(given: Any) -> str | None:
 
 
 def _check_ends(tuning: Tuning) -> None:
-    """Plan the flights of the profile as it is, and one with each end of each range."""
+    """Plan flights of the original profile and of both ends of each range."""
     campaign, common = tuning.campaign, tuning.common
     check(campaign.samples(), common)
     first = campaign._replace(grid={name: values[:1] for name, values in campaign.grid.items()}, draw={})

@@ -1,4 +1,4 @@
-"""The figures of a tuning: what each number is worth, how far tuning came, and what is traded for what."""
+"""Figures of a tuning: importance, slices, history and Pareto front."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,7 +21,7 @@ _MANY_DECADES = 300.0
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return numbers without the tables that all of them are in."""
+    """Remove the tables that all names share."""
     parts = [name.split(".") for name in names]
     shared = 0
     while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
@@ -30,7 +30,7 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) -> Figure:
-    """Return how much each number matters for each objective: bars, the longest first."""
+    """Draw the importance of each number for each objective, the largest first."""
     first = next(iter(importances.values()))
     names = sorted(first, key=lambda name: -first[name])
     figure, ((axes,),) = axes_grid(1, 1, TOP_IN, row_in=0.3 + _BAR_IN * len(names) * len(importances))
@@ -52,7 +52,7 @@ def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) 
 
 
 def draw_slices(title: str, space: Mapping[str, Range], objective: str, trials: Sequence[Ended], best: Ended) -> Figure:
-    """Return the first objective over each number, a dot a trial; the profile as it is, and the best, stand out."""
+    """Draw the first objective over each number, one dot per trial."""
     names = list(space)
     rows = -(-len(names) // _COLUMNS)
     figure, grid = axes_grid(rows, _COLUMNS, TOP_IN, row_in=_PANEL_IN, share=False)
@@ -77,7 +77,7 @@ def draw_slices(title: str, space: Mapping[str, Range], objective: str, trials: 
 
 
 def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended], best: Ended) -> Figure:
-    """Return each objective over the trials, and the least until then."""
+    """Draw each objective over the trials, and its minimum so far."""
     figure, grid = axes_grid(len(objectives), 1, TOP_IN, row_in=2.6)
     for place, (objective, (axes,)) in enumerate(zip(objectives, grid, strict=True)):
         _dots(axes, trials, best, lambda trial: float(trial.number), place)
@@ -95,7 +95,7 @@ def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended],
 def draw_pareto(
     title: str, objectives: Sequence[str], trials: Sequence[Ended], front: Sequence[Ended], best: Ended
 ) -> Figure:
-    """Return each further objective over the first, a dot a trial; the Pareto front is joined."""
+    """Draw the other objectives over the first, with the Pareto front."""
     figure, grid = axes_grid(len(objectives) - 1, 1, TOP_IN, row_in=3.6, share=False)
     joined = sorted(front, key=lambda trial: trial.values)
     for place, (objective, (axes,)) in enumerate(zip(objectives[1:], grid, strict=True), start=1):
@@ -118,7 +118,7 @@ def draw_pareto(
 def _dots(
     axes: Axes, trials: Sequence[Ended], best: Ended, along: Any, place: int, front: Sequence[Ended] | None = None
 ) -> None:
-    """Draw an objective of each trial; pruned ones are grey, those of the front, if there is one, are blue."""
+    """Draw an objective of each trial: pruned or dominated ones grey, others blue."""
     first = trials[0]
     strong = [trial for trial in trials if not trial.pruned and (front is None or trial in front)]
     weak = [trial for trial in trials if trial not in strong]
@@ -134,7 +134,7 @@ def _dots(
 
 
 def _scale_by_ratios(axes: Axes) -> None:
-    """Have an even axis for even ratios, with few plain numbers."""
+    """Use a logarithmic axis with few plain numbers."""
     axes.set_xscale("log")
     low, high = axes.get_xlim()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < _MANY_DECADES * low else (1.0,)))

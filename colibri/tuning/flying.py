@@ -1,4 +1,4 @@
-"""A trial flown: step by step, some seeds each, until its end or until it is clearly worse than the best."""
+"""Fly a trial in steps of some seeds, until its end or until it is clearly worse than the best."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,11 +21,11 @@ _WORST, _EACH = "worst", "each"
 
 
 class Scale(NamedTuple):
-    """What the flights with the profile as it is say about all others.
+    """Reference values from the original profile's flights.
 
     Attributes:
-        worst: What a lost flight counts, for each objective.
-        each: What each flight counts, step by step, for each objective.
+        worst: Value of a lost flight, for each objective.
+        each: Value of each flight in order, for each objective.
     """
 
     worst: tuple[float, ...]
@@ -33,35 +33,33 @@ class Scale(NamedTuple):
 
 
 class Flights:
-    """Flights by an engine whose workers stay from one trial to the next."""
+    """Flies with an engine whose workers are kept between trials.
+
+    It is also the iterator from which the engine takes its jobs.
+    """
 
     def __init__(self, engine: Engine, common: Common) -> None:
-        """Fly by `engine`; the factors of each flight hold beside what is in `common`."""
         self._left: deque[Point] = deque()
         self._flown = fly_points(self, common, engine)
 
     def fly(self, points: Sequence[Point]) -> list[Flown]:
-        """Return what comes of flights, in their order."""
         self._left.extend(points)
         found = {flown.flight: flown for flown in islice(self._flown, len(points))}
         return [found[point.flight] for point in points]
 
     def __iter__(self) -> Self:
-        """Be what an engine takes its jobs from, again and again: more come when what it was given has ended."""
         return self
 
     def __next__(self) -> Point:
-        """Return the next flight; none is left until more are to be flown."""
+        """Return the next flight; more may follow after StopIteration."""
         if not self._left:
             raise StopIteration
         return self._left.popleft()
 
     def __enter__(self) -> Self:
-        """Begin."""
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """End the workers."""
         self._flown.close()
 
 
@@ -76,15 +74,8 @@ def fly_trial(
     """Fly a trial.
 
     Args:
-        tuning: What it is a trial of.
-        begun: The trial.
-        flights: Fly it.
-        scale: By the profile as it is; None where the trial is that.
-        best: The least value of a trial until now; one that is pruned is no better.
-        progress: Is given each flight.
-
-    Raises:
-        TuningError: The profile as it is cannot be measured.
+        scale: Reference of the original profile, whose own trial has none.
+        best: Least value so far; a pruned trial counts at least that.
     """
     factors = tuning.flown(begun.params)
     flown: list[Flown] = []
@@ -107,11 +98,7 @@ def fly_trial(
 
 
 def scale_of(tuning: "Tuning", flown: Sequence[Flown]) -> Scale:
-    """Return the scale by flights with the profile as it is.
-
-    Raises:
-        TuningError: They cannot be measured.
-    """
+    """Return the reference values; TuningError if the flights are refused or have no metric."""
     refused = next((each for each in flown if each.verdict is Verdict.REFUSED), None)
     if refused is not None:
         raise TuningError(refused.why)
@@ -120,12 +107,10 @@ def scale_of(tuning: "Tuning", flown: Sequence[Flown]) -> Scale:
 
 
 def scale_kept(first: Ended) -> Scale:
-    """Return the scale that was kept with the first trial."""
     return Scale(tuple(first.attributes[_WORST]), tuple(map(tuple, first.attributes[_EACH])))
 
 
 def _counts(tuning: "Tuning", flown: Sequence[Flown], worst: Sequence[float]) -> list[Array]:
-    """Return what each flight counts for each objective."""
     metrics = tuning.campaign.metrics
     return [
         objective.of_flights(flown, metrics, at_most)
@@ -134,7 +119,7 @@ def _counts(tuning: "Tuning", flown: Sequence[Flown], worst: Sequence[float]) ->
 
 
 def _is_pruned(tuning: "Tuning", begun: Begun, counts: Array, new: int) -> bool:
-    """Tell Optuna of the last flights; return whether the trial is clearly worse than the best, and not at its end."""
+    """Report the last flights to Optuna; return whether to end the trial early."""
     if not tuning.prune_after:
         return False
     for place in range(len(counts) - new, len(counts)):
@@ -143,7 +128,7 @@ def _is_pruned(tuning: "Tuning", begun: Begun, counts: Array, new: int) -> bool:
 
 
 def _expected(tuning: "Tuning", counts: Array, scale: Scale) -> float:
-    """Return what a trial would have come to by all seeds, if it kept its ratio to the profile as it is."""
+    """Extrapolate to all seeds by the ratio to the original profile."""
     (objective,) = tuning.objectives
     whole = np.array(scale.each[0])
     pooled, same = objective.pooled(counts), objective.pooled(whole[: len(counts)])

@@ -1,4 +1,4 @@
-"""What is to become small: metrics of flights, pooled over all of a trial; lost flights count."""
+"""Objectives: metrics pooled over a trial's flights; lost flights count."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,19 +14,13 @@ from colibri.tuning.space import TuningError
 
 SHARE_LOST = "share_lost"
 LOST_COUNTS = 10.0
-"""A lost flight counts as so many times the largest of the flights with the profile as it is."""
+"""A lost flight counts this many times the largest value with the original profile."""
 _POOLINGS = ("mean", "rms", "median", "largest")
 _NOT_SMALL = ("lost_at_s",)
 
 
 class Objective(NamedTuple):
-    """A metric, and how it is pooled over flights; the smaller, the better.
-
-    Attributes:
-        metric: Its name, or `share_lost`.
-        quantile: The part of flights that are not worse; None for another pooling.
-        pooling: What that is called.
-    """
+    """A metric to minimize, and its pooling over flights; `metric` may be `share_lost`."""
 
     metric: str
     pooling: str = "mean"
@@ -34,23 +28,23 @@ class Objective(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What tables and figures call it."""
+        """Name in tables and figures."""
         if self.metric == SHARE_LOST:
             return SHARE_LOST
         return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
 
     def of_flights(self, flown: Sequence[Flown], metrics: Sequence[Metric], worst: float) -> Array:
-        """Return what each flight counts, (n,): at most `worst`, and that where it was lost or has no such metric."""
+        """Return the value of each flight, (n,): at most `worst`, which also stands for lost and missing ones."""
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
         return np.array([min(_known(each, place, worst), worst) for each in flown])
 
     def worst(self, flown: Sequence[Flown], metrics: Sequence[Metric]) -> float:
-        """Return what a lost flight counts, by the flights with the profile as it is.
+        """Return the value of a lost flight, from the original profile's flights.
 
         Raises:
-            TuningError: None of them came through, or one that did has no such metric, or one below zero.
+            TuningError: All of them were lost, or a metric is missing or negative.
         """
         if self.metric == SHARE_LOST:
             return 1.0
@@ -66,7 +60,6 @@ class Objective(NamedTuple):
         return LOST_COUNTS * (max(values) or 1.0)
 
     def pooled(self, values: Array, axis: int = -1) -> Any:
-        """Return one number of many flights along an axis."""
         if self.quantile is not None:
             return np.quantile(values, self.quantile, axis=axis)
         if self.pooling == "rms":
@@ -81,11 +74,7 @@ def _known(flown: Flown, place: int, otherwise: float) -> float:
 
 
 def read_objectives(given: Mapping[str, Any], metrics: Sequence[Metric]) -> tuple[Objective, ...]:
-    """Return the objectives of a tuning, `{ rmse_m = "mean" }` say; `metrics` has those of one's own.
-
-    Raises:
-        TuningError: There is no such metric, or no such pooling.
-    """
+    """Read objectives such as `{ rmse_m = "mean" }`; `metrics` adds user-defined ones."""
     if not given:
         raise TuningError('objectives: say what is to become small, rmse_after_20s_m = "mean" say')
     return tuple(_objective(name, pooling, metrics) for name, pooling in given.items())
@@ -112,7 +101,7 @@ def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
 
 
 def metrics_of(objectives: Sequence[Objective], metrics: Sequence[Metric]) -> tuple[Metric, ...]:
-    """Return what is kept of each flight: what the objectives need, then the other `metrics`."""
+    """Return the metrics to keep: those of objectives first."""
     names = {metric.name: metric for metric in metrics}
     needed = [each.metric for each in objectives if each.metric != SHARE_LOST]
     found = {name: names.get(name) or read_metrics([name])[0] for name in needed}

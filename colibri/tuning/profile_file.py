@@ -1,4 +1,4 @@
-"""The file of a tuned profile: that of the profile it was made of, comments and all, with other numbers."""
+"""The file of a tuned profile: the original's file, comments included, with new numbers."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,14 +11,13 @@ from colibri.common.config import value_at
 
 
 def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Sequence[str], origin: Sequence[str]) -> str:
-    """Return the file of a tuned profile, which is read back as just that.
+    """Return the file of a tuned profile, verified by reading it back.
 
     Args:
-        base: The profile as it was.
-        text: Its file; None for one that has none.
-        tuned: The profile with other numbers.
-        factors: Which of them are others.
-        origin: Where it comes from, in lines of a comment.
+        base: The original profile.
+        text: Its file, if it has one.
+        factors: Names of the tuned numbers.
+        origin: Lines of the comment at the top.
     """
     import tomlkit
 
@@ -43,12 +42,11 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
 
 
 def tuned_name(base: Profile) -> str:
-    """Return what a tuned profile is called."""
     return f"{base.name.rstrip('*')}-tuned"
 
 
 def _set(document: Any, key: str, value: Any) -> None:
-    """Set what a document has at a dotted key, as `Profile.replace` has them."""
+    """Set a value at a dotted key, as in `Profile.replace`."""
     *above, last = key.split(".")
     parent = document
     for name in above:
@@ -57,18 +55,17 @@ def _set(document: Any, key: str, value: Any) -> None:
 
 
 def _tables(profile: Profile) -> Mapping[str, Any]:
-    """Return what a profile's file would have."""
+    """Return a profile as the tables of its file."""
     plain = msgspec.to_builtins(profile)
     return {key: _given(plain[key]) for key in ProfileTables.__struct_fields__ if plain[key] is not None}
 
 
 def _given(value: Any) -> Any:
-    """Return a table without what is None, which TOML does not have."""
+    """Remove `None`, which TOML does not have."""
     return {key: _given(each) for key, each in value.items() if each is not None} if isinstance(value, dict) else value
 
 
 def _check(written: str, tuned: Profile, name: str) -> None:
-    """Check that what is written is what was flown."""
     expected = msgspec.convert({**_tables(tuned), "name": name}, type=ProfileTables)
     if msgspec.toml.decode(written, type=ProfileTables) != expected:
         raise AssertionError("the profile that was written is not the one that was flown")

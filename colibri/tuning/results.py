@@ -1,4 +1,4 @@
-"""What came of a tuning: its trials, the profile, what that is worth, and the folder that has them."""
+"""The results of a tuning: trials, profile, comparison, and folder."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -22,23 +22,21 @@ PROFILE = "profile.toml"
 
 
 class TuningResults:
-    """What came of a tuning, as `colibri.tune` returns it.
+    """The results of a tuning.
 
     Attributes:
-        tuning: What was tuned.
-        trials: That have ended, by their numbers; the first is the profile as it is.
-        best: Of them the chosen one: with the least objective; of several objectives, on their Pareto front the
-            nearest to the least of each, in parts of the front's ranges.
-        front: Those that no other beats in one objective without being worse in another.
-        importances: For each objective, by its name, how much each number matters for being among the best trials, as
-            parts of one (PED-ANOVA); empty below eight trials.
-        profile: The tuned one.
-        checked: Both profiles' flights by seeds that tuning never saw; None where there are none.
-        verdict: What they came to, before and after; empty where there are none.
+        tuning: The tuning.
+        trials: Finished trials by number; the first is the original profile.
+        best: Trial with the least objective; with several, the one on the Pareto front nearest to the least of each,
+            relative to the front's ranges.
+        front: Trials that are not dominated.
+        importances: Importance of each number by objective, as fractions of one (PED-ANOVA); empty below eight trials.
+        profile: The tuned profile.
+        checked: Flights of both profiles with `check_seeds`, if there are any.
+        verdict: Comparison of both; empty without them.
     """
 
     def __init__(self, tuning: Tuning, trials: Sequence[Ended], importances: Sequence[dict[str, float]]) -> None:
-        """Choose among the trials of a tuning."""
         self.tuning = tuning
         self.trials = list(trials)
         names = [objective.name for objective in tuning.objectives]
@@ -50,22 +48,22 @@ class TuningResults:
         self.verdict: list[Compared] = []
 
     def add_check(self, checked: CampaignResults) -> None:
-        """Add the flights by seeds that tuning never saw."""
+        """Add the flights with `check_seeds`."""
         self.checked = checked
         self.verdict = compare(self.tuning, checked)
 
     @property
     def is_better(self) -> bool:
-        """Whether one objective is better with 95 % confidence by seeds that tuning never saw, and none is worse."""
+        """Whether one objective is better with 95 % confidence on `check_seeds`, and no other is worse."""
         return better(self.verdict)
 
     @property
     def profile_text(self) -> str:
-        """The file of the tuned profile, which says where it comes from."""
+        """The file of the tuned profile, with its origin as a comment."""
         return self.file_of(self.best)
 
     def file_of(self, trial: Ended) -> str:
-        """Return the file of the profile of a trial."""
+        """Return the file of a trial's profile."""
         from importlib.metadata import version
 
         tuning, first = self.tuning, self.trials[0]
@@ -84,12 +82,12 @@ class TuningResults:
 
     @property
     def headings(self) -> Row:
-        """Names of the columns of the table of trials."""
+        """Column names of `rows`."""
         objectives = (objective.name for objective in self.tuning.objectives)
         return ("trial", "state", "flights", "lost", *objectives, *self.tuning.space)
 
     def rows(self) -> list[Row]:
-        """Return the table of trials: chosen, on the Pareto front, pruned or flown; numbers with ten digits."""
+        """Return the table of trials: chosen, front, pruned or flown; numbers with ten digits."""
         return [
             (
                 str(trial.number),
@@ -106,7 +104,7 @@ class TuningResults:
         """Return a figure: history, slices, with eight trials importance, with several objectives pareto.
 
         Raises:
-            TuningError: There is none of that name.
+            TuningError: The name is unknown.
         """
         figures = self._figures()
         if what not in figures:
@@ -114,7 +112,7 @@ class TuningResults:
         return figures[what]()
 
     def save(self, folder: str | Path) -> Path:
-        """Write profile, tables and figures into a folder, and return it."""
+        """Write profile, tables and figures; return the folder."""
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)
         (path / PROFILE).write_text(self.profile_text, encoding="utf-8")
@@ -159,7 +157,7 @@ class TuningResults:
 
 
 def _front(trials: Sequence[Ended]) -> list[Ended]:
-    """Return those trials that no other beats; of equal ones the first."""
+    """Return the trials that are not dominated; of equal ones the first."""
     front: list[Ended] = []
     for trial in sorted(trials, key=lambda trial: (trial.values, trial.number)):
         if not any(all(a <= b for a, b in zip(other.values, trial.values, strict=True)) for other in front):
@@ -168,7 +166,7 @@ def _front(trials: Sequence[Ended]) -> list[Ended]:
 
 
 def _chosen(front: Sequence[Ended]) -> Ended:
-    """Return that of a front which is nearest to the least of each objective, in parts of the front's ranges."""
+    """Return the trial nearest to the least of each objective, relative to the front's ranges."""
     least = [min(values) for values in zip(*(trial.values for trial in front), strict=True)]
     most = [max(values) for values in zip(*(trial.values for trial in front), strict=True)]
 

@@ -1,4 +1,4 @@
-"""`colibri.tune`: trial by trial, alone or beside other processes, then the verdict by seeds that tuning never saw."""
+"""`colibri.tune`: fly trials, alone or beside other processes, then compare on other seeds."""
 
 from collections.abc import Callable
 from importlib.metadata import version
@@ -27,19 +27,19 @@ IDENTITY = "tuning.json"
 
 
 class Watcher:
-    """What is told how far a tuning is; nothing is done with it here."""
+    """Progress callbacks of a tuning; each does nothing by default."""
 
     def began(self, trials: int) -> None:
-        """So many trials there shall be."""
+        """Start with this number of trials to do."""
 
     def flown(self, flown: Flown) -> None:
-        """A flight has ended."""
+        """Count a finished flight."""
 
     def ended(self, trials: int, first: float, best: float) -> None:
-        """So many trials have ended; the first objective with the profile as it is, and its least until now."""
+        """Update the finished trials; `first` and `best` are the first objective of the original and its minimum."""
 
     def checking(self, flights: int) -> None:
-        """All trials have ended, and so many flights are flown by seeds that they never saw."""
+        """Start the comparison, with this number of flights."""
 
 
 def tune(
@@ -52,22 +52,22 @@ def tune(
     watcher: Watcher | None = None,
     **tables: Any,
 ) -> TuningResults:
-    """Tune numbers of a profile and return what came of it.
+    """Tune numbers of a profile.
 
     Args:
-        file: TOML file of the tuning; keywords take precedence over what is in it.
-        out: Folder for profile, tables, figures, and what it takes to go on; None: nothing is written.
-        workers: Processes; None: one a core. From a script, call this under `if __name__ == "__main__":`, for they
-            load the script, too.
-        executor: In their place, a `distributed.Client` or the address of a scheduler of Dask.
-        resume: Go on with what `out` has of this tuning, or join the processes that are at it.
-        watcher: Is told how far it is.
+        file: TOML file of the tuning; keywords take precedence.
+        out: Folder for profile, tables, figures and journal; by default no files are written.
+        workers: Processes; default one per core. In a script, call this under `if __name__ == "__main__":`, as each
+            process imports the script.
+        executor: A `distributed.Client` or the address of a Dask scheduler, instead of processes.
+        resume: Continue the tuning in `out`, or join running processes.
+        watcher: Progress callbacks.
         tables: As in the file: `tune={"controllers.LAW.KEY": {"uniform": [2, 20]}}, objectives={"rmse_m": "mean"},
             fly={...}, grid={...}, draw={...}, seeds="1-8", check_seeds="101-150"`, `trials`, `prune_after`, `metrics`,
-            `name`, `root_seed`. Values may be what `colibri.fly` takes; metrics may be functions of a `Flight`.
+            `name`, `root_seed`. Values may be objects, as in `colibri.fly`; metrics may be functions of a `Flight`.
 
     Raises:
-        Error: What the command line would say in one line.
+        Error: An input is invalid.
     """
     require_optuna()
     tuning = tuning_of(tables_of(TuningTables, file, tables))
@@ -88,11 +88,7 @@ def fly_tuning(
     watcher: Watcher | None = None,
     keep: bool = True,
 ) -> TuningResults:
-    """Fly those trials of a tuning that `out` does not have yet, and write what came of it; see `tune`.
-
-    Raises:
-        Error: It cannot be flown, or `out` has something else.
-    """
+    """Fly the trials missing in `out`, and write the results unless `keep` is off."""
     told = watcher or Watcher()
     first_engine = engine()
     _open(out, tuning, resume=resume)
@@ -110,7 +106,6 @@ def fly_tuning(
 
 
 def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -> None:
-    """Fly until all trials have ended."""
     told.began(tuning.trials)
     with Flights(engine, tuning.common) as flights:
         while (begun := trials.ask()) is not None:
@@ -123,7 +118,7 @@ def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -
 
 
 def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, told: Watcher) -> CampaignResults:
-    """Fly the profile as it is, and the tuned one, by seeds that tuning never saw; go on with what there is of that."""
+    """Fly both profiles with `check_seeds`, continuing earlier flights."""
     after = msgspec.structs.replace(results.profile, name=tuned_name(tuning.base))
     campaign = check_campaign(tuning, tuning.base, after)
     told.checking(campaign.flights)
@@ -132,11 +127,7 @@ def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, to
 
 
 def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
-    """Make `out` the folder of this tuning, or go on with it.
-
-    Raises:
-        TuningError: It has something else, or is not to go on.
-    """
+    """Claim `out` for this tuning; TuningError if it has other contents or may not be resumed."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with FileLock(out):
@@ -148,7 +139,7 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
 
 
 def _identity(tuning: Tuning) -> dict[str, Any]:
-    """Return in plain data which tuning it is; it may go on with more trials."""
+    """Return all inputs except the number of trials, which may grow."""
     return {
         **identity_of(tuning.campaign, tuning.common),
         "optuna": version("optuna"),

@@ -1,4 +1,4 @@
-"""Which values of a number are tried: ranges, evenly or by their logarithm, integers, choices."""
+"""Ranges of tuned numbers: uniform, log-uniform, integers, choices."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
@@ -11,18 +11,17 @@ _DIGITS = 4
 
 
 class TuningError(Error):
-    """A tuning that cannot be done; the message names the key."""
+    """A tuning is invalid; the message names the key."""
 
 
 class Integers(NamedTuple):
-    """Whole numbers from `low` to `high`, both included."""
+    """Integers from `low` to `high`, inclusive."""
 
     low: int
     high: int
 
     @property
     def typical(self) -> tuple[int, ...]:
-        """The ends."""
         return self
 
 
@@ -30,11 +29,7 @@ Range: TypeAlias = Uniform | LogUniform | Integers | Choice
 
 
 def read_range(key: str, given: Any) -> Range:
-    """Return the range that a tuning has for a number, `{ log-uniform = [2, 20] }` say.
-
-    Raises:
-        Error: It is none.
-    """
+    """Read a range such as `{ log-uniform = [2, 20] }`."""
     kind = next(iter(given)) if isinstance(given, dict) and len(given) == 1 else None
     if kind not in _KINDS:
         raise TuningError(f"{key}: expected one of {', '.join(_KINDS)}, as in {{ uniform = [2, 20] }}, not {given}")
@@ -54,11 +49,7 @@ def read_range(key: str, given: Any) -> Range:
 
 
 def check_holds(key: str, values: Range, value: Any) -> None:
-    """Check that a profile's own value, where tuning begins, is in its range.
-
-    Raises:
-        TuningError: It is not.
-    """
+    """Check that the original value, where tuning starts, is within its range."""
     if isinstance(values, Choice):
         if value not in values.values:
             raise TuningError(
@@ -72,7 +63,7 @@ def check_holds(key: str, values: Range, value: Any) -> None:
 
 
 def distribution(values: Range) -> Any:
-    """Return a range as Optuna has it; choices by the names that tables have."""
+    """Convert a range for Optuna; choices by their names in tables."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
     if isinstance(values, Choice):
@@ -83,19 +74,17 @@ def distribution(values: Range) -> Any:
 
 
 def as_tried(values: Range, value: Any) -> Any:
-    """Return a value of Optuna's as it is tried: a number with four digits, that one may read and write."""
+    """Round a value from Optuna to four digits, for people to read and write."""
     if not isinstance(values, Uniform | LogUniform):
         return value
     return min(max(float(f"{value:.{_DIGITS}g}"), values.low), values.high)
 
 
 def as_optuna(values: Range, value: Any) -> Any:
-    """Return a profile's value as Optuna has it."""
     return shown(value) if isinstance(values, Choice) else value
 
 
 def as_flown(values: Range, value: Any) -> Any:
-    """Return what a profile has for a value that was tried."""
     if isinstance(values, Choice):
         return next(each for each in values.values if shown(each) == value)
     return value

@@ -1,4 +1,4 @@
-"""The trials of a tuning: Optuna's, in a journal that several processes write to and that outlives each of them."""
+"""The trials of a tuning: an Optuna study in a journal that several processes share."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,21 +23,16 @@ JOURNAL, _LOCKS = "trials.log", "locks"
 _NUMBER, _PROCESS, _FLIGHTS, _LOST, _PRUNED = "number", "process", "flights", "lost", "pruned"
 _POLL_S = 0.2
 _MAX_P = 0.05
-"""A trial ends early where it is worse than the best with less than this chance of that being chance."""
+"""A trial is pruned if it is worse than the best at this significance level."""
 _BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
 class Ended(NamedTuple):
-    """A trial that has ended.
+    """A finished trial; number 0 is the original profile.
 
     Attributes:
-        number: Its place; 0 is the profile as it is.
-        values: Of the objectives; of a pruned trial what they would probably have been.
-        params: What was tried.
-        flights: How many it flew.
-        lost: How many of them were lost.
-        pruned: Whether it ended early.
-        attributes: What else was kept.
+        values: Objectives; extrapolated if pruned.
+        lost: Number of flights lost.
     """
 
     number: int
@@ -50,7 +45,7 @@ class Ended(NamedTuple):
 
 
 class Begun(NamedTuple):
-    """A trial to be flown: its number, what is tried, and Optuna's part of it."""
+    """A trial to fly."""
 
     number: int
     params: dict[str, Any]
@@ -58,19 +53,14 @@ class Begun(NamedTuple):
 
 
 class Trials:
-    """The trials of a tuning in a folder, shared by all processes that are at it.
+    """The trials of a tuning in a folder, shared by several processes.
 
-    A process has a place, by a lock that ends with it, so that the others know which trials nobody flies any more. What
-    the next trial tries follows from the trials that have ended, its number and the root seed: a process that goes on
-    after another's end goes on as that would have.
+    Each process holds a lock that ends with it, so that others repeat its unfinished trials. The values of a trial
+    depend only on the trials finished before, its number and the root seed: a resumed tuning continues as it would
+    have.
     """
 
     def __init__(self, folder: Path, tuning: "Tuning") -> None:
-        """Go on with the trials in `folder`, or begin.
-
-        Raises:
-            TuningError: Optuna is not installed.
-        """
         optuna = require_optuna()
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._tuning = tuning
@@ -91,17 +81,15 @@ class Trials:
             )
 
     def __enter__(self) -> Self:
-        """Begin."""
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Leave: what this process has begun and not ended, another does again."""
         self._held.release()
 
     def ask(self) -> Begun | None:
-        """Return the next trial; None when all have ended.
+        """Begin the next trial; `None` when all have ended.
 
-        It waits for the end of the first, which everything is measured by, and of those that others fly: they may die.
+        It waits for the first trial, the reference of all, and for those of other processes, which may die.
         """
         while True:
             with self._asking:
@@ -115,7 +103,6 @@ class Trials:
             sleep(_POLL_S)
 
     def tell(self, begun: Begun, ended: Ended) -> None:
-        """Keep the end of a trial."""
         kept = {_FLIGHTS: ended.flights, _LOST: ended.lost, _PRUNED: ended.pruned, **ended.attributes}
         for name, value in kept.items():
             begun.trial.set_user_attr(name, value)
@@ -123,14 +110,13 @@ class Trials:
 
     @property
     def ended(self) -> list[Ended]:
-        """The trials that have ended, by their numbers."""
         return [_ended(trial) for trial in self._trials() if trial.state.is_finished()]
 
     def importances(self) -> list[dict[str, float]]:
-        """Return for each objective how much each number matters for being among the best trials, as parts of one.
+        """Return the importance of each number for being among the best quarter of trials, by objective.
 
         S. Watanabe, A. Bansal, F. Hutter, PED-ANOVA: Efficiently Quantifying Hyperparameter Importance in Arbitrary
-        Subspaces, IJCAI 2023. Of the quarter of best trials, for a tenth of them would be too few.
+        Subspaces, IJCAI 2023. A tenth, their default, would be too few trials.
         """
         from optuna.importance import PedAnovaImportanceEvaluator, get_param_importances
 
@@ -146,14 +132,14 @@ class Trials:
         return found
 
     def _take_place(self) -> tuple[int, FileLock]:
-        """Return the first place that no living process has, and the lock that keeps it."""
+        """Return the first free place of a process and its lock."""
         place = 0
         while not (lock := FileLock(self._folder / f"process-{place}")).acquire(wait=False):
             place += 1
         return place, lock
 
     def _trials(self) -> list["FrozenTrial"]:
-        """Return the trials that have ended, or will, by their numbers."""
+        """Return finished and running trials by number."""
         from optuna.trial import TrialState
 
         states = (TrialState.COMPLETE, TrialState.RUNNING)
@@ -161,7 +147,7 @@ class Trials:
         return sorted(trials, key=lambda trial: int(trial.user_attrs[_NUMBER]))
 
     def _give_up_abandoned(self) -> None:
-        """Have those trials fail that no living process flies."""
+        """Mark trials whose process has died as failed."""
         from optuna.trial import TrialState
 
         for trial in self._study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
@@ -177,7 +163,7 @@ class Trials:
             lock.release()
 
     def _begin(self, trials: Sequence["FrozenTrial"]) -> Begun:
-        """Begin the trial with the least number that there is not yet."""
+        """Begin the first missing trial."""
         from optuna.trial import TrialState
 
         taken = {int(trial.user_attrs[_NUMBER]) for trial in trials}
@@ -190,7 +176,7 @@ class Trials:
         return Begun(int(trial.user_attrs[_NUMBER]), trial.params, trial)
 
     def _next(self, trials: Sequence["FrozenTrial"], number: int) -> dict[str, Any]:
-        """Return what a trial tries, from nothing but those before it, its number and the root seed."""
+        """Sample the values of a trial."""
         from optuna.samplers import TPESampler
 
         root = self._tuning.campaign.root_seed
@@ -201,7 +187,7 @@ class Trials:
         return {name: as_tried(values, params[name]) for name, values in self._tuning.space.items()}
 
     def _study_of(self, ended: Sequence["FrozenTrial"], objectives: Sequence[int], sampler: Any = None) -> "Study":
-        """Return a study in memory that has these trials, and of their objectives those at some places."""
+        """Copy trials, with some of their objectives, into a study in memory."""
         import optuna
 
         study = optuna.create_study(directions=["minimize"] * len(objectives), sampler=sampler)
@@ -212,11 +198,7 @@ class Trials:
 
 
 def require_optuna() -> Any:
-    """Return Optuna, and have tomlkit at hand.
-
-    Raises:
-        TuningError: One of them is not installed.
-    """
+    """Import Optuna and check for tomlkit; TuningError if one is missing."""
     try:
         import optuna
         import tomlkit  # noqa: F401
@@ -227,7 +209,7 @@ def require_optuna() -> Any:
 
 @contextmanager
 def _unwarned() -> Iterator[None]:
-    """Use what Optuna calls experimental."""
+    """Silence Optuna's warnings of experimental features."""
     from optuna.exceptions import ExperimentalWarning
 
     with catch_warnings():

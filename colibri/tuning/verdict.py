@@ -1,4 +1,4 @@
-"""What a tuned profile is worth: flown beside the one it was made of, by seeds that tuning never saw, in pairs."""
+"""Compare a tuned profile with its original on other seeds, in pairs."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,27 +20,23 @@ if TYPE_CHECKING:
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
 ALL = "all"
-"""Combinations of the grid."""
+"""All combinations of the grid."""
 _RESAMPLES = 10_000
 _CONFIDENCE = (0.025, 0.975)
 _STREAM = 1
-"""Of the seed 0: what the bootstrap resamples by."""
+"""Random stream of the bootstrap."""
 
 
 class Compared(NamedTuple):
-    """One number before and after, over the flights of all combinations or of one.
+    """One number before and after, for one combination or all.
 
     Attributes:
-        what: The objective, or a metric that was kept beside them.
-        where: The combination; `all` for all.
-        seeds: How many.
-        before: With the profile as it is.
-        after: With the tuned one.
-        change: In parts of `before`; of a share, or where that is zero by some of the resampled seeds, the difference.
-        low: Between this and `high` the change lies with 95 % confidence: bootstrap over seeds, in pairs.
-        high: See there.
-        is_relative: Whether `change` is in parts.
-        is_objective: Whether it was tuned for.
+        what: Objective or metric.
+        where: The combination, or `all`.
+        before: With the original profile.
+        after: With the tuned profile.
+        change: Relative to `before`; absolute for a share, or if a resampled `before` is zero.
+        low, high: Bounds at 95 % confidence: bootstrap over seeds, in pairs.
     """
 
     what: str
@@ -56,12 +52,11 @@ class Compared(NamedTuple):
 
     @property
     def is_overall(self) -> bool:
-        """Whether it is over the flights of all combinations."""
         return self.where == ALL
 
     @property
     def changes(self) -> Row:
-        """The change and its interval, in words: in percent, but for the difference of what is no share."""
+        """The change and its interval as texts, in percent if relative or a share."""
         percent = self.is_relative or self.what == SHARE_LOST
         numbers = (self.change, self.low, self.high)
         change, low, high = (f"{100.0 * x:+.1f} %" if percent else f"{x:+.4g}" for x in numbers)
@@ -69,13 +64,13 @@ class Compared(NamedTuple):
 
     @property
     def row(self) -> Row:
-        """Itself as a row of a table."""
+        """The row of a table."""
         numbers = (self.before, self.after, self.change, self.low, self.high)
         return (self.what, self.where, str(self.seeds), *(f"{number:.6g}" for number in numbers))
 
 
 def check_campaign(tuning: "Tuning", before: "Profile", after: "Profile") -> Campaign:
-    """Return the campaign in which both profiles fly the same by seeds, and draws, that tuning never saw."""
+    """Return the campaign that flies both profiles with `check_seeds` and other draws."""
     campaign = tuning.campaign
     return campaign._replace(
         name=f"{campaign.name}: check",
@@ -88,7 +83,7 @@ def check_campaign(tuning: "Tuning", before: "Profile", after: "Profile") -> Cam
 
 
 def compare(tuning: "Tuning", table: FlightTable) -> list[Compared]:
-    """Return each objective, and each other metric, before and after."""
+    """Compare each objective and each other metric."""
     pairs = _Pairs(table)
     others = [metric.name for metric in table.campaign.metrics]
     wanted = {objective.metric for objective in tuning.objectives}
@@ -102,7 +97,6 @@ class _Pairs:
     """The flights of both profiles by combination and seed."""
 
     def __init__(self, table: FlightTable) -> None:
-        """Sort the flights of a check."""
         self._campaign = table.campaign
         self._seeds = len(table.campaign.seeds)
         combinations = table.campaign.combinations // 2
@@ -114,7 +108,7 @@ class _Pairs:
         self._names = [", ".join(shown(point.factors[name]) for name in several) for point in points]
 
     def compared(self, objective: Objective, *, is_objective: bool) -> Iterator[Compared]:
-        """Return one number over all combinations and, where there are several, over each; none where it is unknown."""
+        """Compare a number over all combinations and, if there are several, over each."""
         counts = self._counts(objective, penalised=is_objective)
         each = zip(self._names, np.moveaxis(counts, 1, 0), strict=True) if len(self._names) > 1 else ()
         for where, some in ((ALL, counts), *each):
@@ -122,9 +116,9 @@ class _Pairs:
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
     def _counts(self, objective: Objective, *, penalised: bool) -> Array:
-        """Return what each flight counts, (2, combinations, seeds).
+        """Return the value of each flight, (2, combinations, seeds).
 
-        Where it was not tuned for, flights that were lost or have no such metric are nan, and so are their pairs.
+        For a metric without penalty, lost flights and their pairs are nan.
         """
         metrics = self._campaign.metrics
         if penalised or objective.metric == SHARE_LOST:
@@ -148,7 +142,7 @@ def _value(flown: Flown, place: int) -> float:
 
 
 def _compared(objective: Objective, where: str, counts: Array, *, is_objective: bool) -> Compared:
-    """Compare what flights count, (2, combinations, seeds): as they are, then by resampled seeds."""
+    """Compare values, (2, combinations, seeds), and resample the seeds."""
     whole = np.moveaxis(counts, -1, 1)  # (2, seeds, combinations)
     seeds = whole.shape[1]
     chance = Generator(PCG64(SeedSequence(0, spawn_key=(_STREAM,))))
@@ -162,7 +156,7 @@ def _compared(objective: Objective, where: str, counts: Array, *, is_objective: 
 
 
 def _pooled(objective: Objective, counts: Array) -> Array:
-    """Return one number a row of flights, without those that are nan."""
+    """Pool each row, ignoring nan."""
     if not np.isnan(counts).any():
         pooled: Array = objective.pooled(counts)
         return pooled
@@ -170,6 +164,5 @@ def _pooled(objective: Objective, counts: Array) -> Array:
 
 
 def better(compared: Sequence[Compared]) -> bool:
-    """Tell whether one objective is better with 95 % confidence over all flights, and none is worse."""
     found = [each for each in compared if each.is_objective and each.is_overall]
     return any(each.high < 0.0 for each in found) and not any(each.low > 0.0 for each in found)

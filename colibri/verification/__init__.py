@@ -1,3 +1,3 @@
-"""Flights that must be the same bit for bit: twice, and as they once were, on every computer."""
+"""Flights that must be reproduced bit for bit: twice, and as recorded."""
 
 __all__: list[str] = []  # the command line's; nothing to import

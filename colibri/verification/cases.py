@@ -1,4 +1,4 @@
-"""Flights that are named once and flown again: by the options of `colibri fly`, or by what a ground station orders."""
+"""Named flights: by options of `colibri fly`, or by commands of a ground station."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,9 +23,8 @@ class Case(NamedTuple):
     """A flight along a track.
 
     Attributes:
-        name: What it is called.
-        options: Of `colibri fly`, by their names there.
-        waypoints: Contents of the file of track `waypoints`, whose other options then are `track`.
+        options: Those of `colibri fly`.
+        waypoints: Contents of the file of track `waypoints`.
     """
 
     name: str
@@ -33,18 +32,13 @@ class Case(NamedTuple):
     waypoints: str = ""
 
     def plan(self, out: Path, **more: Any) -> FlightPlan:
-        """Return the plan of the flight with its logs in `out`, and with `more` options."""
         options = dict(self.options)
         if self.waypoints:
             options["track"] = f"waypoints:{out / _WAYPOINTS_FILE}"
         return FlightPlan.of(FlightSpec.of(**(options | {"out": out} | more)))
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
-        """Fly over `link`, `udp` or `memory`, with the logs in `out`; return the hash of the trajectory.
-
-        Raises:
-            Error: It cannot begin, or does not end.
-        """
+        """Fly with the logs in `out`; return the hash of the trajectory."""
         prepare(out)
         if self.waypoints:
             _write(out / _WAYPOINTS_FILE, self.waypoints)
@@ -56,12 +50,10 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SitlCase:
-    """A flight that a ground station orders, as under `colibri sitl`.
+    """A flight commanded by a ground station, as under `colibri sitl`.
 
     Attributes:
-        name: What it is called.
-        orders: Orders it, and lets time pass.
-        setting: What it begins with: keys as of `colibri.sitl.backends.setting.Setting`.
+        setting: Keys of `colibri.sitl.backends.setting.Setting`.
     """
 
     name: str
@@ -69,11 +61,7 @@ class SitlCase:
     setting: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(self, out: Path, link: str) -> str:
-        """Fly over `link`, `udp` or `memory`, with the logs in `out`; return the hash of every truth and command.
-
-        Raises:
-            SitlError: It cannot begin, or does not end; or an order was refused, or not done in time.
-        """
+        """Fly with the logs in `out`; return the hash of all truth and commands."""
         from colibri.sitl.backends.launcher import launcher
         from colibri.sitl.session import Flights
 

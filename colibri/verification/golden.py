@@ -1,4 +1,4 @@
-"""`colibri verify --golden`: is every golden flight still the one that it was, on whatever computer?"""
+"""`colibri verify --golden`: compare the golden flights with their recorded hashes."""
 
 import argparse
 import json
@@ -16,7 +16,7 @@ from colibri.verification.cases import Case, SitlCase
 from colibri.verification.golden_flights import FLIGHTS
 
 FOUND = "golden.json"
-"""File in the folder of the logs: what each flight came to."""
+"""File of the results in the folder of the logs."""
 _SHOWN = 16
 _NO_HASH = "-"
 
@@ -24,14 +24,7 @@ _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class Outcome(NamedTuple):
-    """What came of a golden flight.
-
-    Attributes:
-        name: Of the flight.
-        sha256: Of what was flown; empty where the flight did not end.
-        wall_time_s: How long it took.
-        error: Why it did not end.
-    """
+    """The result of a golden flight; the hash is empty if it failed."""
 
     name: str
     sha256: str
@@ -40,10 +33,7 @@ class Outcome(NamedTuple):
 
 
 def verify_golden(args: argparse.Namespace) -> int:
-    """Fly the golden flights as the command line says; compare their hashes, or write them anew; return the exit code.
-
-    The logs of each flight, and `FOUND` with all hashes and times, are in `args.out`.
-    """
+    """Fly the golden flights; compare or renew their hashes; return the exit code."""
     if args.duration is not None:
         fail("--duration does not go with --golden: each golden flight has its own")
     path: Path = args.golden
@@ -69,7 +59,6 @@ def verify_golden(args: argparse.Namespace) -> int:
 
 
 def chosen(names: Sequence[str]) -> list[Case | SitlCase]:
-    """Return the flights of these names, in the set's order; without names all of them. Or end with one line."""
     flights = {flight.name: flight for flight in FLIGHTS}
     for name in names:
         if name not in flights:
@@ -78,7 +67,6 @@ def chosen(names: Sequence[str]) -> list[Case | SitlCase]:
 
 
 def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
-    """Fly a golden flight with its logs in `out`; one that does not end is an outcome, too."""
     began_s = perf_counter()
     try:
         sha256, error = flight.fly(out, link), ""
@@ -88,7 +76,6 @@ def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
 
 
 def read_hashes(path: Path) -> dict[str, str]:
-    """Return the hash of each flight that a file names, or end with one line."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, _Hash])
     except FileNotFoundError:
@@ -100,7 +87,7 @@ def read_hashes(path: Path) -> dict[str, str]:
 
 
 def _check_names(path: Path, known: Mapping[str, str]) -> None:
-    """See that a file names the flights of the set and no others, or end with one line."""
+    """Require the file to have the hash of each golden flight and no others."""
     names = {flight.name for flight in FLIGHTS}
     wrong = [f"names {name}, which is no golden flight" for name in sorted(known.keys() - names)]
     wrong += [f"has no hash of golden flight {name}" for name in sorted(names - known.keys())]
@@ -109,7 +96,7 @@ def _check_names(path: Path, known: Mapping[str, str]) -> None:
 
 
 def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[Outcome]) -> int:
-    """Write the hashes of what was flown, keep those of what was not, and print what changes."""
+    """Write the hashes flown, keep the others, and print the changes."""
     path: Path = args.golden
     lost = [outcome for outcome in outcomes if outcome.error]
     if lost:

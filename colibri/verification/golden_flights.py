@@ -1,7 +1,7 @@
-"""The golden flights: a fixed set that is sensitive on purpose, so that a single bit anywhere shows in some hash.
+"""The golden flights: a fixed set in which the difference of a single bit changes a hash.
 
-What saturates, tumbles or flies by noise makes a difference of one bit large within a second; what tracks well hides
-it, as the wire carries 32-bit floats. Both are here: the former find a difference, the latter say where it matters.
+Flights that saturate, tumble or use noisy sensors amplify one bit within a second; good tracking hides it, as the link
+carries 32-bit floats. Both are included: the former find a difference, the latter show where it matters.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ def _flown(name: str, track: str, duration: float, profile: str = "flight", **op
 
 
 def _mission(sitl: "Sitl") -> None:
-    """Take off, fly a corner at two speeds, come home and land."""
+    """Take off, fly a corner at two speeds, return and land."""
     corner = [
         mission_items.waypoint(8.0, 0.0, 4.0),
         mission_items.change_speed(8.0),
@@ -47,7 +47,7 @@ def _rotor_lost(sitl: "Sitl") -> None:
 
 
 def _rotor_lost_on_sensors(sitl: "Sitl") -> None:
-    """Lose a rotor soon after the take-off, and land on three."""
+    """Lose a rotor soon after take-off, and land on three."""
     sitl.takeoff(6.0, wait=False)
     sitl.wait_until(lambda: sitl.mode is Mode.HOLD and sitl.position[2] > 5.4, within=17.0, what="the climb")
     sitl.inject("motor", "off", 4)
@@ -63,7 +63,7 @@ def _restarted(sitl: "Sitl") -> None:
 
 
 def _sticks(sitl: "Sitl") -> None:
-    """Fly by hand: by attitude, by position, and home."""
+    """Fly manually: by attitude, by position, and return."""
     with sitl.sticks_held(pitch=0.7, roll=-0.4, thrust=0.6, yaw=0.3):
         sitl.run(0.2)
         sitl.select(Mode.STABILIZED)

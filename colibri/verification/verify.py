@@ -1,4 +1,4 @@
-"""`colibri verify`: a fixed set of flights, each flown twice, in memory, and replayed: is every bit the same?"""
+"""`colibri verify`: fly each case twice and in memory, and replay it; compare all bits."""
 
 import argparse
 from pathlib import Path
@@ -37,13 +37,11 @@ SEED = 7
 
 
 class Verdict(NamedTuple):
-    """What came of a case.
+    """The result of a case.
 
     Attributes:
-        name: Of the case.
         hashes: Of the trajectories: first, second, in memory.
-        commands: How many of the first were replayed.
-        replays: Whether each was what it was.
+        commands: Number of commands replayed.
     """
 
     name: str
@@ -53,12 +51,10 @@ class Verdict(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether every bit is."""
         return len(set(self.hashes)) == 1 and self.replays
 
 
 def verify(args: argparse.Namespace) -> int:
-    """Verify as the command line says; return the exit code."""
     if args.renew or args.only:
         fail(f"--{'renew' if args.renew else 'only'} goes with --golden alone")
     if args.duration is None:
@@ -88,7 +84,6 @@ def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
 
 
 def _flown(case: Case, out: Path, link: str, duration_s: float) -> str:
-    """Fly a case; return the hash of its trajectory."""
     return case.fly(out, link, duration=duration_s, seed=SEED)
 
 

@@ -1,4 +1,4 @@
-"""Flights and vehicles in a browser: scene and plots as plain data, of logs or of telemetry, and the page."""
+"""Show flights and live vehicles in a browser."""
 
 from typing import TYPE_CHECKING
 

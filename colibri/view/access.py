@@ -1,7 +1,7 @@
-"""Who may use the page: it is for this computer's browsers, from its own address; commands need the token as well.
+"""Access control of the page: browsers of this computer, from its own address; commands require a token.
 
-A page of another site can open connections to loopback, too: its browser then says so in `Origin`. A name of another
-site that is made to lead to loopback (DNS rebinding) shows in `Host`.
+Pages of other sites can open connections to loopback, with their address in `Origin`. A foreign name that resolves to
+loopback (DNS rebinding) shows in `Host`.
 """
 
 import secrets
@@ -14,27 +14,21 @@ _OURS = (HOST, "localhost")
 
 
 class Token(NamedTuple):
-    """What a browser has to know before it may command."""
+    """The secret that a browser needs for commands."""
 
     text: str
 
     @classmethod
     def new(cls) -> "Token":
-        """Return one that nobody can guess."""
         return cls(secrets.token_urlsafe(_TOKEN_BYTES))
 
     def matches(self, text: str) -> bool:
-        """Whether somebody knows it; how long that takes says nothing of how near a guess is."""
+        """Compare in constant time."""
         return secrets.compare_digest(self.text.encode(), text.strip().encode())
 
 
 def refusal(headers: Mapping[str, str], port: int) -> str | None:
-    """Return why a request for the page, or a connection of it, is refused; None where it is not.
-
-    Args:
-        headers: Of the request, by their names in any case as `websockets` has them.
-        port: Where the page is served.
-    """
+    """Return why to refuse a request or connection, or `None`; `port` is the page's."""
     if headers.get("Host") not in {f"{name}:{port}" for name in _OURS}:
         return "the page is served to this computer alone"
     origin = headers.get("Origin")

@@ -1,4 +1,4 @@
-"""From snapshots to what is drawn: segments, arrows, colours; pure functions of arrays."""
+"""Geometry of the scene: segments, arrows and colours, as pure functions of arrays."""
 
 from collections.abc import Sequence
 from math import cos, hypot, isfinite, isnan, pi, sin
@@ -20,15 +20,15 @@ _SCALE: tuple[tuple[float, Colour], ...] = (
     (1.0, (220, 40, 40)),
 )
 _MAX_ARROW = 3.0
-"""Length of the arrow of a rotor at its top speed, in radii of the rotor."""
+"""Length of a rotor's arrow at top speed, in radii of the rotor."""
 _TURNS_A_SECOND = 1.5
-"""Of a rotor at its top speed as it is drawn: a true one would seem to stand still or to turn backwards."""
+"""Displayed rate of a rotor at top speed; the true one would alias."""
 _EDGES = 4
-"""Upright lines of a zone that is a circle."""
+"""Upright lines of a circular zone."""
 
 
 def rotor_colour(part: float) -> Colour:
-    """Return the colour of a rotor's speed, a part of the largest: blue, green, yellow, red; grey where unknown."""
+    """Return the colour of a relative rotor speed: blue, green, yellow, red; grey if unknown."""
     if not isfinite(part):
         return IDLE_GREY
     levels, colours = zip(*_SCALE, strict=True)
@@ -37,7 +37,7 @@ def rotor_colour(part: float) -> Colour:
 
 
 def blade_angles(rotors: FourRotors, spins: FourRotors, before_rad: FourRotors, elapsed_s: float) -> FourRotors:
-    """Return by how much each rotor is turned as it is drawn, rad, `elapsed_s` after it was at `before_rad`."""
+    """Return the displayed angles of the rotors, rad."""
     full = 2.0 * pi * _TURNS_A_SECOND * elapsed_s
     a, b, c, d = (
         (angle + full * spin * (0.0 if isnan(part) else part)) % (2.0 * pi)
@@ -47,12 +47,12 @@ def blade_angles(rotors: FourRotors, spins: FourRotors, before_rad: FourRotors, 
 
 
 def about_up(angle_rad: float) -> Quaternion:
-    """Return the rotation about the z axis by an angle."""
+    """Return the rotation about the z axis."""
     return cos(angle_rad / 2.0), 0.0, 0.0, sin(angle_rad / 2.0)
 
 
 def thrust_arrows(airframe: Airframe, rotors: FourRotors, scale: float) -> Array:
-    """Return begin and end of each rotor's thrust, proportional to its squared speed; FLU, m times scale, (4, 2, 3)."""
+    """Return the ends of thrust arrows, proportional to squared speeds; FLU, m times scale, (4, 2, 3)."""
     arrows = np.zeros((len(airframe.rotors_m), 2, 3))
     arrows[:, :, :2] = scale * np.array(airframe.rotors_m)[:, None, :]
     lengths = np.nan_to_num(np.square(rotors)) * _MAX_ARROW * airframe.radius_m * scale
@@ -61,14 +61,14 @@ def thrust_arrows(airframe: Airframe, rotors: FourRotors, scale: float) -> Array
 
 
 def segments(points: Array) -> NDArray[np.float32]:
-    """Return what joins points (n, 3) in their order, (n - 1, 2, 3); points that are not numbers part it."""
+    """Join points (n, 3) by segments, (n - 1, 2, 3); non-finite points interrupt the line."""
     joined = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
     whole: NDArray[np.float32] = joined[np.isfinite(joined).all(axis=(1, 2))]
     return whole
 
 
 def thinned(points: Array, most: int) -> Array:
-    """Return at most `most` + 1 of points (n, 3), evenly, the last among them."""
+    """Return at most `most` + 1 of points (n, 3), evenly, including the last."""
     step = -(-len(points) // most) if len(points) > most else 1
     kept: Array = points[::-1][::step][::-1]
     return kept
@@ -84,7 +84,7 @@ def zone_segments(zone: Zone, bottom_m: float, top_m: float) -> NDArray[np.float
 
 
 def thinned_indices(corners: int) -> list[int]:
-    """Return at which corners upright edges stand: at each, or at four where the many make a circle."""
+    """Return the corners with upright edges: all, or four of a circle."""
     return list(range(corners)) if corners <= 3 * _EDGES else [corners * k // _EDGES for k in range(_EDGES)]
 
 
@@ -95,7 +95,7 @@ def circle(east_m: float, north_m: float, radius_m: float, corners: int = 48) ->
 
 
 def ground_point(origin: Vector, direction: Vector, ground_m: float) -> Vector | None:
-    """Return where a ray meets the ground; None where it looks up."""
+    """Return where a ray meets the ground, if it points down."""
     if direction[2] >= 0.0 or origin[2] <= ground_m:
         return None
     far = (ground_m - origin[2]) / direction[2]
@@ -103,7 +103,7 @@ def ground_point(origin: Vector, direction: Vector, ground_m: float) -> Vector |
 
 
 def bounds(points: Sequence[Array]) -> tuple[Vector, float]:
-    """Return the middle of the box around some points (n, 3) each, and half of its largest side; at least 2 m."""
+    """Return centre and half size of the bounding box of points (n, 3) each; at least 2 m."""
     known = [each[np.isfinite(each).all(axis=1)] for each in points]
     filled = [each for each in known if len(each)]
     if not filled:
@@ -115,20 +115,20 @@ def bounds(points: Sequence[Array]) -> tuple[Vector, float]:
 
 
 def outline(around: Surroundings) -> list[Array]:
-    """Return what has to be in sight of what stands still, points (n, 3) each."""
+    """Return the points that the camera must show, (n, 3) each."""
     marks = [*around.mission, *around.rally, Mark(around.home_enu_m, "home")]
     zones = [np.column_stack([zone.corners_m, np.full(len(zone.corners_m), around.ground_m)]) for zone in around.fence]
     return [around.path, around.reference_path, np.array([mark.place_enu_m for mark in marks]), *zones]
 
 
 def vehicle_scale(extent_m: float, airframe: Airframe) -> float:
-    """Return how many times its size a vehicle is drawn so that it can be seen in a scene of half size `extent_m`."""
+    """Return the scale at which a vehicle is visible in a scene of half size `extent_m`."""
     size = max(hypot(*place) for place in airframe.rotors_m) + airframe.radius_m
     return max(1.0, round(0.2 * extent_m / size, 1))
 
 
 def arrow(place: Vector, vector: Vector, scale: float) -> Array | None:
-    """Return begin and end of one arrow, (1, 2, 3); None where it would have no length, or is not known."""
+    """Return the ends of an arrow, (1, 2, 3); `None` for one of zero or unknown length."""
     tip = np.array(place) + scale * np.array(vector)
     if not np.isfinite(tip).all() or np.linalg.norm(vector) < 1e-3:
         return None

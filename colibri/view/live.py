@@ -1,4 +1,4 @@
-"""A live vehicle as a source: a thread that serves a link, and hands what it knows to the page."""
+"""A live vehicle: a thread serves its link; the page reads its state."""
 
 from collections.abc import Callable
 from threading import Event, Lock, Thread
@@ -13,12 +13,11 @@ _WAIT_S = 0.02
 
 
 class LiveVehicle:
-    """The vehicle at the other end of a link.
+    """The vehicle at the other end of a link; a `Source`.
 
     Attributes:
-        url: Of the link, with the port that it has got.
-        name: The same, where it has no other.
-        airframe: Of no vehicle in particular: telemetry does not say where rotors are.
+        url: With the actual port.
+        airframe: Generic, as telemetry has no geometry.
     """
 
     airframe = Airframe()
@@ -45,38 +44,33 @@ class LiveVehicle:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """Nothing is known of before."""
         return 0.0, 0.0
 
     @property
     def surroundings(self) -> Surroundings:
-        """Its plans, home and fence, as they were last asked for."""
         with self._lock:
             return self._observer.surroundings
 
     @property
     def autopilot(self) -> int | None:
-        """MAV_AUTOPILOT; None before its first heartbeat."""
+        """MAV_AUTOPILOT; `None` before the first heartbeat."""
         with self._lock:
             return self._observer.telemetry.autopilot
 
     def at(self, time_s: float) -> Snapshot:
-        """Return the vehicle now, which is `time_s` by the wall clock."""
         with self._lock:
             return self._observer.telemetry.snapshot(time_s)
 
     def charts(self) -> tuple[Chart, ...]:
-        """Return what is plotted of the last minute."""
         with self._lock:
             return self._observer.telemetry.charts()
 
     def order(self, give: Callable[[Observer], None]) -> None:
-        """Have an order given: `live.order(Observer.land)`."""
+        """Call a command of the observer: `live.order(Observer.land)`."""
         with self._lock:
             give(self._observer)
 
     def close(self) -> None:
-        """Close the link."""
         self._ends.set()
         self._thread.join()
         self._link.close()

@@ -1,7 +1,7 @@
-"""The page's end of a MAVLink link: requests telemetry and plans, and passes on commands and their results.
+"""The page's end of a MAVLink link: requests telemetry and plans, sends commands and reports their results.
 
-No I/O: datagrams and the time in, datagrams out. It does not claim to be a ground station: a vehicle must not return
-home because somebody has closed a browser.
+No I/O: datagrams and time in, datagrams out. It does not identify as a ground station: closing a browser must not
+trigger a failsafe.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ CHOICES: dict[int, tuple[str, ...]] = {
     PX4: ("Hold", "Position", "Altitude", "Mission", "Return", "Land"),
     ARDUPILOT: ("Guided", "Loiter", "Alt Hold", "Auto", "Brake", "RTL", "Land"),
 }
-"""The modes that the page offers, by MAV_AUTOPILOT."""
+"""Modes that the page offers, by MAV_AUTOPILOT."""
 _REPEAT = Repeat(every_us=1_000_000, tries=4)
 _PLANS_EVERY_US = 10_000_000
 _RESULTS = {number: each.name.removeprefix("MAV_RESULT_").lower() for number, each in mav.enums["MAV_RESULT"].items()}
@@ -33,11 +33,7 @@ _ABSOLUTE_FRAMES = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
 
 
 class Observer:
-    """Watches the first vehicle that it finds on a link.
-
-    Attributes:
-        surroundings: A new object whenever its plans or home change.
-    """
+    """Watches the first vehicle on a link; `surroundings` is a new object after each change."""
 
     def __init__(self) -> None:
         self.telemetry = Telemetry()
@@ -49,14 +45,12 @@ class Observer:
         self._drawn = ""
 
     def receive(self, datagram: bytes, now_s: float) -> None:
-        """Read a datagram."""
         for message in self._client.receive(datagram, round(now_s * 1e6)):
             self._note_events()
             if self.telemetry.system in (0, message.source[0]):
                 self.telemetry.receive(message, now_s)
 
     def poll(self, now_s: float) -> list[bytes]:
-        """Return the datagrams that are due."""
         now_us = round(now_s * 1e6)
         if self.telemetry.system and now_us >= self._plans_at_us:
             self._plans_at_us = now_us + _PLANS_EVERY_US
@@ -70,11 +64,9 @@ class Observer:
     # Commands.
 
     def arm(self, armed: bool) -> None:
-        """Arm or disarm."""
         self._command("arm" if armed else "disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, float(armed))
 
     def take_off(self, height_m: float) -> None:
-        """Take off to a height above home."""
         if self.telemetry.autopilot == ARDUPILOT:
             self._command("take off", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_m)
             return
@@ -87,15 +79,12 @@ class Observer:
         self._command("take off", mav.MAV_CMD_NAV_TAKEOFF, -1.0, 0.0, 0.0, nan, nan, nan, above_sea)
 
     def land(self) -> None:
-        """Land where it is."""
         self._command("land", mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan, nan, nan, 0.0)
 
     def return_home(self) -> None:
-        """Return home."""
         self._command("return", mav.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
     def set_mode(self, name: str) -> None:
-        """Change the mode, by its name."""
         mode = mode_named(self.telemetry.autopilot, name)
         if mode is None:
             self.telemetry.say(f"mode {name}: unknown for this autopilot")
@@ -103,7 +92,6 @@ class Observer:
             self._command(f"mode {name}", mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def go_to(self, place_enu_m: Vector) -> None:
-        """Go to a place, ENU."""
         origin = self.telemetry.origin
         if origin is None:
             self.telemetry.say("go to: the vehicle has not said where it is")
@@ -130,7 +118,7 @@ class Observer:
         self._give(what, Command(self._vehicle, number, *params, repeat=_REPEAT))
 
     def _give(self, what: str, command: Command) -> None:
-        """Send a command in place of the one under way: the newest counts."""
+        """Send a command; a pending one is cancelled."""
         if not self.telemetry.system:
             self.telemetry.say(f"{what}: no vehicle is there")
             return
@@ -156,7 +144,7 @@ class Observer:
                     self._order = None
 
     def _draw(self) -> None:
-        """Draw the surroundings again if a plan, the origin or home has changed."""
+        """Redraw the surroundings if a plan, the origin or home has changed."""
         home = self.telemetry.home_enu_m
         now = str((self.telemetry.origin, home, self._plans))
         if now != self._drawn:

@@ -1,4 +1,4 @@
-"""The page of recorded flights: served before what reads them is loaded, as a browser loads the page meanwhile."""
+"""Serve the page of recorded flights before the reader is loaded: the browser loads it meanwhile."""
 
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -12,11 +12,6 @@ _NEEDED = ("provenance.json", "flight.ulg")
 
 
 def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Show flights that were flown, until interrupted.
-
-    Raises:
-        ViewError: One cannot be read, or the port is taken.
-    """
     with ExitStack() as held:
         if not all((folder / name).is_file() for folder in folders for name in _NEEDED):
             from colibri.view.run import read_flights

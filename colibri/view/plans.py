@@ -1,4 +1,4 @@
-"""Missions, rally points and fences of a live vehicle, as the page draws them."""
+"""Missions, rally points and fences of a live vehicle as surroundings."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -21,11 +21,11 @@ _CIRCLES = {
 }
 
 Place = Callable[[MissionItem], Vector]
-"""(item) -> its place in the local frame, ENU; nan where that is unknown."""
+"""(item) -> its place in the local frame, ENU; nan if unknown."""
 
 
 def drawn(plans: Mapping[int, Sequence[MissionItem]], home_enu_m: Vector, place: Place) -> Surroundings:
-    """Return what is drawn of plans, by their MAV_MISSION_TYPE."""
+    """Convert plans, by MAV_MISSION_TYPE."""
     return Surroundings(
         ground_m=0.0 if home_enu_m[2] != home_enu_m[2] else home_enu_m[2],
         home_enu_m=home_enu_m,

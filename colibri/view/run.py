@@ -1,4 +1,4 @@
-"""The page from its address on the terminal to its end: flights played, vehicles followed, what was done passed on."""
+"""Run the page: play flights, follow vehicles, pass on user actions."""
 
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
@@ -25,18 +25,20 @@ from colibri.view.snapshot import Source, ViewError
 
 FRAMES_HZ = 30.0
 EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
-"""Of a page that is written to a file; of a long flight fewer a second."""
+"""Rate of an exported page; lower in a long flight."""
 WORDS_HZ = 5.0
-"""How often words and time line change: an eye reads no faster."""
+"""Update rate of texts and time line, enough to read."""
 PLOTS_HZ = 2.0
-"""How often plots change, which are sent whole, and drawn anew: their mark moves by a pixel or two."""
+"""Update rate of plots, which are sent whole; the mark moves by a pixel or two."""
 PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
-"""How long a browser is left alone with words and plots once it has laid out the page, and for that at most: a scene
-that moves meanwhile would hold it up."""
+"""Delay from a browser's layout, or at most from its connection, to the first motion, which would slow down drawing."""
 
 
 class Show:
-    """Sources on a page, brought up to date whenever it is time: pure of waiting."""
+    """Updates the page as time passes, without waiting; starts with the first browser.
+
+    `order` is called with each command.
+    """
 
     def __init__(
         self,
@@ -45,7 +47,6 @@ class Show:
         now_s: float,
         order: Callable[[str, Any], None] = lambda _what, _value: None,
     ) -> None:
-        """Show sources from their beginning, which is when the first browser comes; `order` takes what is ordered."""
         begin_s, end_s = zip(*(source.span_s for source in sources), strict=True)
         self._page = page
         self._sources = sources
@@ -58,7 +59,7 @@ class Show:
         self._is_told = self._is_plotted = False
 
     def turn(self, now_s: float) -> None:
-        """Do what was asked for, and show what is now."""
+        """Apply user actions and update the page."""
         if not self._has_begun and self._page.watched:
             self._begins_at_s = min(self._begins_at_s, now_s + (PLOTTED_AFTER_S if self._page.laid_out else WAITS_S))
         if not self._has_begun and now_s >= self._begins_at_s:
@@ -95,11 +96,6 @@ class Show:
 
 
 def play(folders: Sequence[Path], server: PageServer) -> None:
-    """Show flights that were flown, until interrupted.
-
-    Raises:
-        ViewError: One cannot be read.
-    """
     with ExitStack() as held:
         flights = read_flights(folders, held)
         page = Page(flights, server)
@@ -107,11 +103,7 @@ def play(folders: Sequence[Path], server: PageServer) -> None:
 
 
 def export(folders: Sequence[Path], path: Path) -> None:
-    """Write flights as one HTML file that plays them in any browser, without plots.
-
-    Raises:
-        ViewError: One cannot be read, or the file cannot be written.
-    """
+    """Write flights as an HTML file that plays them, without plots."""
     with ExitStack() as held:
         flights = read_flights(folders, held, wait=True)
         begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
@@ -127,11 +119,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
 
 
 def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
-    """Return the flights of folders, whose horizons come by and by as long as `held` lasts; `wait` for all of them.
-
-    Raises:
-        ViewError: One cannot be read.
-    """
+    """Read flights. Their horizons are computed while `held` is open; `wait` for all of them."""
     flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
     for folder, flight in zip(folders, flights, strict=True):
         horizons = Horizons()
@@ -144,11 +132,7 @@ def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False
 
 
 def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Show the vehicle on a link, until interrupted; say a token that its commands need.
-
-    Raises:
-        ViewError: The link cannot be opened, or the port is taken.
-    """
+    """Show the vehicle on a link until interrupted; print the token for commands."""
     vehicle = LiveVehicle(url)
     try:
         page, show = _begin(vehicle, port, browser=browser, say=say)
@@ -161,7 +145,7 @@ def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None])
 
 
 def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
-    """Give a vehicle an order of the page."""
+    """Execute a command of the page."""
     orders: dict[str, Callable[[Observer], None]] = {
         "arm": lambda observer: observer.arm(True),
         "disarm": lambda observer: observer.arm(False),
@@ -176,12 +160,9 @@ def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
 
 @contextmanager
 def page_beside(say: Callable[[str], None]) -> Iterator[str]:
-    """Show in a browser what flies meanwhile; yields the link that the vehicle has to call.
+    """Show the flight in this block; yield the link for the vehicle to connect to.
 
-    The page has a thread of its own in this process, which only watches those that fly.
-
-    Raises:
-        ViewError: There is no port for it.
+    The page runs in a thread of this process, which otherwise only waits for its children.
     """
     vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
     ends = Event()
@@ -219,7 +200,7 @@ def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return short names that differ: the last parts of the paths, as many as it takes."""
+    """Return short unique names: as many last parts of the paths as needed."""
     paths = [folder.resolve().parts for folder in folders]
     if len(set(paths)) < len(paths):
         raise ViewError(f"{folders[0]} is given twice: name two flights")

@@ -1,4 +1,4 @@
-"""What the page shows of a vehicle: at an instant, around it, and over time. Plain values, SI, ENU and FLU."""
+"""The state that the page shows: now, around the vehicle, and over time. SI, ENU and FLU."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -15,16 +15,16 @@ UNKNOWN_ROTORS: FourRotors = (nan, nan, nan, nan)
 
 
 class ViewError(Error):
-    """What cannot be shown; the message is the one line that a user needs."""
+    """Data that cannot be shown."""
 
 
 class Airframe(NamedTuple):
-    """What is drawn of a vehicle that has four rotors.
+    """The geometry of a vehicle with four rotors.
 
     Attributes:
         rotors_m: x forward, y left of each rotor.
-        spins: 1.0 of each rotor that turns counter-clockwise seen from above, -1.0 of the others.
-        foot_m: How far the feet are below the rotors.
+        spins: 1.0 counter-clockwise from above, -1.0 clockwise.
+        foot_m: Height of the rotors above the feet.
     """
 
     rotors_m: tuple[tuple[float, float], ...] = ((0.17, -0.17), (-0.17, 0.17), (0.17, 0.17), (-0.17, -0.17))
@@ -41,20 +41,16 @@ class Airframe(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """A vehicle at an instant; nan and empty for what is not known of it.
+    """A vehicle at an instant; unknown values are nan or empty.
 
     Attributes:
-        time_s: Of the flight.
         attitude: Unit quaternion, FLU to ENU.
-        rotors: Speeds as parts of the largest.
-        reference_enu_m: What it steers to.
-        trail: Where it was lately, ENU, m, (n, 3), the newest last.
-        horizon: Where its controller predicts that it will be, ENU, m, (k, 3).
-        estimate_enu_m: Where it takes itself to be, where that is not `position_enu_m`.
-        sigma_m: Standard deviations of that estimate, east, north and up.
-        armed: None where that is not known.
-        battery: As text.
-        texts: What it said last, the newest first.
+        rotors: Fractions of the largest speed.
+        trail: Recent positions, ENU, m, (n, 3), the newest last.
+        horizon: Predicted positions, ENU, m, (k, 3).
+        estimate_enu_m: Estimated position, if `position_enu_m` is the true one.
+        sigma_m: Its standard deviations, east, north, up.
+        texts: Latest texts, the newest first.
     """
 
     time_s: float
@@ -75,7 +71,7 @@ class Snapshot:
 
 
 class Mark(NamedTuple):
-    """A place with a word beside it: an item of a mission, home, a rally point."""
+    """A labelled place: mission item, home or rally point."""
 
     place_enu_m: Vector
     text: str
@@ -86,7 +82,7 @@ class Zone(NamedTuple):
 
     Attributes:
         corners_m: East and north of its outline, (n, 2), n >= 3.
-        keeps_in: Whether the vehicle has to stay inside, and not outside.
+        keeps_in: Whether the vehicle must stay inside, or else outside.
     """
 
     corners_m: Array
@@ -95,14 +91,13 @@ class Zone(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """What stands still around a vehicle.
+    """The static objects around a vehicle.
 
     Attributes:
         ground_m: Height of the ground, z of ENU.
-        path: All of its flight, where that is over, ENU, m, (n, 3).
-        reference_path: What it was to fly, (n, 3).
-        mission: Its items that have a place, in their order.
-        ceiling_m: Up to which height zones are drawn.
+        path: All positions of a recorded flight, ENU, m, (n, 3).
+        reference_path: Its references, (n, 3).
+        ceiling_m: Displayed top of zones.
     """
 
     ground_m: float = 0.0
@@ -119,11 +114,11 @@ class Chart(NamedTuple):
     """Some series over the same times.
 
     Attributes:
-        title: What is shown and its unit; charts of several flights with one title are one.
-        names: Of the series; one that begins with a parenthesis is a limit, drawn grey.
+        title: Quantity and unit; charts of several flights are merged by title.
+        names: Names of the series; in parentheses a limit, drawn grey.
         times_s: (n,).
         values: (series, n).
-        headline: The one number that is shown of each flight where there are several, (n,).
+        headline: The series to show of each of several flights, (n,).
     """
 
     title: str
@@ -138,28 +133,24 @@ class Source(Protocol):
 
     Attributes:
         name: Short, for labels.
-        is_live: Whether time goes on by itself.
-        span_s: From when to when it is known.
-        surroundings: Another object whenever they change.
+        is_live: Whether time passes by itself.
+        span_s: First and last known time.
+        surroundings: A new object after each change.
     """
 
     name: str
     airframe: Airframe
 
     @property
-    def is_live(self) -> bool:
-        """See above."""
+    def is_live(self) -> bool: ...
 
     @property
-    def span_s(self) -> tuple[float, float]:
-        """See above."""
+    def span_s(self) -> tuple[float, float]: ...
 
     @property
-    def surroundings(self) -> Surroundings:
-        """See above."""
+    def surroundings(self) -> Surroundings: ...
 
     def at(self, time_s: float) -> Snapshot:
-        """Return the vehicle at a time; at the nearest that is known."""
+        """Return the vehicle at the nearest known time."""
 
-    def charts(self) -> tuple[Chart, ...]:
-        """Return what is plotted of it."""
+    def charts(self) -> tuple[Chart, ...]: ...

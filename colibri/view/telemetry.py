@@ -1,4 +1,4 @@
-"""What a live vehicle is like, from the messages that it sends: any vehicle's common ones, and Colibri's own."""
+"""The state of a live vehicle from its messages: common ones, and Colibri's own."""
 
 from collections import deque
 from collections.abc import Callable
@@ -21,7 +21,7 @@ TRAIL_POINTS = 600
 TEXTS = 4
 _ROW_S = 0.1
 _STALE_S = 3.0
-"""What has not been said for that long is no longer shown: a predicted horizon, a reference."""
+"""Age from which values are hidden."""
 _PULSE_US = (1000.0, 2000.0)
 _E7 = 1e7
 _ROTORS = "rotors, % of the largest"
@@ -38,17 +38,15 @@ _CHARTS = (
 
 
 class Telemetry:
-    """The latest of everything, by messages as they come.
+    """The latest state by messages.
 
     Attributes:
-        autopilot: MAV_AUTOPILOT; None before the first heartbeat.
+        autopilot: MAV_AUTOPILOT; `None` before the first heartbeat.
         system: Its system id; 0 before.
-        origin: Where its local frame begins; None before it is received.
-        home_enu_m: As it says.
+        origin: Origin of its local frame, once received.
     """
 
     def __init__(self) -> None:
-        """Know nothing."""
         self.autopilot: int | None = None
         self.system = 0
         self.origin: Geodetic | None = None
@@ -80,7 +78,7 @@ class Telemetry:
         }
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take in a message of the vehicle's autopilot, come at `now_s` by the wall clock."""
+        """Process a message of the autopilot; `now_s` is wall-clock time."""
         if isnan(self._began_s):
             self._began_s = now_s
         handler = self._handlers.get(message.name)
@@ -88,11 +86,10 @@ class Telemetry:
             handler(message.fields, now_s)
 
     def say(self, text: str) -> None:
-        """Add a line to what is said."""
         self._texts.appendleft(text)
 
     def snapshot(self, now_s: float) -> Snapshot:
-        """Return the vehicle as far as it is known; where no position has come, at the origin."""
+        """Return the known state; at the origin without a position."""
         now = self._now
         place = now.position_enu_m if all(map(isfinite, now.position_enu_m)) else (0.0, 0.0, 0.0)
         return Snapshot(
@@ -112,7 +109,7 @@ class Telemetry:
         )
 
     def charts(self) -> tuple[Chart, ...]:
-        """Return what is plotted of the last minute; nothing of what the vehicle never sends."""
+        """Return the charts of the last minute for which there are messages."""
         if len(self._rows) < 2:
             return ()
         rows = np.array(self._rows)
@@ -130,7 +127,7 @@ class Telemetry:
         return tuple(charts)
 
     def place_of(self, latitude_deg: float, longitude_deg: float, up_m: float, *, above_sea: bool) -> Vector:
-        """Return a place on earth in the local frame, ENU; nan where nobody has said where that begins."""
+        """Convert a place to the local frame, ENU; nan without an origin."""
         if self.origin is None:
             return NOWHERE
         east, north, _ = enu_of(Geodetic(latitude_deg, longitude_deg, self.origin.altitude_m), self.origin)
@@ -145,7 +142,7 @@ class Telemetry:
         self._values[name] = (now_s, value)
 
     def _reference(self) -> Vector:
-        """Return where it was to be when its position came last: the last reference, carried on by its velocity."""
+        """Extrapolate the last reference by its velocity to the time of the last position."""
         said_s, (place, velocity) = self._values.get("reference", (-_STALE_S, (NOWHERE, NOWHERE)))
         age_s = self._moved_s - said_s
         x, y, z = np.add(place, np.multiply(age_s, velocity)).tolist()
@@ -262,4 +259,4 @@ INTERVALS_US: dict[str, int] = {
     **dict.fromkeys(("GLOBAL_POSITION_INT", "ESTIMATOR_STATUS", "BATTERY_STATUS", "WIND_COV"), 500_000),
     **dict.fromkeys(("GPS_GLOBAL_ORIGIN", "HOME_POSITION"), 2_000_000),
 }
-"""What the page asks for, and how often."""
+"""Messages to request, with their intervals."""

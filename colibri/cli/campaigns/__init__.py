@@ -1,1 +1,1 @@
-"""Many flights at once: campaigns, comparisons, studies."""
+"""Subcommands that fly many flights."""

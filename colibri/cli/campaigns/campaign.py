@@ -1,4 +1,4 @@
-"""`colibri campaign`: its options, and its call."""
+"""`colibri campaign`."""
 
 from argparse import SUPPRESS, Namespace
 from pathlib import Path
@@ -11,7 +11,6 @@ from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri campaign`."""
     add = parser.add_argument
     add("file", nargs="?", type=Path, metavar="FILE.toml", help="the campaign; options take precedence over it")
     add("--track", dest="tracks", action="append", metavar="TRACK", help="a track; may be repeated: each is flown")
@@ -47,7 +46,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Fly a campaign as the command line says; return the exit code."""
     with loading():
         from colibri.cli.campaigns.fly_campaign import fly
 

@@ -1,4 +1,4 @@
-"""`colibri compare`: its options, and its call."""
+"""`colibri compare`."""
 
 from argparse import Namespace
 
@@ -9,7 +9,6 @@ from colibri.flights.spec import FlightSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri compare`."""
     add = parser.add_argument
     add(
         "--profile",
@@ -37,7 +36,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Compare as the command line says; return the exit code."""
     from colibri.common.errors import Error
     from colibri.common.process.lifecycle import fail
     from colibri.flights.folder import occupied

@@ -1,4 +1,4 @@
-"""`colibri figures`: its options, and its call."""
+"""`colibri figures`."""
 
 from argparse import Namespace
 
@@ -7,14 +7,12 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri figures`."""
     add = parser.add_argument
     add_out(add, "out/thesis", "PNG and SVG")
     add("--only", action="append", metavar="NUMBER", help="only this figure, 4.9 say; may be repeated")
 
 
 def run(args: Namespace) -> int:
-    """Fly and draw as the command line says; return the exit code."""
     from colibri.studies.thesis_figures import figures
 
     return figures(args)

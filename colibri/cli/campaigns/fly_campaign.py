@@ -1,4 +1,4 @@
-"""`colibri campaign`: read what the command line adds to a file, fly, and say what came of it."""
+"""Fly the campaign of a command line and its file, and print the results."""
 
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
@@ -21,17 +21,14 @@ _TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
 
 
 class _Bar(Protocol):
-    """What shows how far a campaign is."""
+    """A progress bar of a campaign; `kept` flights are there at the start."""
 
-    def begun(self, kept: int) -> None:
-        """Begin with so many flights that there are already."""
+    def begun(self, kept: int) -> None: ...
 
-    def ended(self, flown: Flown) -> None:
-        """Count a flight."""
+    def ended(self, flown: Flown) -> None: ...
 
 
 def fly(args: Namespace) -> int:
-    """Fly a campaign as the command line says; what it says takes precedence over the file."""
     try:
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}
@@ -57,7 +54,6 @@ def _grid(args: Namespace) -> dict[str, Any]:
 
 
 def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[str, Any]:
-    """Read factors of the command line, each of which is there once."""
     pairs = list(map(read, texts))
     if twice := first_twice(key for key, _ in pairs):
         raise CampaignError(f"{twice} is said twice: give all of its values at once")
@@ -65,13 +61,11 @@ def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[
 
 
 def _setting(text: str) -> tuple[str, Any]:
-    """Read KEY=VALUES of the command line."""
     key, values = _pair(text, "KEY=VALUES, body.mass_kg=0.6:0.8:5 say")
     return key, values if values.count(":") == 2 else [_value(each) for each in values.split(",")]
 
 
 def _draw(text: str) -> tuple[str, Any]:
-    """Read KEY=DISTRIBUTION of the command line."""
     key, drawn = _pair(text, "KEY=DISTRIBUTION, plant-vehicle.body.mass_kg=uniform:0.6:0.8 say")
     name, _, rest = drawn.partition(":")
     return key, {name: [_value(each) for each in rest.split("," if name == "choice" else ":")]}
@@ -85,7 +79,7 @@ def _pair(text: str, expected: str) -> tuple[str, str]:
 
 
 def _value(text: str) -> Any:
-    """Return a number or a truth value, where a text is one."""
+    """Parse a number or a truth value; other texts are kept."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -123,7 +117,7 @@ def _short(cell: str) -> str:
 
 @contextmanager
 def _progress(title: str, flights: int, *, quiet: bool) -> Iterator[_Bar]:
-    """Show on standard error how many were flown, how many a second, which share was lost, and the time left."""
+    """Show progress, rate, share lost and time left on standard error."""
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

@@ -1,4 +1,4 @@
-"""`colibri study`: its options, and its call."""
+"""`colibri study`."""
 
 from argparse import Namespace
 
@@ -7,7 +7,6 @@ from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri study`."""
     add = parser.add_argument
     add(
         "names",
@@ -19,7 +18,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Study as the command line says; return the exit code."""
     from colibri.studies.studies import study
 
     return study(args)

@@ -1,4 +1,4 @@
-"""`colibri bench`: its options, and its call."""
+"""`colibri bench`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -7,7 +7,6 @@ from colibri.common.process.arguments import ArgumentParser, positive
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri bench`."""
     add = parser.add_argument
     add(
         "--only",
@@ -37,7 +36,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Measure as the command line says; return the exit code."""
     from colibri.bench.run import bench
 
     return bench(args)

@@ -1,4 +1,4 @@
-"""`colibri completion`: its options, and its call."""
+"""`colibri completion`."""
 
 import re
 from argparse import Action, Namespace, _SubParsersAction
@@ -10,12 +10,10 @@ SHELLS = ("bash", "zsh", "fish", "tcsh", "powershell")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri completion`."""
     parser.add_argument("shell", choices=SHELLS, help="whose; where the script goes is in the examples")
 
 
 def run(args: Namespace) -> int:
-    """Print the script by which a shell completes every command; return the exit code."""
     from shtab import complete
 
     print(complete(completed_parser(), args.shell))  # noqa: T201
@@ -23,7 +21,7 @@ def run(args: Namespace) -> int:
 
 
 def completed_parser() -> ArgumentParser:
-    """Return a parser to complete by, not to parse with: of each argument what it may be, as far as that is known."""
+    """Return a parser with the possible values of each argument, for completion only."""
     from colibri.autopilot.__main__ import command_line as autopilot
     from colibri.cli.shared.commands import COMMANDS
     from colibri.cli.shared.parser import parser_of
@@ -40,7 +38,6 @@ def completed_parser() -> ArgumentParser:
 
 
 def _names() -> dict[str, Callable[[], Sequence[str]]]:
-    """Return the names that there are of what an argument, or the first one of a command, names."""
     from colibri.autopilot.control.profile import profile_names
     from colibri.autopilot.control.registry import controller_names
     from colibri.autopilot.guidance.trajectories.registry import track_names

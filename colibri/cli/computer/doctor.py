@@ -1,4 +1,4 @@
-"""`colibri doctor`: its options, and its call."""
+"""`colibri doctor`."""
 
 from argparse import Namespace
 
@@ -8,7 +8,6 @@ GCS = "udpout:127.0.0.1:14550"
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri doctor`."""
     add = parser.add_argument
     add(
         "--gcs",
@@ -21,7 +20,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Examine this computer as the command line says; return the exit code."""
     from colibri.common.process.lifecycle import fail
     from colibri.doctor.examine import examine_as_told
     from colibri.mavlink.links.link import LinkError

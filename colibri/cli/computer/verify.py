@@ -1,4 +1,4 @@
-"""`colibri verify`: its options, and its call."""
+"""`colibri verify`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -10,7 +10,6 @@ GOLDEN_HASHES = Path("tests/golden/hashes.json")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri verify`."""
     add = parser.add_argument
     add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
     add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
@@ -29,7 +28,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Verify as the command line says; return the exit code."""
     if args.golden is not None:
         from colibri.verification.golden import verify_golden
 

@@ -1,1 +1,1 @@
-"""Files of profiles and vehicles: Colibri's own, and a vehicle as parameters of other autopilots."""
+"""Subcommands about files of profiles and vehicles."""

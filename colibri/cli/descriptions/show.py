@@ -1,4 +1,4 @@
-"""`colibri show`: its options, and its call."""
+"""`colibri show`."""
 
 import sys
 from argparse import Namespace
@@ -9,14 +9,12 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri show`."""
     add = parser.add_argument
     add("what", choices=("profile", "vehicle"), help="what to show")
     add("name", metavar="NAME", help="of those that come with Colibri; any other for a list of them")
 
 
 def run(args: Namespace) -> int:
-    """Print the file of a profile or vehicle, to be copied and changed; return the exit code."""
     from colibri.autopilot.control.profile import profile_text
     from colibri.plant.vehicle.description import vehicle_text
 

@@ -1,4 +1,4 @@
-"""`colibri vehicle`: its options, and its call."""
+"""`colibri vehicle`."""
 
 import shlex
 import sys
@@ -11,7 +11,6 @@ from colibri.common.process.lifecycle import fail
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri vehicle`."""
     add = parser.add_argument
     add("name", metavar="NAME", help="vehicle name or .toml")
     add(
@@ -25,7 +24,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Write a vehicle as parameters of another autopilot; return the exit code."""
     from colibri.plant.vehicle.description import load_vehicle
     from colibri.plant.vehicle.parameter_files import FILES
 

@@ -1,1 +1,1 @@
-"""Subcommands about a control law itself: what it must satisfy, and what can be proven of it."""
+"""Subcommands about a control law."""

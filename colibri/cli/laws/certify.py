@@ -1,4 +1,4 @@
-"""`colibri certify`: its options, and its call."""
+"""`colibri certify`."""
 
 from argparse import ArgumentTypeError, Namespace
 
@@ -7,7 +7,6 @@ from colibri.common.process.arguments import ArgumentParser, natural, positive
 
 
 def part(text: str) -> float:
-    """Read a number above 0, of at most 1, of the command line."""
     value = positive(text)
     if value > 1.0:
         raise ArgumentTypeError(f"must be a part of 1, not {text}")
@@ -15,7 +14,6 @@ def part(text: str) -> float:
 
 
 def some(text: str) -> int:
-    """Read a whole number from 1 on of the command line."""
     value = natural(text)
     if value == 0:
         raise ArgumentTypeError("must be at least 1")
@@ -23,7 +21,6 @@ def some(text: str) -> int:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri certify`."""
     add = parser.add_argument
     add("profile", metavar="PROFILE", help="control profile name or .toml")
     add("--controller", metavar="NAME", help="control law that the profile has numbers for (default: its own)")
@@ -49,7 +46,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Certify as the command line says; return the exit code."""
     from colibri.certification.report import certify_profile
     from colibri.flights.folder import occupied
 

@@ -1,4 +1,4 @@
-"""`colibri check-controller`: its options, and its call."""
+"""`colibri check-controller`."""
 
 from argparse import Namespace
 
@@ -7,7 +7,6 @@ from colibri.common.process.lifecycle import loading
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri check-controller`."""
     add = parser.add_argument
     add("name", metavar="NAME", help="control law, also of another package")
     add("--profile", metavar="NAME", help="control profile name or .toml (default: the one with numbers for the law)")
@@ -31,7 +30,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Check as the command line says; return the exit code."""
     with loading():
         from colibri.conformance.check import check_by_command
 

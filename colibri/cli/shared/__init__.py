@@ -1,1 +1,1 @@
-"""What is no subcommand: their list and parser, options that several have, a flight and its report, both processes."""
+"""Parser, list of subcommands, shared options, and the two processes."""

@@ -1,4 +1,4 @@
-"""`--view`: the page of what flies, beside it, for the commands that have it."""
+"""`--view`: the page in a browser beside a flight."""
 
 from argparse import Namespace
 from collections.abc import Iterator
@@ -12,13 +12,12 @@ NEEDS_VISER = "the page needs viser: pip install 'colibri-sitl[view]'"
 
 
 def add_view(add: Any) -> None:
-    """Add the option."""
     add("--view", action="store_true", help="show it in a browser as it flies; the page's address is the first line")
 
 
 @contextmanager
 def viewed(args: Namespace, links: list[str]) -> Iterator[None]:
-    """Show what flies meanwhile where that is asked for: over a link beside `links`."""
+    """Show the flight over an additional link if `--view` is given."""
     if not args.view:
         yield
         return

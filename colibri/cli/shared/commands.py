@@ -1,4 +1,4 @@
-"""Every subcommand: what it does, in which room its file is, and how it is used."""
+"""The subcommands with their descriptions and examples."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,8 @@ class Command(NamedTuple):
     """A subcommand.
 
     Attributes:
-        does: What it does, in a line.
-        room: Below `colibri.cli`, where its file is; empty for that room itself.
-        examples: Of its use, one a line, each with what it shows behind a `#`.
+        room: Package of its file below `colibri.cli`.
+        examples: One a line, each with its purpose after a `#`.
     """
 
     does: str
@@ -170,5 +169,5 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
     },
 }
-"""By what they are for, and by their names, which are also those of their files."""
+"""Subcommands by purpose; a subcommand's name is also that of its file."""
 COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}

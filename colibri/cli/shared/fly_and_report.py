@@ -1,4 +1,4 @@
-"""`colibri fly`: fly one track, show how far it is, report how well it went."""
+"""`colibri fly`: fly one track with a progress bar, and report the results."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -25,7 +25,6 @@ _UPDATES = 500
 
 
 def fly(args: argparse.Namespace) -> int:
-    """Fly as the command line says; return the exit code."""
     try:
         plan = FlightPlan.of(from_namespace(FlightSpec, args))
     except Error as error:
@@ -61,7 +60,7 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
 
 
 def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
-    """Write what there is of a flight that did not end well; that of one that never began is nothing."""
+    """Write the results of a flight that ended badly, if it has a log."""
     if not (plan.out / FILE).exists():
         return
     from colibri.analysis.outcome import keep_what_there_is
@@ -70,7 +69,7 @@ def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
 
 
 def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -> "Report":
-    """Keep what was flown and say how well it went; what does that is loaded only now, when something has flown."""
+    """Write and print the results. Modules are loaded only now, after the flight."""
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
     from colibri.analysis.series.figure_series import FigureSeries
@@ -87,7 +86,7 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
 
 
 class Shown(NamedTuple):
-    """What shows a flight, as `fly_plan` takes it: its simulated time, a line, the number of compiled functions."""
+    """Callbacks of `fly_plan`: simulated time, s; a line of text; number of compiled functions."""
 
     progress: Callable[[float], None]
     say: Callable[[str], None]
@@ -96,7 +95,7 @@ class Shown(NamedTuple):
 
 @contextmanager
 def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
-    """Show on standard error a bar with simulated time and speed, and above it what there is to say."""
+    """Show simulated time and speed on standard error."""
     if quiet:
         yield Shown(unseen, unseen, unseen)
         return

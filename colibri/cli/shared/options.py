@@ -5,13 +5,11 @@ from pathlib import Path
 
 
 def add_signing(add: Callable[..., object]) -> None:
-    """Add the key of links, and leave to do without."""
     add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
     add("--insecure", action="store_true", help="let links leave this computer without a key")
 
 
 def add_engine(add: Callable[..., object]) -> None:
-    """Add what flies many flights: processes of this computer, or a cluster."""
     add("--workers", type=int, metavar="N", help="processes (default: one a core)")
     add(
         "--dask",
@@ -21,6 +19,5 @@ def add_engine(add: Callable[..., object]) -> None:
 
 
 def add_out(add: Callable[..., object], folder: str, what: str) -> None:
-    """Add the folder that takes `what`, `folder` where it is not named, and leave to be quiet."""
     add("--out", type=Path, default=Path(folder), metavar="DIR", help=f"folder for {what} (default %(default)s)")
     add("--quiet", action="store_true", help="say nothing but errors")

@@ -1,4 +1,4 @@
-"""The parser of the whole command, and its help. Loads only the subcommands that are asked for."""
+"""The parser of the command and its help. Loads only the modules of requested subcommands."""
 
 from argparse import Action, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Generator, Sequence
@@ -16,20 +16,17 @@ _NAME = 18
 
 
 class Subcommand(Protocol):
-    """The file of a subcommand."""
+    """The module of a subcommand."""
 
-    def add_options(self, parser: ArgumentParser) -> None:
-        """Add its options."""
+    def add_options(self, parser: ArgumentParser) -> None: ...
 
-    def run(self, args: Namespace) -> int:
-        """Do it; return the exit code."""
+    def run(self, args: Namespace) -> int: ...
 
 
 class Version(Action):
-    """Prints the version that is installed, and ends."""
+    """Print the installed version and exit; it is looked up only now, as that takes time."""
 
     def __call__(self, *_: object) -> NoReturn:
-        """Look it up only now: that takes a while."""
         from importlib.metadata import version
 
         print(f"colibri {version('colibri-sitl')}")  # noqa: T201
@@ -37,20 +34,20 @@ class Version(Action):
 
 
 class _Grouped(RawDescriptionHelpFormatter):
-    """Help in which the subcommands are listed by what they are for, at the end, and nowhere else."""
+    """Help with the subcommands in groups at the end only."""
 
     def _iter_indented_subactions(self, _action: Action) -> Generator[Action, None, None]:
         yield from ()
 
 
 def parser_for(given: Sequence[str]) -> ArgumentParser:
-    """Return the parser of the whole command, with the options of the subcommand that is given alone."""
+    """Return the parser with the options of the given subcommand only."""
     asked = next((word for word in given if word in COMMANDS), None)
     return parser_of(*(name for name in COMMANDS if name == asked))
 
 
 def parser_of(*whole: str) -> ArgumentParser:
-    """Return the parser of the whole command, in which these subcommands have their options."""
+    """Return the parser with the options of some subcommands."""
     parser = ArgumentParser(
         prog="colibri",
         description="A quadrotor autopilot in pure Python, flown over MAVLink.",
@@ -76,7 +73,6 @@ def parser_of(*whole: str) -> ArgumentParser:
 
 
 def _listed() -> str:
-    """Return what the subcommands do, by what they are for, within the terminal's width."""
     known = {group: {name: it.does for name, it in commands.items()} for group, commands in GROUPS.items()}
     width, lines = min(get_terminal_size().columns, _MAX_WIDTH), []
     for group, commands in (known | {"the two processes of a flight": PROCESSES}).items():
@@ -87,6 +83,5 @@ def _listed() -> str:
 
 
 def subcommand(name: str) -> Subcommand:
-    """Return the file of a subcommand."""
     room = ".".join(filter(None, ("colibri.cli", COMMANDS[name].room, name.replace("-", "_"))))
     return cast(Subcommand, import_module(room))

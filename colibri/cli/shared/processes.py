@@ -1,4 +1,4 @@
-"""`colibri plant` and `colibri autopilot`: the two processes on their own, with command lines of their own."""
+"""`colibri plant` and `colibri autopilot`: the two processes, with command lines of their own."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,6 @@ PROCESSES = {
 
 
 def run_process(name: str, options: Sequence[str]) -> int:
-    """Be one of the two processes; return the exit code."""
     if name == "plant":
         from colibri.plant.__main__ import main
     else:

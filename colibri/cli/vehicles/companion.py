@@ -1,4 +1,4 @@
-"""`colibri companion`: its options, and its call."""
+"""`colibri companion`."""
 
 from argparse import Namespace
 from math import inf
@@ -10,7 +10,6 @@ from colibri.flights.spec import TRACK_HELP
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri companion`."""
     add = parser.add_argument
     mission = "or FILE.plan, a mission of QGroundControl: its waypoints, from the vehicle's home"
     add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; {mission}")
@@ -70,7 +69,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Fly a vehicle as the command line says; return the exit code."""
     with loading():
         from colibri.companion.process import fly
 

@@ -1,1 +1,1 @@
-"""What is looked at in a browser."""
+"""Subcommands that show flights in a browser."""

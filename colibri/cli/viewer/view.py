@@ -1,4 +1,4 @@
-"""`colibri view`: its options, and its call."""
+"""`colibri view`."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -11,7 +11,6 @@ _LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri view`."""
     add = parser.add_argument
     add(
         "what",
@@ -26,7 +25,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Show flights or a vehicle in a browser until interrupted; return the exit code."""
     from colibri.common.errors import Error
 
     links = [what for what in args.what if what.startswith(_LINKS)]

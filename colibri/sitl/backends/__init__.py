@@ -1,1 +1,1 @@
-"""Plant and autopilot brought together frame by frame, in memory or as processes, and what links do to datagrams."""
+"""Lockstep sessions of plant and autopilot, in memory or as processes, with link faults."""

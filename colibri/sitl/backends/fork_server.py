@@ -1,7 +1,7 @@
-"""A program of its own: loads what plant and autopilot need, then forks one or the other on request.
+"""A process that loads plant and autopilot, then forks one or the other on request.
 
-A request is a line on standard input, a JSON list: "start", the package, a file for its output, and its specification
-as JSON; "code" or "kill" and a process. The answer is a line on standard output: the process, its exit code, or null.
+A request is a line on standard input, a JSON list: "start", the package, an output file and the specification as JSON;
+or "code" or "kill" and a process id. The answer is a line: the process id, its exit code, or null.
 """
 
 import gc
@@ -20,7 +20,6 @@ _FLIGHTS = ({"feedback": "state"}, {"feedback": "sensors", "turbulence": "light"
 
 
 def main() -> None:
-    """Serve until standard input ends."""
     use_one_thread()
     _load()
     gc.collect()
@@ -44,7 +43,7 @@ def main() -> None:
 
 
 def _load() -> None:
-    """Load, and run once, all that is compiled."""
+    """Load all modules and run all compiled functions once."""
     from colibri.sitl.backends.lockstep import LockstepSession
     from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
     from colibri.sitl.backends.setting import setting_of

@@ -1,4 +1,4 @@
-"""Plant and autopilot of a flight in memory, as objects: for tests of what no message shows or changes."""
+"""Plant and autopilot of a flight in memory, as objects."""
 
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import Copter
@@ -10,18 +10,12 @@ from colibri.sitl.errors import SitlError
 
 
 class Inside:
-    """The two sides of a flight in memory.
+    """Access to plant and autopilot, for tests of internal state.
 
-    Attributes:
-        plant: The plant.
+    SitlError if they are in other processes.
     """
 
     def __init__(self, session: LockstepSession) -> None:
-        """Open a flight.
-
-        Raises:
-            SitlError: Its autopilot is in another process.
-        """
         plant, autopilot = session.plant, session.autopilot
         if not (isinstance(plant, MemoryPlant) and isinstance(autopilot, MemoryAutopilot)):
             raise SitlError("nothing can be seen inside another process: fly with --sitl-link memory")
@@ -32,26 +26,26 @@ class Inside:
 
     @property
     def autopilot(self) -> Autopilot[Copter]:
-        """What flies the vehicle frame by frame; another one after a restart."""
+        """The autopilot; a new one after a restart."""
         return self._side.autopilot
 
     @property
     def copter(self) -> Copter:
-        """What the autopilot does at each stage of a frame."""
         return self._side.autopilot.stages
 
     @property
     def world(self) -> World:
-        """The plant's world; the next frame is of one that is set."""
+        """The plant's world; setting it changes the next frame."""
         return self.plant.world
 
     @world.setter
     def world(self, world: World) -> None:
+        """The plant's world; setting it changes the next frame."""
         self.plant.world = world
         self._measure_again()
 
     def skip(self, frames: int) -> None:
-        """Have the plant go on by itself for some frames, with the last command."""
+        """Let the plant run without the autopilot for some frames, with the last command."""
         for _ in range(frames):
             self.plant.go_on()
         self._measure_again()

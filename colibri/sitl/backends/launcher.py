@@ -1,4 +1,4 @@
-"""Starts processes of a flight: both from scratch, or the autopilot, forked from one that has loaded everything."""
+"""Start the processes of a flight: both as commands, or the autopilot forked from a loaded process."""
 
 import json
 import os
@@ -17,43 +17,30 @@ _LAST_WORDS_BYTES = 2000
 
 
 class Launcher(Protocol):
-    """Starts processes.
+    """Starts processes whose output goes into a file.
 
     Attributes:
-        starts_plants: Whether the plant is to be a process, too; if not, the test's own has it.
+        starts_plants: False if the plant runs in the test's process.
     """
 
     starts_plants: bool
 
-    def start(self, spec: ProcessSpec, log: Path) -> Running:
-        """Start what `spec` describes; its output goes into file `log`."""
+    def start(self, spec: ProcessSpec, log: Path) -> Running: ...
 
-    def close(self) -> None:
-        """End what is left."""
+    def close(self) -> None: ...
 
 
 class LoggedChild:
-    """A flying process, with its output.
-
-    Attributes:
-        name: What it is.
-        number: Of the process.
-        log: The file of its output.
-    """
+    """A running process and the file of its output."""
 
     def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
-        """Start it."""
         self.name = name_of(spec)
         self.log = log
         self._running = launcher.start(spec, log)
         self.number = self._running.number
 
     def check(self) -> None:
-        """See that it lives.
-
-        Raises:
-            SessionError: It has died.
-        """
+        """Raise SessionError if the process has died."""
         code = self._running.code()
         if code is None:
             return
@@ -61,52 +48,45 @@ class LoggedChild:
         raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
 
     def last_words(self) -> str:
-        """Return the last line that is not a status."""
+        """Return the last line of output that is not a status."""
         text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
         lines = [line for line in text.splitlines() if line and not line.startswith("{")]
         return lines[-1] if lines else ""
 
     def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
         self._running.kill()
 
 
 class FromScratch:
-    """Starts each process from scratch, as a user does."""
+    """Starts each process as a user does."""
 
     starts_plants = True
 
     def start(self, spec: ProcessSpec, log: Path) -> Running:
-        """Start what `spec` describes; its output goes into file `log`."""
         return Child(spec, log=log)
 
-    def close(self) -> None:
-        """Leave nothing: each flight ends its own."""
+    def close(self) -> None: ...
 
 
 class Forked:
-    """Has a fork server start each autopilot: it has loaded what they need, which takes longer than most flights.
+    """Forks each autopilot from a loaded server: loading takes longer than most flights.
 
-    Plants stay with the test, which steps them: of three processes that share a core each would find less of what it
-    needs in the caches than of two.
+    Plants run in the test's process: on a shared core, two processes make better use of the caches than three.
     """
 
     starts_plants = False
 
     def __init__(self) -> None:
-        """Start the fork server; it loads while this process goes on."""
         command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
         self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
     def start(self, spec: ProcessSpec, log: Path) -> Running:
-        """Start what `spec` describes; its output goes into file `log`."""
         log.touch()
         pid = self._request("start", name_of(spec), str(log), to_json(spec).decode())
         assert pid is not None, "whatever is forked has a number"
         return _ForkedChild(pid, self._request)
 
     def close(self) -> None:
-        """End the fork server, and with it whatever it has started."""
         assert self._fork_server.stdin is not None, "it is piped"
         self._fork_server.stdin.close()
         self._fork_server.wait()
@@ -143,19 +123,18 @@ class _ForkedChild:
 
 
 def launcher(*, from_scratch: bool) -> Launcher:
-    """Return what starts processes; where nothing can be forked, each starts from scratch."""
     return FromScratch() if from_scratch or not hasattr(os, "fork") else Forked()
 
 
 @contextmanager
 def one_core(worker: int, workers: int) -> Iterator[None]:
-    """Keep this thread, and each process that it starts, to a core of its own, where workers take up all cores.
+    """Pin this thread and its processes to one core each if workers occupy all cores.
 
-    Of a flight in lockstep one process computes at a time, and to wake the next one costs much more on another core.
+    In lockstep one process computes at a time, and waking another core costs much more.
 
     Args:
-        worker: Which of those that fly at the same time, from 0 on.
-        workers: How many they are.
+        worker: Index of the worker, from 0.
+        workers: Number of workers.
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
     if not cores or not workers or workers % len(cores):  # a core may be idle, or would have more to do than others

@@ -1,4 +1,4 @@
-"""Faults of a link: loss, delay, duplication, reordering and corruption of datagrams, by seed and simulated time."""
+"""Link faults: loss, delay, duplication, reordering and corruption of datagrams, by seed and simulated time."""
 
 from dataclasses import dataclass
 from heapq import heappop, heappush
@@ -6,25 +6,25 @@ from math import inf
 from random import Random
 
 _HELD_BACK_S = 0.05
-"""For so long, at most, a datagram is held back so that others overtake it."""
+"""Largest delay of a reordered datagram."""
 
 
 _MAX = {"loss": 1.0, "delay_s": inf, "jitter_s": inf, "duplicate": 1.0, "reorder": 1.0, "corrupt": 1.0, "down": True}
-"""What a link does, and the largest value of each; the smallest is 0."""
+"""Largest value of each fault; the smallest is 0."""
 
 
 @dataclass(slots=True)
 class Trouble:
-    """What a link does, to each datagram by itself. May be changed at any time, to what it can be.
+    """The faults of a link, drawn for each datagram; may be changed at any time.
 
     Attributes:
-        loss: Part of the datagrams that never arrive.
-        delay_s: How long each takes.
-        jitter_s: How much longer at most.
-        duplicate: Part that arrives twice, the second time with a delay of its own.
-        reorder: Part that is held back, so that others overtake it.
-        corrupt: Part in which a bit is wrong.
-        down: Whether nothing arrives.
+        loss: Fraction of datagrams lost.
+        delay_s: Delay of each datagram.
+        jitter_s: Largest additional delay.
+        duplicate: Fraction delivered twice, the copy with its own delay.
+        reorder: Fraction delayed so that later ones overtake.
+        corrupt: Fraction with a wrong bit.
+        down: Whether all are lost.
     """
 
     loss: float = 0.0
@@ -36,12 +36,6 @@ class Trouble:
     down: bool = False
 
     def __setattr__(self, name: str, value: float) -> None:
-        """Change what the link does.
-
-        Raises:
-            AttributeError: A link has no such attribute.
-            ValueError: It cannot have that value.
-        """
         if name not in _MAX:
             raise AttributeError(f"a link has no {name}: choose {', '.join(sorted(_MAX))}")
         if not isinstance(value, int | float) or not 0.0 <= value <= _MAX[name] or value == inf:
@@ -51,23 +45,20 @@ class Trouble:
 
     @property
     def any(self) -> bool:
-        """Whether it does anything at all."""
         of_chance = self.loss or self.duplicate or self.reorder or self.corrupt
         return bool(of_chance or self.delay_s or self.jitter_s or self.down)
 
 
 class Pipe:
-    """One direction of a link."""
+    """One direction of a link; the same `seed` affects the same datagrams."""
 
     def __init__(self, trouble: Trouble, seed: str) -> None:
-        """Apply `trouble` to datagrams; the same `seed` affects the same datagrams."""
         self._trouble = trouble
         self._chance = Random(seed)
         self._waiting: list[tuple[int, int, bytes]] = []
         self._order = 0
 
     def put(self, datagram: bytes, now_us: int) -> None:
-        """Send a datagram."""
         trouble, chance = self._trouble, self._chance
         if not trouble.any:
             self._wait(now_us, datagram)
@@ -83,7 +74,6 @@ class Pipe:
             self._wait(now_us + round((trouble.delay_s + second * trouble.jitter_s) * 1e6), datagram)
 
     def due(self, now_us: int) -> list[bytes]:
-        """Return what arrives up to `now_us`."""
         arrived = []
         while self._waiting and self._waiting[0][0] <= now_us:
             arrived.append(heappop(self._waiting)[2])
@@ -91,7 +81,6 @@ class Pipe:
 
     @property
     def due_us(self) -> int | None:
-        """When something arrives next; None where nothing is on its way."""
         return self._waiting[0][0] if self._waiting else None
 
     def _wait(self, due_us: int, datagram: bytes) -> None:
@@ -100,7 +89,7 @@ class Pipe:
 
 
 def spoilt(datagram: bytes, place: float) -> bytes:
-    """Return a datagram with one bit wrong, the one at `place` of 0..1."""
+    """Flip the bit at relative position `place`, 0..1."""
     if not datagram:
         return datagram
     bit = int(place * len(datagram) * 8)

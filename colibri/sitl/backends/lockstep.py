@@ -1,6 +1,6 @@
-"""A flight in lockstep, one frame at a time: the session stands between plant and autopilot, and steps simulated time.
+"""A flight in lockstep: the session passes datagrams between plant and autopilot, frame by frame.
 
-The two may be in this process or in others: see `memory` and `udp`. Either way the same bytes pass.
+Each side may be in this process or another, see `memory` and `udp`; the bytes are the same.
 """
 
 from collections.abc import Sequence
@@ -32,86 +32,79 @@ _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
 _ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")
 _GLANCE_S = 0.002
 _GIVE_UP_S = 200.0
-"""Of the clock that a link is late by. No flight depends on it."""
+"""In time of the link clock. Flights are independent of it."""
 
 
 class SessionError(SitlError):
-    """A flight that cannot go on: a process has died, or does not answer; the message says which and why."""
+    """A flight cannot go on: a process has died or is silent."""
 
 
 class Plant(Protocol):
-    """The plant's side."""
+    """The plant's side; `process` is its id if it has its own."""
 
     @property
-    def process(self) -> int | None:
-        """The number of its process; None where it has none of its own."""
+    def process(self) -> int | None: ...
 
     def receive(self, datagram: bytes) -> None:
-        """Take in a datagram of an autopilot's, sound or not."""
+        """Process a datagram of an autopilot, which may be corrupt."""
 
     def frame(self) -> list[bytes]:
-        """Return what the plant sends up to its next frame, which comes last."""
+        """Return the datagrams up to the next frame, which comes last."""
 
     def take(self, answer: bytes) -> None:
-        """Take in the answer to that frame, and go on."""
+        """Process the answer to the frame."""
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
+        """Return the datagrams sent within `timeout_s`; an unanswered frame is repeated."""
 
     def clock_s(self) -> float:
-        """Return the time that links are late by."""
+        """Return the time by the link clock, s."""
 
-    def close(self) -> None:
-        """End it."""
+    def close(self) -> None: ...
 
 
 class Autopilot(Protocol):
-    """The autopilot's side."""
+    """The autopilot's side; `process` is its id if it has its own."""
 
     @property
-    def process(self) -> int | None:
-        """The number of its process; None where it has none of its own."""
+    def process(self) -> int | None: ...
 
     def call(self) -> bytes:
-        """Return how it calls a plant."""
+        """Return its first datagram to the plant."""
 
     def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        """Take in a frame of the plant, and what ground stations send at its time."""
+        """Process a frame of the plant, and the datagrams of ground stations at its time."""
 
     def expect(self, step_message: StepMessage) -> None:
-        """Take in what ground stations send at the time of the next frame."""
+        """Process the datagrams of ground stations for the next frame."""
 
     def receive(self, datagram: bytes) -> None:
-        """Give it a datagram of the plant's, sound or not."""
+        """Process a datagram of the plant, which may be corrupt."""
 
     def listen(self) -> list[bytes]:
-        """Return what it has sent to the plant."""
+        """Return the datagrams sent to the plant."""
 
     def answer(self) -> bytes:
-        """Return its answer to the frame."""
+        """Return the answer to the frame."""
 
     def to_stations(self) -> StepMessage:
-        """Return what it sends to ground stations at that frame."""
+        """Return the datagrams to ground stations at that frame."""
 
     def kill(self) -> None:
         """End it as a power cut does."""
 
-    def start(self) -> None:
-        """Start it again."""
+    def start(self) -> None: ...
 
-    def close(self) -> None:
-        """End it."""
+    def close(self) -> None: ...
 
 
 class Instant(NamedTuple):
     """A frame that was flown.
 
     Attributes:
-        began: How the vehicle was, in truth.
-        command: What the autopilot answered.
-        to_stations: What it sent to ground stations.
-        frame: What the plant sent to the autopilot, as bytes.
-        answer: The answer, as bytes.
+        began: True state at its start.
+        frame: Datagram to the autopilot.
+        answer: Datagram to the plant.
     """
 
     began: StateFrame
@@ -125,15 +118,13 @@ class LockstepSession:
     """A flight that is stepped.
 
     Attributes:
-        plant, autopilot: The two sides.
-        truth: How the vehicle is now.
-        flown: The last frame that was flown; before the first one, what there is to it.
+        truth: True state now.
+        flown: The last frame.
         acks: Answers of the plant to commands: number and MAV_RESULT.
-        trouble: What the link between plant and autopilot does.
+        trouble: Faults of the link between plant and autopilot.
     """
 
     def __init__(self, plant: Plant, autopilot: Autopilot, system: int, seed: int = 0) -> None:
-        """Bring the two together; the vehicle is system `system`, and `seed` that of what goes wrong between them."""
         self.plant = plant
         self.autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)
@@ -151,8 +142,8 @@ class LockstepSession:
         """Fly one frame.
 
         Args:
-            parcels: What ground stations send now.
-            injected: Frames that go to the plant with the autopilot's answer.
+            parcels: Datagrams of ground stations.
+            injected: MAVLink frames added to the autopilot's answer.
 
         Raises:
             SessionError: The flight cannot go on.
@@ -177,9 +168,9 @@ class LockstepSession:
     def _struggle(
         self, frame: bytes, step_message: StepMessage, injected: bytes
     ) -> tuple[bytes, StepMessage, list[bytes]]:
-        """Carry a frame and its answer over a bad link, until the plant has gone on.
+        """Pass a frame and its answer over a faulty link.
 
-        Returns the answer, what goes to ground stations, and what the plant sent up to its next frame.
+        Return the answer, the datagrams to ground stations, and those of the plant up to its next frame.
         """
         plant, autopilot, up, down = self.plant, self.autopilot, self._up, self._down
         began_s = plant.clock_s()
@@ -208,25 +199,24 @@ class LockstepSession:
                 raise SessionError("nothing passes between plant and autopilot, however often it is repeated")
 
     def measure_again(self) -> None:
-        """Replace the next frame by one of the plant as it is now."""
+        """Replace the next frame by one of the plant's present state."""
         self._frame, self.truth = self._taken_in(self.plant.frame())
 
     def command_to_plant(self, number: int, *params: float) -> bytes:
-        """Return a COMMAND_LONG as the autopilot would send it to the plant."""
+        """Encode a COMMAND_LONG from the autopilot to the plant."""
         values = (*params, *(0.0,) * (7 - len(params)))
         return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
 
     def change_of_world(self, change: WorldChange) -> bytes:
-        """Return a change of the plant's world as the autopilot would send it."""
+        """Encode a change of the world from the autopilot to the plant."""
         return encode_change(self._codec, change, (self._codec.source[0], PLANT_COMPONENT))
 
     def processes(self) -> dict[str, int]:
-        """Return the number of each process that flies."""
         sides = {"plant": self.plant.process, "autopilot": self.autopilot.process}
         return {name: number for name, number in sides.items() if number is not None}
 
     def kill_autopilot(self) -> None:
-        """End the autopilot as a power cut does, and start it again: the plant waits meanwhile."""
+        """End the autopilot as a power cut does, and restart it while the plant waits."""
         self.autopilot.kill()
         self.autopilot.start()
         self.autopilot.call()
@@ -266,7 +256,7 @@ class LockstepSession:
 
 
 def answers(datagram: bytes, time_us: int) -> bool:
-    """Whether a datagram of whole MAVLink 2 frames that are not signed holds the answer to the frame of a time."""
+    """Whether a datagram of unsigned MAVLink 2 frames holds the answer to the frame of a time."""
     sought = time_us.to_bytes(8, "little")
     at = 0
     while at < len(datagram):
@@ -277,7 +267,7 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
-    """Return what of a plant's datagram is for the autopilot, and the truth, which comes behind it."""
+    """Split a plant's datagram into the part for the autopilot and the truth behind it."""
     at = 0
     while at < len(datagram) and datagram[at + _COMPONENT_AT] != TRUTH_COMPONENT:
         at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES

@@ -1,4 +1,4 @@
-"""Plant and autopilot in this process: what their processes do, without sockets and without a clock."""
+"""Plant and autopilot in this process, without sockets and clock."""
 
 from time import perf_counter
 from typing import Any
@@ -31,17 +31,13 @@ class MemoryPlant:
     """A plant in this process.
 
     Attributes:
-        plant: The plant; None before the first frame.
+        plant: `None` before the first frame.
     """
 
     process = None
 
     def __init__(self, spec: PlantSpec, clock: LinkClock | None = None) -> None:
-        """Begin as `spec` says; without a `clock` the autopilot is in this process, too.
-
-        Raises:
-            SettingError: It cannot begin so.
-        """
+        """Build the plant; pass a `clock` if the autopilot is in another process."""
         try:
             self._builder = builder_of(spec)
         except VehicleError as error:
@@ -53,11 +49,6 @@ class MemoryPlant:
         self._clock = clock or StoppedClock()
 
     def receive(self, datagram: bytes) -> None:
-        """Take in a datagram of an autopilot: its call, or an answer.
-
-        Raises:
-            SessionError: The state cannot be integrated any further.
-        """
         command = self._end.receive(datagram, _ADDRESS, self._clock.now_s())
         self._end.received.clear()
         if command is None:
@@ -70,20 +61,13 @@ class MemoryPlant:
         self._answered = True
 
     def frame(self) -> list[bytes]:
-        """Return what the plant sends up to its next frame, which comes last."""
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def take(self, answer: bytes) -> None:
-        """Take in the answer to that frame, and go on.
-
-        Raises:
-            SessionError: The state cannot be integrated any further.
-        """
         self.receive(answer)
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
         if self._answered:
             self._offer()
         else:
@@ -92,11 +76,9 @@ class MemoryPlant:
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def clock_s(self) -> float:
-        """Return the time that links are late by."""
         return self._clock.now_s()
 
-    def close(self) -> None:
-        """Leave nothing: it has no process."""
+    def close(self) -> None: ...
 
     def _offer(self) -> None:
         end = self._end
@@ -108,29 +90,19 @@ class MemoryPlant:
 
 
 class MemoryAutopilot:
-    """An autopilot in this process, with its ground side as the process has it.
+    """An autopilot in this process, with its ground side.
 
     Attributes:
-        autopilot: The autopilot; another one after a restart.
+        autopilot: A new one after a restart.
     """
 
     process = None
 
     def __init__(self, spec: AutopilotSpec) -> None:
-        """Begin as `spec` says.
-
-        Raises:
-            SettingError: It cannot begin so.
-        """
         self._spec = spec
         self.start()
 
     def start(self) -> None:
-        """Start it again.
-
-        Raises:
-            SettingError: It cannot start.
-        """
         spec = self._spec
         try:
             self._conductor = _MemoryConductor()
@@ -141,7 +113,7 @@ class MemoryAutopilot:
         self.connect()
 
     def connect(self) -> None:
-        """Forget which frame the plant sent last: the next one may be of any time."""
+        """Reset the connection, so that the next frame may have any time."""
         spec = self._spec
         self._end = AutopilotEnd(
             system_id=spec.system_id,
@@ -151,81 +123,65 @@ class MemoryAutopilot:
         )
 
     def call(self) -> bytes:
-        """Return how it calls a plant."""
         self._end.poll(NEVER_LATE_S)
         (call,) = self._end.take_outbox()
         return call
 
     def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        """Take in a frame of the plant, and what ground stations send at its time."""
         self.expect(step_message)
         self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
-        """Take in what ground stations send at the time of the next frame."""
         self._conductor.from_stations = step_message
 
     def receive(self, datagram: bytes) -> None:
-        """Give it a datagram of the plant's, sound or not."""
         try:
             answer(self._end, self.autopilot, datagram, NEVER_LATE_S)
         except DecisionError as error:
             raise SessionError(f"the autopilot ended: {error}") from error
 
     def listen(self) -> list[bytes]:
-        """Return what it has sent to the plant."""
         return self._end.take_outbox()
 
     def answer(self) -> bytes:
-        """Return its answer to the frame.
-
-        Raises:
-            SessionError: It was shut down.
-        """
         if self._ground.shut_down:
             raise SessionError("the autopilot ended with exit code 0")
         (answer,) = self._end.take_outbox()
         return answer
 
     def to_stations(self) -> StepMessage:
-        """Return what it sends to ground stations at that frame."""
         self.autopilot = self._ground.serve(perf_counter())
         assert self._conductor.to_stations is not None, "it has served them"
         return self._conductor.to_stations
 
     def kill(self) -> None:
-        """End it as a power cut does: nothing is written that was not."""
+        """End it as a power cut does: pending files are not written."""
         self._ground.abandon()
 
     def close(self) -> None:
-        """End it."""
         self._ground.close()
 
 
 class _MemoryConductor:
-    """The conductor of an autopilot in this process."""
+    """Passes messages of ground stations within this process."""
 
     def __init__(self) -> None:
         self.from_stations: StepMessage | None = None
         self.to_stations: StepMessage | None = None
 
     def receive(self) -> StepMessage | None:
-        """Return what ground stations send at this time."""
         return self.from_stations
 
     def send(self, step_message: StepMessage) -> None:
-        """Take in what the vehicle sends."""
         self.to_stations = step_message
 
-    def close(self) -> None:
-        """Let go."""
+    def close(self) -> None: ...
 
 
 class _Silence(Status):
-    """Says nothing."""
+    """Prints no events."""
 
     def __init__(self) -> None:
         super().__init__("", as_json=False)
 
-    def say(self, event: str, text: str, **facts: Any) -> None:
-        """Say nothing."""
+    def say(self, event: str, text: str, **facts: Any) -> None: ...

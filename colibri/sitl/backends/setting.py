@@ -20,15 +20,15 @@ from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.errors import SitlError
 
 _STANDING = Start(psi=90.0)
-"""On its feet at the origin, its nose to the north."""
+"""At rest on its feet at the origin, facing north."""
 
 
 class SettingError(SitlError):
-    """A flight that cannot begin so; the message is the one line that a user needs."""
+    """A setting with which a flight cannot begin."""
 
 
 def _numbers(text: str) -> dict[str, int | float]:
-    """Read KEY=VALUE,... in numbers; whole ones stay whole."""
+    """Parse KEY=VALUE,... with numbers; integers stay integers."""
     try:
         return {key: _number(value) for key, _, value in (pair.partition("=") for pair in text.split(","))}
     except ValueError:
@@ -43,8 +43,8 @@ def _number(text: str) -> int | float:
 class Setting(WorldSpec, LawSpec):
     """The setting of a flight; most fields are options of `colibri plant` and `autopilot`.
 
-    The seed is that of the links' faults, too. What is left out of `start` is that of a vehicle that stands, nose to
-    the north; x, y, z count from there.
+    The seed also seeds link faults. The default start is standing at the origin, facing north; x, y, z count from
+    there.
     """
 
     vehicle: Annotated[str | Vehicle, Option("vehicle that the plant flies, name or .toml")] = "hummingbird"
@@ -77,11 +77,7 @@ class Setting(WorldSpec, LawSpec):
     ready: Annotated[bool, Option("the flight is handed over only after the first HEARTBEAT")] = True
 
     def plant_spec(self) -> PlantSpec:
-        """Return the plant.
-
-        Raises:
-            VehicleError: There is no such vehicle.
-        """
+        """Return the specification of the plant."""
         start = _STANDING
         if self.airborne is not None:
             vehicle = load_vehicle(self.vehicle)
@@ -91,7 +87,7 @@ class Setting(WorldSpec, LawSpec):
         return part_of(self, PlantSpec, system_id=self.system, start=begins, truth=True, speed=inf)
 
     def autopilot_spec(self, state: Path) -> AutopilotSpec:
-        """Return an autopilot that keeps its files in folder `state`."""
+        """Return the specification of an autopilot with its files in folder `state`."""
         vehicle = self.believed or self.vehicle
         return part_of(self, AutopilotSpec, vehicle=vehicle, system_id=self.system, state=state)
 
@@ -100,11 +96,7 @@ DOES = frozenset(Trouble.__slots__) - {"down"}
 
 
 def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
-    """Return the setting that several marks describe together, where a later one overrides; params add up.
-
-    Raises:
-        SettingError: An option is unknown, or cannot have its value.
-    """
+    """Merge marks into a setting: later ones override, params add up."""
     values: dict[str, Any] = {}
     for mark in marks:
         read = read_values(Setting, mark, SettingError)

@@ -1,4 +1,4 @@
-"""Plant and autopilot as processes over UDP, either or both, this process in between."""
+"""Plant and autopilot, either or both, as processes that this one connects over UDP."""
 
 import json
 from collections.abc import Sequence
@@ -17,16 +17,15 @@ from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import SessionError, answers, parted
 
 SILENCE_S = 60.0
-"""Wall-clock time after which a silent process is taken for dead. No flight depends on it."""
+"""Wall-clock time after which a silent process counts as dead. Flights are independent of it."""
 _LOOK_EVERY_S = 0.1
 _HERE = "udpin:127.0.0.1:0"
 
 
 class UdpPlant:
-    """A plant in another process."""
+    """A plant in another process; see `lockstep.Plant`."""
 
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
-        """Start it; `folder` takes its output."""
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
         self._link: UdpLink | None = None
         self._clock = QuickClock()
@@ -34,17 +33,15 @@ class UdpPlant:
 
     @property
     def process(self) -> int:
-        """The number of its process."""
         return self._child.number
 
     def receive(self, datagram: bytes) -> None:
-        """Send a datagram of an autopilot that answers no frame: its call."""
+        """Send the autopilot's first datagram."""
         if self._link is None:
             self._link = opened(self._url().replace("udpin", "udpout"))
         self._link.send(datagram)
 
     def frame(self) -> list[bytes]:
-        """Return what the plant sends up to its next frame, which comes last."""
         assert self._link is not None, "it was called"
         datagrams = []
         while True:
@@ -59,13 +56,11 @@ class UdpPlant:
                 return datagrams
 
     def take(self, answer: bytes) -> None:
-        """Send the answer to that frame."""
         assert self._link is not None, "it was called"
         self._answer = answer
         self._link.send(answer)
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
         assert self._link is not None, "it was called"
         self._link.wait(timeout_s)
         datagrams = [datagram for datagram, _ in self._link.receive_now()]
@@ -75,17 +70,14 @@ class UdpPlant:
         return datagrams
 
     def clock_s(self) -> float:
-        """Return the time that links are late by."""
         return self._clock.now_s()
 
     def close(self) -> None:
-        """End it."""
         self._child.kill()
         if self._link is not None:
             self._link.close()
 
     def _url(self) -> str:
-        """Return where it listens."""
         began_s = perf_counter()
         while perf_counter() < began_s + SILENCE_S:
             for line in self._child.log.read_text(encoding="utf-8").split("\n")[:-1]:
@@ -98,10 +90,9 @@ class UdpPlant:
 
 
 class UdpAutopilot:
-    """An autopilot in another process."""
+    """An autopilot in another process; see `lockstep.Autopilot`."""
 
     def __init__(self, launcher: Launcher, spec: AutopilotSpec, folder: Path) -> None:
-        """Start it; `folder` takes its output."""
         self._launcher = launcher
         self._folder = folder
         self._spec = spec
@@ -110,11 +101,9 @@ class UdpAutopilot:
 
     @property
     def process(self) -> int:
-        """The number of its process."""
         return self._child.number
 
     def start(self) -> None:
-        """Start it again."""
         self._starts += 1
         self._link, self._stations = opened(_HERE), opened(_HERE)
         plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
@@ -124,7 +113,6 @@ class UdpAutopilot:
         self._time_us = 0
 
     def call(self) -> bytes:
-        """Return how it calls a plant."""
         _, address = received(self._stations, (self._child,), "autopilot")
         self._stations.speak_with(address)
         call, address = received(self._link, (self._child,), "autopilot")
@@ -132,36 +120,31 @@ class UdpAutopilot:
         return call
 
     def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        """Take in a frame of the plant, and what ground stations send at its time."""
         self.expect(step_message)
         self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
-        """Take in what ground stations send at the time of the next frame."""
         self._time_us = step_message.time_us
         for packet in packets(step_message):
             self._stations.send(packet)
 
     def receive(self, datagram: bytes) -> None:
-        """Give it a datagram of the plant's, sound or not."""
         self._link.send(datagram)
 
     def listen(self) -> list[bytes]:
-        """Return what it has sent to the plant."""
         datagrams = [datagram for datagram, _ in self._link.receive_now()]
         if not datagrams:
             self._child.check()
         return datagrams
 
     def answer(self) -> bytes:
-        """Return its answer to the frame; everything else is a call for a plant."""
+        """Return the answer to the frame; other datagrams are calls for a plant."""
         while True:
             datagram, _ = received(self._link, (self._child,), "autopilot")
             if answers(datagram, self._time_us):
                 return datagram
 
     def to_stations(self) -> StepMessage:
-        """Return what it sends to ground stations at that frame."""
         while True:
             packet, _ = received(self._stations, (self._child,), "autopilot")
             step_message = self._gathering.take(packet)
@@ -169,18 +152,16 @@ class UdpAutopilot:
                 return step_message
 
     def kill(self) -> None:
-        """End it as a power cut does, and forget what is still on its way."""
         self.close()
 
     def close(self) -> None:
-        """End it."""
         self._child.kill()
         self._link.close()
         self._stations.close()
 
 
 def opened(url: str) -> UdpLink:
-    """Open a link that is polled with pauses: flights share the cores."""
+    """Open a link that sleeps between polls, as flights share the cores."""
     link = open_link(url)
     link.spin_s = 0.0
     return link
@@ -189,11 +170,7 @@ def opened(url: str) -> UdpLink:
 def received(
     link: UdpLink, children: Sequence[LoggedChild], name: str, silence_s: float = SILENCE_S
 ) -> tuple[bytes, Address]:
-    """Return what comes next.
-
-    Raises:
-        SessionError: The process has died, or is silent.
-    """
+    """Return the next datagram; SessionError if the process has died or is silent."""
     began_s = perf_counter()
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:
         for child in children:

@@ -1,1 +1,1 @@
-"""The page itself, by viser, which no other room imports: server, scene, plots, controls."""
+"""The page in viser: server, scene, plots, controls."""

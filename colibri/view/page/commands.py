@@ -1,4 +1,4 @@
-"""Commands to a live vehicle: in each browser for itself, once it has said the token."""
+"""Commands to a live vehicle, in each browser once its user has entered the token."""
 
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue
@@ -11,12 +11,12 @@ from colibri.view.access import Token
 from colibri.view.page.controls import Done
 
 ORDERS = {"Arm": "arm", "Disarm": "disarm", "Take off": "take off", "Land": "land", "Return": "return"}
-"""Buttons, and what they order."""
+"""Buttons and their commands."""
 _HEIGHT_M = 3.0
 
 
 class Commands:
-    """What commands there are in each browser; none of them is there before the token was."""
+    """The command panels of all browsers; commands go into the queue `done`."""
 
     def __init__(
         self,
@@ -26,7 +26,6 @@ class Commands:
         done: "SimpleQueue[Done]",
         ground_point: Callable[[Vector, Vector], Vector | None],
     ) -> None:
-        """Ask each browser that comes for `token`; put what it orders into `done`."""
         self._token = token
         self._modes = modes
         self._done = done

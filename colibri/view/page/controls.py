@@ -1,4 +1,4 @@
-"""Buttons, sliders and words at the left: what is done with them goes into a queue, in its order."""
+"""The left panel; user actions go into a queue."""
 
 from collections.abc import Sequence
 from queue import SimpleQueue
@@ -13,17 +13,16 @@ from colibri.view.snapshot import Snapshot
 
 
 class Done(NamedTuple):
-    """What somebody did: `play`, `seek` to a time, `speed` as its text, `layers`, `scale`, `follow`."""
+    """A user action: `play`, `seek` with time, `speed` with its text, `layers`, `scale`, `follow`."""
 
     what: str
     value: Any = None
 
 
 class Controls:
-    """The panel at the left."""
+    """The left panel; a live vehicle has no `span_s` and no time line."""
 
     def __init__(self, gui: viser.GuiApi, span_s: tuple[float, float] | None, scale: float) -> None:
-        """Build it; `span_s` is None for what is live and has no time line."""
         self.done: SimpleQueue[Done] = SimpleQueue()
         self._words = gui.add_markdown("")
         self._play: viser.GuiButtonHandle | None = None
@@ -35,11 +34,9 @@ class Controls:
 
     @property
     def layers(self) -> frozenset[str]:
-        """What is to be shown."""
         return frozenset(name for name, box in self._boxes.items() if box.value)
 
     def show(self, text: str, time_s: float, plays: bool) -> None:
-        """Show words, and where playing is."""
         if self._words.content != text:
             self._words.content = text
         if self._slider is not None and self._play is not None:
@@ -67,13 +64,13 @@ class Controls:
         follow.on_update(lambda event: self._by_hand(event, Done("follow", follow.value)))
 
     def _by_hand(self, event: viser.GuiEvent[Any], done: Done) -> None:
-        """Count what a browser did, not what the page sets itself."""
+        """Queue an action of a browser; changes by the page itself have no client."""
         if event.client_id is not None:
             self.done.put(done)
 
 
 def words(names: Sequence[str], snapshots: Sequence[Snapshot]) -> str:
-    """Return what is said of the vehicles now, as Markdown."""
+    """Describe the vehicles now, as Markdown."""
     return "\n\n".join(
         _of_one(name, "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)]), now)
         for number, (name, now) in enumerate(zip(names, snapshots, strict=True))
@@ -102,5 +99,5 @@ def _of_one(name: str, colour: str, now: Snapshot) -> str:
 
 
 def _widened(span_s: tuple[float, float]) -> tuple[float, float]:
-    """Return the ends of the time line to the hundredth; a flight of one row gets some length."""
+    """Round the ends of the time line to 0.01 s, at least that far apart."""
     return round(span_s[0], 2), max(round(span_s[1], 2), round(span_s[0], 2) + 0.01)

@@ -1,4 +1,4 @@
-"""The page as one thing: begun with vehicles, shown what they are like, asked what was done on it."""
+"""The page: shows vehicles and collects user actions."""
 
 from collections.abc import Callable, Iterator, Sequence
 from queue import Empty
@@ -18,21 +18,18 @@ from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
 _LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
-"""Half of the side of what is looked at of a vehicle whose way is not known yet; how much more than its plans is."""
+"""Half size of the view before a live vehicle's path is known; margin around its plans."""
 
 
 class Page:
     """A page that shows vehicles.
 
     Attributes:
-        server: viser's.
-        url: Its address.
-        controls: What it was told.
-        laid_out: Whether some browser has put the panels in their places: its camera has another aspect from then on.
+        server: The server of viser.
+        laid_out: Whether a browser has laid out its panels, which changes the aspect of its camera.
     """
 
     def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
-        """Put it on a server."""
         self._sources = sources
         self._names = [source.name for source in sources]
         self.server = server
@@ -67,11 +64,10 @@ class Page:
 
     @property
     def watched(self) -> bool:
-        """Whether a browser shows it."""
         return bool(self.server.get_clients())
 
     def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
-        """Begin the scene, of which browsers have nothing before; whatever is known of a live vehicle is in sight."""
+        """Draw the scene; browsers that are connected already get the camera of a live vehicle's surroundings."""
         if self._vehicles:
             return
         if snapshots and self._sources[0].is_live:
@@ -94,7 +90,7 @@ class Page:
         client.camera.on_update(note)
 
     def done(self) -> Iterator[Done]:
-        """Yield what was done since last asked; what concerns only the picture is taken care of."""
+        """Yield user actions; those about the picture only are applied here."""
         while True:
             try:
                 done = self.controls.done.get_nowait()
@@ -111,7 +107,7 @@ class Page:
             yield done
 
     def show(self, snapshots: Sequence[Snapshot]) -> None:
-        """Show each vehicle as it is now, once the scene has begun."""
+        """Update each vehicle, once the scene is drawn."""
         if not self._vehicles:
             return
         layers = self.controls.layers
@@ -126,26 +122,26 @@ class Page:
                 self._world.position = (-x, -y, -z)
 
     def tell(self, snapshots: Sequence[Snapshot], time_s: float, plays: bool) -> None:
-        """Say in words what they are doing."""
+        """Update the texts."""
         self.controls.show(words(self._names, snapshots), time_s, plays)
 
     def plot(self, time_s: float, *, anew: bool = False) -> None:
-        """Mark a time in the plots; `anew` plots what has come since, too."""
+        """Move the mark in the plots; `anew` also updates the series."""
         if anew:
             self._plots.show([source.charts() for source in self._sources])
         self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
-        """Offer commands to browsers that know a token; they come as `order` among what was done."""
+        """Offer commands to browsers with the token; they are yielded by `done` as `order`."""
         Commands(self.server, token, modes, self.controls.done, self._ground_point)
 
     def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
-        """Return where a ray of the camera meets the ground, in the vehicle's frame."""
+        """Intersect a ray of the camera with the ground, in the vehicle's frame."""
         x, y, z = np.subtract(origin, self._world.position).tolist()
         return ground_point((x, y, z), direction, self._ground_m)
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
-        """Return the scene at some times, one after the other at their pace, as a page that needs no server."""
+        """Return an animation of the scene at some times as a page that works without a server."""
         self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]
@@ -156,7 +152,6 @@ class Page:
         return serializer.as_html()
 
     def close(self) -> None:
-        """End the server."""
         stop(self.server)
 
     def _built(self) -> list[VehicleScene]:
@@ -164,7 +159,7 @@ class Page:
         return [VehicleScene(scene, number, each.airframe, self._scale) for number, each in enumerate(self._sources)]
 
     def _look(self, middle: tuple[float, float, float], extent_m: float) -> None:
-        """Put the camera of who comes: from the south-west, at all of the flight."""
+        """Set the initial camera: from the south-west, with the whole flight in view."""
         camera = self.server.initial_camera
         camera.position = tuple(np.add(middle, np.array([-1.2, -1.8, 1.0]) * extent_m).tolist())
         camera.look_at = middle

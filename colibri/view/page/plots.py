@@ -1,4 +1,4 @@
-"""The plots beside the scene: series over time, and a mark where the flight is now."""
+"""Plots beside the scene: series over time, with a mark at the present time."""
 
 from collections.abc import Sequence
 from itertools import cycle
@@ -20,10 +20,9 @@ _AXIS_PX = 44
 
 
 class Plots:
-    """One plot a title: of one vehicle all series, of several the headline of each."""
+    """One plot per title: all series of one vehicle, or the headline of each of several."""
 
     def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str], *, marked: bool) -> None:
-        """Plot into a tab, of vehicles by their names; `marked` where a time of theirs can be marked."""
         self._marked = marked
         self._gui = gui
         self._tab = tab
@@ -31,7 +30,6 @@ class Plots:
         self._shown: dict[str, tuple[Any, tuple[Array, ...]]] = {}
 
     def show(self, charts: Sequence[Sequence[Chart]]) -> None:
-        """Plot charts of each vehicle."""
         for title in dict.fromkeys(chart.title for of_one in charts for chart in of_one):
             same = [next((chart for chart in of_one if chart.title == title), None) for of_one in charts]
             data, series = self._alone(same[0]) if len(same) == 1 and same[0] else self._overlaid(same)
@@ -44,7 +42,6 @@ class Plots:
                 self._shown[title] = (handle, data)
 
     def mark(self, time_s: float) -> None:
-        """Mark a time in each plot, where that can be done."""
         if not self._marked:
             return
         for handle, data in self._shown.values():
@@ -75,7 +72,7 @@ class Plots:
         return self._framed(chart.times_s, list(chart.values), lines)
 
     def _overlaid(self, charts: Sequence[Chart | None]) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-        """Return the headlines of several vehicles over the times of all."""
+        """Return the headlines of several vehicles over the union of their times."""
         known = [chart for chart in charts if chart is not None]
         times_s = np.unique(np.concatenate([chart.times_s for chart in known]))
         values, lines = [], []
@@ -90,7 +87,7 @@ class Plots:
     def _framed(
         self, times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
     ) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-        """Return data and series with time before them and the mark, if there is one, behind them."""
+        """Return data and series with time first and, if used, the mark last."""
         seconds = uplot.Series(label="s")
         if not self._marked:
             return (times_s, *values), (seconds, *lines)
@@ -99,7 +96,7 @@ class Plots:
 
 
 def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
-    """Return a line along the lowest value, up to the largest at a time: uPlot finds no range for what is no number."""
+    """Return the mark: a line at the lowest value with a peak at a time. A nan would break uPlot's scaling."""
     low, high = (float(pick(values)) for pick in (np.min, np.max))
     mark = np.full(len(times_s), low)
     if time_s >= times_s[0]:

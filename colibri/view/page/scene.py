@@ -1,4 +1,4 @@
-"""The scene: what snapshots and surroundings look like in three dimensions."""
+"""The 3D scene of snapshots and surroundings."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ from colibri.view.geometry import (
 from colibri.view.snapshot import NO_POINTS, Airframe, Mark, Snapshot, Surroundings
 
 COLOURS: tuple[Colour, ...] = ((30, 110, 210), (230, 120, 20), (40, 150, 70), (150, 60, 170))
-"""Of the first vehicle, the second, ..."""
+"""By vehicle."""
 LAYERS = ("trail", "path", "reference", "horizon", "thrust", "estimate", "wind", "mission, fence")
 REFERENCE: Colour = (120, 120, 120)
 HORIZON: Colour = (220, 30, 160)
@@ -32,16 +32,15 @@ RALLY: Colour = (110, 60, 190)
 _FRONT: Colour = (220, 50, 40)
 _DARK: Colour = (60, 60, 65)
 _WIND_S = 0.4
-"""The arrow of the wind is what it blows in that time, at a vehicle of true size."""
+"""Length of the wind's arrow in time, for a vehicle of true size."""
 _ABOVE, _BELOW = (0.0, 0.0, 0.2), (0.0, 0.0, -0.2)
 _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 
 
 class VehicleScene:
-    """One vehicle, its trail, reference and horizon."""
+    """One vehicle with trail, reference and horizon, drawn at `scale` times its size."""
 
     def __init__(self, scene: viser.SceneApi, number: int, airframe: Airframe, scale: float) -> None:
-        """Draw it at `scale` times its size."""
         self._scene = scene
         self._root = f"/world/{number}"
         self._airframe = airframe
@@ -77,7 +76,6 @@ class VehicleScene:
         )
 
     def show(self, now: Snapshot, ground_m: float, layers: frozenset[str]) -> None:
-        """Show it as it is now, over the ground; rotors turn on since the snapshot before."""
         elapsed_s = 0.0 if self._time_s is None else min(max(now.time_s - self._time_s, 0.0), 0.2)
         self._time_s = now.time_s
         self._angles = blade_angles(now.rotors, self._airframe.spins, self._angles, elapsed_s)
@@ -96,7 +94,6 @@ class VehicleScene:
         self._show_estimate(now, layers)
 
     def remove(self) -> None:
-        """Take it away."""
         self._frame.remove()
 
     def _show_reference(self, now: Snapshot, layers: frozenset[str]) -> None:
@@ -121,7 +118,7 @@ class VehicleScene:
         )
 
     def _build(self, colour: Colour) -> tuple[list[viser.BoxHandle], list[viser.CylinderHandle]]:
-        """Draw body, arms and rotors; return blades, which turn, and discs, which have the colour of the speed."""
+        """Draw body, arms and rotors; return blades and discs, which change."""
         scene, at, scale = self._scene, f"{self._root}/vehicle", self._scale
         radius = self._airframe.radius_m * scale
         scene.add_box(f"{at}/body", dimensions=(0.9 * radius, 0.6 * radius, 0.3 * radius), color=colour)
@@ -160,7 +157,6 @@ class SurroundingsScene:
     """Ground, paths, mission, fence, home and rally points of one vehicle."""
 
     def __init__(self, scene: viser.SceneApi, number: int) -> None:
-        """Draw nothing yet."""
         self._scene = scene
         self._root = f"/world/around{number}"
         self._frame = scene.add_frame(self._root, show_axes=False)
@@ -169,7 +165,7 @@ class SurroundingsScene:
         self.shown: Surroundings | None = None
 
     def show(self, around: Surroundings, layers: frozenset[str]) -> None:
-        """Draw anew what has changed; show what belongs to `layers`."""
+        """Redraw after changes; show the given layers."""
         if around is not self.shown:
             self.shown = around
             self._frame.remove()
@@ -205,7 +201,7 @@ class SurroundingsScene:
         return self._scene.add_line_segments(at, lines, colors=colour, thickness=width, thickness_units="screen")
 
     def _marks(self, name: str, marks: tuple[Mark, ...], colour: Colour, *, below: bool = False) -> None:
-        """Draw balls with words above them, or below, where those of a landing at home leave room."""
+        """Draw balls with labels above; below for home, where a landing has its own."""
         for number, mark in enumerate(marks):
             at = f"{self._root}/{name}{number}"
             self._add("mission, fence", self._scene.add_icosphere(at, 0.12, colour, position=mark.place_enu_m))
@@ -223,7 +219,7 @@ class SurroundingsScene:
 
 
 def add_ground(scene: viser.SceneApi, ground_m: float, extent_m: float) -> None:
-    """Draw the ground: squares of 1 m, or of 10 m where the scene is large."""
+    """Draw the ground: squares of 1 m, of 10 m in a large scene."""
     cell = 1.0 if extent_m < 40.0 else 10.0
     scene.configure_default_lights(cast_shadow=False)
     scene.add_grid(
@@ -248,7 +244,7 @@ def add_ground(scene: viser.SceneApi, ground_m: float, extent_m: float) -> None:
 
 
 def _show(handle: Any, points: Any, layers: frozenset[str], layer: str) -> None:
-    """Give lines or arrows their points; hide them where there are none, or their layer is not shown."""
+    """Update lines or arrows; hide them if they are empty or their layer is off."""
     visible = layer in layers and points is not None and len(points) > 0
     if handle.visible != visible:
         handle.visible = visible

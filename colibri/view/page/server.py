@@ -1,4 +1,4 @@
-"""The server of the page: viser's, on loopback, refusing whoever comes from elsewhere."""
+"""The server of the page: viser on loopback, with access control."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -18,15 +18,14 @@ _Answer = Callable[[ServerConnection, Request], Response | None]
 
 
 class PageServer(viser.ViserServer):
-    """viser's server without its tunnel, which would lead from everywhere to this computer."""
+    """viser's server without its public tunnel to this computer."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
-        """Open none, whoever asks."""
         return None
 
 
 def serve(port: int, label: str) -> PageServer:
-    """Return a server on a port of loopback; 0 takes one that is free.
+    """Start a server on a port of loopback; 0 takes a free one.
 
     Raises:
         ViewError: The port is taken.
@@ -43,19 +42,18 @@ def serve(port: int, label: str) -> PageServer:
 
 
 def address(server: PageServer) -> str:
-    """Return where a browser finds the page."""
     return f"http://{HOST}:{server.get_port()}"
 
 
 def stop(server: PageServer) -> None:
-    """End a server; it would say so where the page's address stands."""
+    """Stop a server; viser's message would mix with the page's address."""
     with redirect_stdout(StringIO()):
         server.stop()
 
 
 @contextmanager
 def _guarded() -> Iterator[list[str]]:
-    """Have what is served meanwhile look at each request first; yields as many words as servers were begun."""
+    """Add access control to servers started in this block; yield one word for each."""
     begun: list[str] = []
     unguarded = websockets.asyncio.server.serve
 

@@ -1,1 +1,1 @@
-"""Recorded flights: what is shown of their logs at a time, and the horizons that a replay predicts once more."""
+"""Recorded flights: state from their logs, and horizons from a replay."""

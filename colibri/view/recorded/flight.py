@@ -1,4 +1,4 @@
-"""A flight that was flown, from its folder: what `colibri fly` left there, however the flight ended."""
+"""A recorded flight, from its folder, even if it ended early."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -24,41 +24,31 @@ from colibri.view.recorded.horizons import Horizons
 from colibri.view.snapshot import NO_POINTS, NOWHERE, Airframe, Chart, Snapshot, Surroundings, ViewError
 
 MAX_ROWS = 30_000
-"""Of a flight in memory: ten minutes at 50 Hz; of a longer one fewer a second."""
+"""Rows in memory: ten minutes at 50 Hz; longer flights have a lower rate."""
 CHART_POINTS = 512
 _ROW_S = 0.02
 _TRAIL_S = 8.0
 _TRAIL_POINTS = 200
 _PATH_POINTS = 4000
 _EVENTS = 3
-"""How many of the controller's latest events are shown."""
+"""Number of latest controller events shown."""
 
 
 class Columns(NamedTuple):
-    """Some columns of a log by their names, at its times."""
+    """Columns of a log by name, at its times."""
 
     times_s: Array
     named: dict[str, Array]
 
     def columns(self, *names: str) -> Array:
-        """Return some columns, (n, len(names))."""
         return np.stack([self.named[name] for name in names], axis=1)
 
 
 class RecordedFlight:
-    """A flight's logs, thinned to what a page can show.
-
-    Attributes:
-        plan: Of the flight.
-        name, airframe, span_s, surroundings: As of a `Source`.
-    """
+    """A recorded flight, reduced for display; a `Source`."""
 
     def __init__(self, folder: Path, name: str = "") -> None:
-        """Read a folder.
-
-        Raises:
-            ViewError: It holds no flight, or one that ended before it began.
-        """
+        """Read a folder; ViewError if it has no flight or no samples."""
         try:
             self.plan = plan_of(folder)
             log = FlightFile(folder / FILE)
@@ -88,15 +78,13 @@ class RecordedFlight:
 
     @property
     def is_live(self) -> bool:
-        """It is over."""
         return False
 
     def use_horizons(self, horizons: Horizons) -> None:
-        """Show predicted horizons, as far as they are there."""
         self._horizons = horizons
 
     def at(self, time_s: float) -> Snapshot:
-        """Return the vehicle at a time: between two rows of the logs what lies between them."""
+        """Interpolate the vehicle's state between samples."""
         times_s = self._truth.times_s
         row = int(np.searchsorted(times_s, time_s + 1e-9))
         at_s = min(max(time_s, self.span_s[0]), self.span_s[1])
@@ -126,7 +114,6 @@ class RecordedFlight:
         )
 
     def charts(self) -> tuple[Chart, ...]:
-        """Return what is plotted, of some hundred points each."""
         rotors = self.plan.plant_vehicle.rotors
         times_s = self._truth.times_s
         error = np.linalg.norm(self._place - self._reference, axis=1)
@@ -183,14 +170,13 @@ class RecordedFlight:
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    """Return what is drawn of a vehicle that is described."""
     a, b, c, d = (1.0 if direction == "ccw" else -1.0 for direction in vehicle.rotors.direction)
     foot_m = vehicle.ground.foot_depth_m if vehicle.ground else 0.0
     return Airframe(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
 
 
 def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
-    """Return the columns of a topic, of rows at least `apart_s` apart, and no more of them than `MAX_ROWS`."""
+    """Read a topic with samples at least `apart_s` apart, at most `MAX_ROWS`."""
     (times_s,) = read_series(log, topic, "t")
     if not len(times_s):
         raise RecordingError(f"no {topic.name}: the flight ended before it began")
@@ -203,18 +189,18 @@ def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
 
 
 def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:
-    """Return where the vehicle was to be at some times, (n, 3)."""
+    """Return the reference positions, (n, 3)."""
     lags = Lags(decisions.times_s, decisions.named["path_lag_s"])
     return position(plan.track, path_times(times_s, lags))
 
 
 def _ground_m(vehicle: Vehicle, place: Array) -> float:
-    """Return the height of the ground; below the flight where the vehicle has none to stand on."""
+    """Return the height of the ground; below the flight for a vehicle without ground."""
     return vehicle.ground_height_m if vehicle.ground else min(0.0, float(place[:, 2].min()))
 
 
 def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, headline: Array | None = None) -> Chart:
-    """Return a chart of series (n, k), of each span of time the extremes."""
+    """Return a chart of series (n, k), reduced to extremes."""
     extremes = Extremes(values.shape[1] + 2, CHART_POINTS)
     shown = values[:, 0] if headline is None else headline
     extremes.add(np.column_stack([times_s, shown, values]))
@@ -223,7 +209,7 @@ def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, he
 
 
 def _events(decisions: Columns) -> list[tuple[float, str]]:
-    """Return when the controller's QP was not solved, or something else decided, and what; once each time it begins."""
+    """Return the times at which the QP failed or a fallback decided, with texts."""
     statuses = {code: status for status, code in STATUS_CODES.items()}
     fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}
     events = []
@@ -240,7 +226,7 @@ def _word(what: object) -> str:
 
 
 def _between(times_s: Array, rows: Array, time_s: float) -> Array:
-    """Return what lies between the two rows around a time, (columns,)."""
+    """Interpolate linearly, (columns,)."""
     after = min(max(int(np.searchsorted(times_s, time_s)), 1), max(len(times_s) - 1, 0))
     before = max(after - 1, 0)
     span_s = times_s[after] - times_s[before]
@@ -254,7 +240,6 @@ def _interpolated(at_s: Array, times_s: Array, rows: Array) -> Array:
 
 
 def _tilt_deg(quaternions: Array) -> Array:
-    """Return the angle between the body's z axis and the vertical, (n,)."""
     _, x, y, _ = quaternions.T
     tilt: Array = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)))
     return tilt

@@ -1,4 +1,4 @@
-"""The horizons that the autopilot predicted in a recorded flight: it answers the same frames once more."""
+"""Compute the horizons of a recorded flight by replay."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,14 +13,14 @@ from colibri.flights.provenance import plan_of
 from colibri.flights.replay import answers_of
 
 EVERY = 5
-"""Control samples between two horizons that are kept: 25 a second at 125 Hz."""
+"""Control samples per horizon: 25 a second at 125 Hz."""
 
 
 def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
-    """Yield time and points of each horizon of a flight, (k, 3), the first where the vehicle took itself to be.
+    """Yield time and points of each horizon, (k, 3), starting at the estimated position.
 
     Raises:
-        Error: The flight cannot be replayed, or its control law does not plan ahead.
+        Error: The flight cannot be replayed, or its control law has no horizon.
     """
     plan = plan_of(folder)
     loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
