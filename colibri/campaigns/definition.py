@@ -82,6 +82,7 @@ class Point(NamedTuple):
 
     @property
     def settings(self) -> dict[str, Any]:
+        """Options and keys with their values, levels expanded."""
         found: dict[str, Any] = {}
         for name, value in self.factors.items():
             found |= value.settings if isinstance(value, Level) else {name: value}
@@ -128,6 +129,10 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
+        """Yield flights that cover each value of each factor once; of numbers only the first and the last.
+
+        Enough to reject an impossible value before the campaign starts.
+        """
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
@@ -139,6 +144,7 @@ class Campaign(NamedTuple):
                 yield first._replace(factors=first.factors | {factor: value})
 
     def values(self, option: str) -> Iterator[Any]:
+        """Yield the values of an option in any table; continuous draws are left out."""
         draw = self.draw.get(option)
         yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
         yield from self.grid.get(option, ())
@@ -148,6 +154,7 @@ class Campaign(NamedTuple):
         return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
+        """Draw a flight's factors from a random stream of its own."""
         if not self.draw:
             return {}
         chance = Generator(PCG64(SeedSequence(self.root_seed, spawn_key=(stream,))))
@@ -155,6 +162,7 @@ class Campaign(NamedTuple):
 
 
 def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, Any]) -> Tables:
+    """Read a file and override its tables by keywords, factor by factor."""
     base = kind() if file is None else read_toml(Path(file), kind, CampaignError)
     known = kind.__struct_fields__
     for name in given:
@@ -206,6 +214,7 @@ def read_seeds(given: Any) -> tuple[int, ...]:
 
 
 def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:
+    """Return the canonical name of a factor; a name in `others`, or one with levels, is kept."""
     return given if given in others or has_levels(value) else factor_name(given)
 
 

@@ -27,6 +27,7 @@ class Key(NamedTuple):
 
 
 def factor_name(given: str) -> str:
+    """Return the canonical name of a factor; `profile.` may be left out."""
     options = [name for name in keywords_of(FlightSpec) if name not in _NOT_FACTORS]
     name = given.replace("-", "_")
     if name in options:
@@ -53,6 +54,7 @@ def key_of(factor: str) -> Key | None:
 
 
 def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> Any:
+    """Apply the factors of one table to a profile or vehicle, in their order."""
     error = ProfileError if isinstance(of, Profile) else VehicleError
     changed: Any = of
     for factor, value in factors.items():

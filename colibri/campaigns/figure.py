@@ -78,6 +78,7 @@ def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
 
 
 def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
+    """Draw median and 5 to 95 % range over a factor, and below the share of lost flights."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
     for name, color in zip(names, COLORS, strict=False):
@@ -107,6 +108,7 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
 
 
 def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]) -> Figure:
+    """Draw the median over two factors, one map per combination of the others."""
     names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
     xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
     figure, grid = axes_grid(len(names), 1, 0.6, row_in=_MAP_IN, share=False)
@@ -136,6 +138,7 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
 
 
 def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
+    """Draw one dot per flight over the drawn factors; lost flights are at the upper edge."""
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
@@ -156,6 +159,7 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
 
 
 def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
+    """Draw one row of dots per combination, with a bar at the median."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
     make_room_for_names(figure, names)

@@ -27,13 +27,16 @@ class FlightTable:
 
     @property
     def headings(self) -> Row:
+        """Column names of `rows`."""
         return self.campaign.columns
 
     def rows(self) -> list[Row]:
+        """Return one row of texts per flight: factors, metrics, verdict, hash; numbers with ten digits."""
         return [self._row(each) for each in self.flown]
 
     @cached_property
     def flights(self) -> Table:
+        """The table as a structured array, one field per column; a missing number is nan."""
         columns: dict[str, Any] = {"flight": [each.flight for each in self.flown]}
         columns |= {name: self.factor(name) for name in self.campaign.factors}
         columns["seed"] = [self._points[each.flight].seed for each in self.flown]
@@ -52,6 +55,7 @@ class FlightTable:
         return self.flights.to_pandas()
 
     def factor(self, name: str) -> np.ndarray[Any, Any]:
+        """Return the values of a factor, (n,): numbers, or texts."""
         values = [self._points[each.flight].factors[name] for each in self.flown]
         return np.array(values if all(map(is_number, values)) else list(map(shown, values)))
 
@@ -66,15 +70,18 @@ class FlightTable:
 
     @property
     def usual_metric(self) -> str:
+        """The metric that most flights have."""
         names = [metric.name for metric in self.campaign.metrics]
         known = [int(np.isfinite(self.metric(name)).sum()) for name in names]
         return names[int(np.argmax(known))]
 
     @property
     def verdicts(self) -> dict[Verdict, int]:
+        """The number of flights by verdict."""
         return {verdict: sum(each.verdict is verdict for each in self.flown) for verdict in Verdict}
 
     def groups(self) -> dict[tuple[Any, ...], list[int]]:
+        """Return the places in `flown` of the flights of each combination of the grid."""
         found: dict[tuple[Any, ...], list[int]] = {}
         for place, each in enumerate(self.flown):
             factors = self._points[each.flight].factors
@@ -82,6 +89,7 @@ class FlightTable:
         return found
 
     def summary(self) -> tuple[Row, list[Row]]:
+        """Return headings and one row per combination: share lost, and quantiles of each metric."""
         names = [metric.name for metric in self.campaign.metrics]
         headings = (
             *self.campaign.grid,
@@ -104,9 +112,11 @@ class FlightTable:
         return headings, rows
 
     def through(self, places: Sequence[int]) -> list[int]:
+        """Return the flights that were not lost."""
         return [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
 
     def lost(self, places: Sequence[int]) -> tuple[int, int, int]:
+        """Return the number of flights lost, flown and refused."""
         verdicts = [self.flown[place].verdict for place in places]
         refused = verdicts.count(Verdict.REFUSED)
         return sum(verdict.is_lost for verdict in verdicts), len(verdicts) - refused, refused

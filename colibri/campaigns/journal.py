@@ -28,6 +28,7 @@ class Journal:
         self._file: IO[bytes] = (folder / file).open("ab")
 
     def add(self, flown: Flown) -> None:
+        """Write a flight's logs, then its line, and flush it to disk."""
         keep_files(self._folder, flown)
         kept = flown._replace(files={})
         self._file.write(msgspec.json.encode(kept[:-1]) + b"\n")
@@ -79,6 +80,7 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
 
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
+    """Return all inputs that the campaign's table depends on as plain data, files by their hashes."""
     objects = (value for value in campaign.values("profile") if isinstance(value, Profile))
     own = {profile.controller for profile in (*common.profiles.values(), *objects)}
     laws = [*filter(None, campaign.values("controller")), *own.intersection(controller_names())]
@@ -108,6 +110,7 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
 
 
 def _origin(law: Any) -> Any:
+    """Return the file and, if readable, the source of a user-supplied callable."""
     try:
         return [*origin_of_factory(law), getsource(law)]
     except (OSError, TypeError):
@@ -127,6 +130,7 @@ def _hash(content: Any) -> str:
 
 
 def read_journal(path: Path) -> list[Flown]:
+    """Read the flights of a journal; an incomplete last line is cut off in the file, too."""
     if not path.exists():
         return []
     with path.open("r+b") as file:

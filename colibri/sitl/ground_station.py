@@ -51,8 +51,8 @@ class Station(Inbox):
     """A component on a link of its own; received messages are in `Inbox`.
 
     Messages are sent with the next frame. A method that waits for an answer advances simulated time and repeats its
-    request
-    every half second; it raises `RefusedError` if the vehicle refuses, and `NotInTimeError` after `ANSWER_WITHIN_S`.
+    request every half second; it raises `RefusedError` if the vehicle refuses, and `NotInTimeError` after
+    `ANSWER_WITHIN_S`.
 
     Attributes:
         system, component: Its ids.

@@ -27,7 +27,7 @@ class Flights:
 
     Attributes:
         setting: The setting of the test's marks.
-        flown: The flights in order of their begin.
+        flown: The flights in the order of their start.
     """
 
     def __init__(self, setting: Setting, launcher: Launcher | None) -> None:

@@ -52,6 +52,7 @@ class Links(NamedTuple):
     plant: Trouble
 
     def __getattr__(self, name: str) -> Any:
+        """Name the valid links in the error."""
         raise AttributeError(f"there is no link {name}: choose {', '.join(self._fields)}")
 
 
@@ -92,26 +93,31 @@ class Sitl(View, Stepped, Steered):
     if not TYPE_CHECKING:  # checkers know what there is
 
         def __setattr__(self, name: str, value: Any) -> None:
+            """Reject unknown attributes, so that a typo is an error."""
             if name[0] != "_" and "fleet" in self.__dict__ and not hasattr(self, name):
                 raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
             super().__setattr__(name, value)
 
     def begin(self) -> None:
+        """Fly until the first HEARTBEAT of the vehicle, if the setting requires it."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 
     # Time.
 
     def step(self) -> None:
+        """Fly one frame, with all vehicles of the fleet."""
         self.fly_frame()
         self.have_others_catch_up()
 
     def have_others_catch_up(self) -> None:
+        """Fly the vehicles of the fleet that are behind this one."""
         for other in self.fleet:
             while other.time_us < self.time_us:
                 other.fly_frame()
 
     def fly_frame(self) -> None:
+        """Fly one frame of this vehicle alone."""
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
@@ -135,12 +141,19 @@ class Sitl(View, Stepped, Steered):
     # Commands.
 
     def arm(self, *, force: bool = False) -> None:
+        """Arm."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0, what="arming")
 
     def disarm(self, *, force: bool = False) -> None:
+        """Disarm; in the air this requires `force`."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
     def takeoff(self, height_m: float | None = None, *, wait: bool = True, within: float | None = None) -> None:
+        """Arm and climb to a height above home, default MIS_TAKEOFF_ALT; wait until `is_at` holds there.
+
+        Args:
+            within: Simulated time, s; default 8 s and 2 s per metre.
+        """
         height_m = self.get_param("MIS_TAKEOFF_ALT") if height_m is None else height_m
         east, north, from_m = self.position
         if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
@@ -154,6 +167,11 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
+        """Land here and wait until disarmed.
+
+        Args:
+            within: Simulated time, s; default 8 s and 2 s per metre.
+        """
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
         if wait:
@@ -170,6 +188,13 @@ class Sitl(View, Stepped, Steered):
         wait: bool = True,
         within: float | None = None,
     ) -> None:
+        """Fly to a place, ENU, m, by a reposition command, and wait until `is_at` holds.
+
+        Args:
+            yaw: Counter-clockwise from east, rad; nan keeps it.
+            speed: m/s; -1 for the default of the parameters.
+            within: Simulated time, s; default 10 s and 1 s per metre.
+        """
         there = geodetic_of((east, north, up), self.origin)
         x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
         heading = yaw if yaw != yaw else 0.5 * pi - yaw
@@ -189,41 +214,51 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(lambda: self.is_at(goal), within=max_s, what=f"the way to {goal}")
 
     def fly_track(self, name: str) -> None:
+        """Fly a track of parameter TRACK; arm if disarmed, and go to its start first."""
         self.set_param("TRACK", TRACKS.index(_chosen("track", name, TRACKS)))
         self.select(Mode.TRACK)
         if not self.armed:
             self.arm()
 
     def select(self, mode: Mode | str) -> None:
+        """Change the flight mode."""
         number = custom_mode(Mode(_chosen("mode", mode, tuple(Mode))))
         params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
         self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
 
     def command(self, number: int, *params: float) -> int:
+        """Send a COMMAND_LONG and return any MAV_RESULT; missing parameters are 0."""
         return self.gcs.order(number, *params)
 
     def start_mission(self) -> None:
+        """Begin or resume the mission; arm if disarmed."""
         self.select(Mode.MISSION)
         if not self.armed:
             self.arm()
 
     def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload a mission."""
         self.gcs.upload(on_wire(plan, self.origin), MISSION)
 
     def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload a geofence of `items.polygon` and `items.circle`."""
         self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
 
     def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload rally points."""
         self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
+        """Request a parameter."""
         return self.gcs.get_param(name)
 
     def set_param(self, name: str, value: Value) -> Value:
+        """Set a parameter; return its new value, which has 32 bits."""
         return self.gcs.set_param(name, value)
 
     @contextmanager
     def sticks_held(self, **axes: float) -> Iterator[None]:
+        """Hold the sticks, see `stick`, during the block; they are sent at 25 Hz."""
         before, self._sticks = self._sticks, axes
         self._send_sticks()  # now, so that they are heard before whatever else is sent
         if before is None and self.link.ground.any:
@@ -240,6 +275,7 @@ class Sitl(View, Stepped, Steered):
     # Messages that are not answered.
 
     def send(self, name: str, *fields: Any) -> None:
+        """Send a message from the first ground station."""
         self.gcs.send(name, *fields)
 
     # What goes wrong.
@@ -265,10 +301,12 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def wind(self) -> str:
+        """The mean wind, as in mark `wind`; may be set to a constant wind, from the next frame on."""
         return self._wind
 
     @wind.setter
     def wind(self, wind: str | None) -> None:
+        """The mean wind, as in mark `wind`; may be set to a constant wind, from the next frame on."""
         try:
             constant = constant_wind(str(wind or CALM))
         except ArgumentTypeError as error:
@@ -278,25 +316,30 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def payload_kg(self) -> float:
+        """Payload, kg; may be set, from the next frame on."""
         return self._payload_kg
 
     @payload_kg.setter
     def payload_kg(self, mass_kg: float) -> None:
+        """Payload, kg; may be set, from the next frame on."""
         if not 0.0 <= mass_kg <= MAX_PAYLOAD_KG:
             raise ValueError(f"payload_kg must be from 0 to {MAX_PAYLOAD_KG:g}, not {mass_kg!r}")
         self._payload_kg = mass_kg
         self._injected += self._lockstep.change_of_world(PayloadChange(mass_kg))
 
     def kill_autopilot(self) -> None:
+        """Kill the autopilot as SIGKILL does, and restart it at once with the files written so far."""
         self._lockstep.kill_autopilot()
 
     @property
     def inside(self) -> Inside:
+        """Plant and autopilot as objects; only in memory."""
         return Inside(self._lockstep)
 
     # Who else is there.
 
     def client(self, system: int = 254, component: int = 190, *, beats: bool = True) -> Station:
+        """Connect another ground station or companion on its own link; `beats` sends HEARTBEAT."""
         number = len(self._stations) + 1
         trouble, seed = self.link.ground, self.setting.seed
         station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)
@@ -319,4 +362,5 @@ def _number(kind: str, of: str | int) -> int:
 
 
 def _without_kind(unit: str) -> str:
+    """Remove the prefix of a unit: system_motor is motor, sensor_gps is gps."""
     return unit.lower().removeprefix("system_").removeprefix("sensor_")

@@ -108,6 +108,7 @@ class Cluster:
 
 
 def _do(jobs: list[Any], given: tuple[Callable[[Any, Any], Any], Any], wanted: str) -> tuple[float, list[Any]]:
+    """Do a batch of jobs; return the duration in s, and the results."""
     if version(_PACKAGE) != wanted:
         raise CampaignError(f"--dask: a worker has colibri {version(_PACKAGE)}, the campaign is of {wanted}")
     work, common = given

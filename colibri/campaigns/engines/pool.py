@@ -79,6 +79,7 @@ _given: tuple[Callable[[Any, Any], Any], Any]
 
 
 def _begin(packed: bytes) -> None:
+    """Prepare a worker: ignore SIGINT, which the parent handles, and end with the parent."""
     global _given
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
