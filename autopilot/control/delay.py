@@ -1,12 +1,11 @@
-"""Delay compensation: the state that the vehicle will have when the command that is decided now takes effect.
+"""Delay compensation: the vehicle's state at the time a new command takes effect.
 
-Whatever decides is given the vehicle as it will be a delay later: carried there by the vehicle model, by the commands
-that were sent and have not acted yet, and by the disturbance, which is observed as what each state differs by from the
-one predicted for it. References are those of that instant, too. So a control law finds what it is made for, commands
-that act at once.
+The vehicle model carries the state ahead, with the commands already sent and the observed disturbance: the measured
+minus the predicted rates of change. References are taken at the same time, so a control law may assume that its
+commands act at once.
 
-The delay is declared or measured: the plant reports how long after its frame each command took effect, and the median
-of the last ones is compensated. Simulated time alone counts, so the same frames give the same flight.
+The delay is declared, or the median of the delays that the plant reported. Only simulated time counts: equal frames
+give equal flights.
 """
 
 from collections import deque
@@ -22,17 +21,13 @@ from colibri.common.types import Array, FourRotors
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
-MAX_DELAY_US = 200_000
-"""A longer delay is compensated as if it were this one."""
+MAX_DELAY_US = 200_000  # longer delays are compensated as this one
 NO_ROTORS = (0.0, 0.0, 0.0, 0.0)
 _MEDIAN_OF = 25
-_WORTH_US = 1_000
-"""A measured delay is taken over where it differs by this: references are not to tremble with it."""
-_CONTINUES_US = 100_000
-"""After a longer gap the rotors turn as they were commanded, and nothing is known of disturbances."""
+_WORTH_US = 1_000  # a smaller change of the measured delay is ignored: references must not jitter
+_CONTINUES_US = 100_000  # after a longer gap the rotors restart at their commands and the disturbance at zero
 _DISTURBANCE_RAD_S = 10.0
-_MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 60.0, 60.0, 60.0])
-"""Acceleration, m/s², and angular acceleration, rad/s²."""
+_MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 60.0, 60.0, 60.0])  # m/s², rad/s²
 
 
 class _Known(NamedTuple):
@@ -46,11 +41,11 @@ class DelayCompensation:
     """Compensates the delay of one vehicle's commands.
 
     Attributes:
-        delay_us: From a frame to the moment at which the command that answers it takes effect, as it is compensated.
+        delay_us: Compensated time from a frame to the effect of its command.
     """
 
     def __init__(self, vehicle: Vehicle, declared_s: float | None = None) -> None:
-        """Compensate the declared delay, or with None the measured one; compiled code is loaded here."""
+        """Compensate the declared delay, or with None the measured one; loads compiled code."""
         self._measured: deque[int] = deque(maxlen=_MEDIAN_OF)
         self._median_us = self.delay_us = 0
         self._declared_s: float | None = None
@@ -62,16 +57,13 @@ class DelayCompensation:
         motion.thrust_n(x[motion.ROTORS], self._model)
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Predict with other numbers of the vehicle."""
         self._vehicle, self._model = vehicle, packed(motion.motion_model(vehicle))
 
     def declare(self, declared_s: float | None) -> None:
-        """Compensate this delay from now on; None: the measured one."""
         self._declared_s = declared_s
         self._choose()
 
     def measure(self, delay_us: int) -> None:
-        """Take in how late a command took effect."""
         self._measured.append(delay_us)
         median_us = sorted(self._measured)[(len(self._measured) - 1) // 2]
         if abs(median_us - self._median_us) >= _WORTH_US:
@@ -79,14 +71,13 @@ class DelayCompensation:
             self._choose()
 
     def begin(self, controls: FourRotors, *, rests: bool = False) -> None:
-        """Begin with the rotors turning at `controls`; a vehicle that `rests` stays until they carry it."""
+        """Start with the rotors turning at `controls`; a vehicle at rest stays until they lift it."""
         self._sent = deque([ActuatorCommand(0, controls, armed=any(controls))])
         self._known: _Known | None = None
         self._rests = rests
         self._disturbance = np.zeros(6)
 
     def sent(self, command: ActuatorCommand) -> None:
-        """Take in a command that is sent."""
         sent = self._sent
         if command.controls == sent[-1].controls and command.armed == sent[-1].armed:
             return
@@ -95,7 +86,7 @@ class DelayCompensation:
             sent.popleft()
 
     def ahead(self, frame: StateFrame, charge_ah: float, *, standing: bool = False) -> StateFrame:
-        """Return the state `delay_us` after that of a frame; at zero the frame itself. Called once a control sample."""
+        """Return the state `delay_us` after a frame. Called once per control sample."""
         if self.delay_us == 0:
             self._known = None
             return frame
@@ -118,7 +109,7 @@ class DelayCompensation:
         self.delay_us = min(max(delay_us, 0), MAX_DELAY_US)
 
     def _now(self, frame: StateFrame, voltage_v: float) -> Array:
-        """Return x at a frame, the rotors as the commands that have acted turn them; observe what the model missed."""
+        """Return x at a frame, rotors as the acting commands turn them; update the disturbance."""
         now_us, known = frame.time_us, self._known
         x = np.array(
             (
@@ -141,7 +132,6 @@ class DelayCompensation:
         return x
 
     def _carried(self, x: Array, from_us: int, duration_us: int, voltage_v: float) -> Array:
-        """Return x after a duration, by the commands that take effect until then."""
         acting = self._acting(from_us, from_us + duration_us)
         begins = [from_us, *(it.time_us + self.delay_us for it in acting[1:]), from_us + duration_us]
         durations_s = np.diff(np.array(begins)) * 1e-6
@@ -149,7 +139,7 @@ class DelayCompensation:
         return motion.carry(x, durations_s, speeds, self._disturbance, voltage_v, self._model)
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[ActuatorCommand]:
-        """Return the command that acts at a time, and those that take effect until another."""
+        """Return the command acting at a time, then those that take effect before another."""
         acting = [self._sent[0]]
         for it in self._sent:
             acts_us = it.time_us + self.delay_us
@@ -160,7 +150,6 @@ class DelayCompensation:
         return acting
 
     def _speeds(self, command: ActuatorCommand) -> FourRotors:
-        """Return the rotor speeds that a command means: at least idle while armed, none while not."""
         if not command.armed:
             return NO_ROTORS
         rotors = self._vehicle.rotors

@@ -1,10 +1,10 @@
-"""A geometric tracking controller on SE(3), as a baseline beside the LPV-MPC.
+"""A geometric tracking controller on SE(3), as a baseline for the LPV-MPC.
 
-Source: T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; their
-equation numbers in brackets. The frames are ours (ENU, FLU, thrust along +z), so gravity and thrust change sign.
+T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; equation numbers
+in brackets. Frames are ENU and FLU with thrust along +z, so gravity and thrust change sign.
 
-Tuned as three critically damped second-order loops, each well below the next faster one: the position's gains are
-ω² and 2ω times the mass, the attitude's ω² and 2ω times the inertia.
+Position, attitude and yaw are critically damped loops, each well below the next faster: gains are ω² and 2ω times the
+mass, or times the inertia.
 """
 
 from collections.abc import Mapping
@@ -24,8 +24,7 @@ from colibri.common.rotations import nearest_turn, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_MIN_FORCE = 0.05
-"""The demanded force never falls below this part of the weight: its direction would mean nothing."""
+_MIN_FORCE = 0.05  # least demanded force in parts of the weight: a smaller one has no useful direction
 
 
 class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -38,7 +37,7 @@ class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Target(NamedTuple):
-    """The attitude to be tracked: rotation R_d (3, 3) and its body rates Ω_d, rad/s, (3,)."""
+    """Tracked attitude: rotation R_d (3, 3) and body rates Ω_d, rad/s, (3,)."""
 
     rotation: Array
     rate: Array
@@ -63,11 +62,9 @@ class GeometricController:
         self._mixer = Mixer(vehicle)
 
     def initial(self, rotor_speed: float) -> None:
-        """Remember nothing."""
         del rotor_speed
 
     def step(self, memory: None, time_us: int, state: VehicleState, references: Horizon) -> tuple[None, Decision]:
-        """Decide the rotor speeds to hold until the next control sample."""
         del memory, time_us
         R = np.array(rotation_matrix(state.attitude))
         rate = np.array(state.rate_flu_rad_s)
@@ -81,7 +78,6 @@ class GeometricController:
     def step_attitude(
         self, memory: None, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[None, Decision]:
-        """Decide the same for an attitude and a thrust."""
         del memory, time_us
         phi, theta, psi = demand.angles[0].tolist()
         R = np.array(rotation_matrix(state.attitude))
@@ -94,7 +90,7 @@ class GeometricController:
         return None, Decision(speeds, (phi, theta, psi))
 
     def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
-        """Return the specific force wanted, m/s², [15], and its derivative along the motion, m/s³."""
+        """Return the demanded specific force, m/s², [15], and its derivative along the motion, m/s³."""
         gravity = np.array([0.0, 0.0, self._gravity_m_s2])
         position_error = np.array(state.position_enu_m) - references.position_enu_m[0]
         velocity_error = np.array(state.velocity_enu_m_s) - references.velocity_enu_m_s[0]
@@ -108,7 +104,7 @@ class GeometricController:
         return force, jerk
 
     def _moment(self, R: Array, rate: Array, target: Target) -> Array:
-        """Return the moment, N m, [16], but for the angular acceleration of the target."""
+        """Return the moment, N m, [16], without the target's angular acceleration."""
         difference = matmul(target.rotation.T, R)
         rotation_error = 0.5 * vee(difference - difference.T)  # [10]
         carried = matvec(difference.T, target.rate)
@@ -120,9 +116,9 @@ class GeometricController:
 
 
 def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
-    """Return the attitude whose z axis lies along `force` and whose heading is `yaw_rad`, and how fast it turns.
+    """Return the attitude with its z axis along `force` and heading `yaw_rad`, and its body rates.
 
-    `force` is a specific force, m/s², ENU, (3,), and `force_rate` its derivative, m/s³.
+    `force` is a specific force, m/s², ENU, (3,); `force_rate` its derivative, m/s³.
     """
     heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
@@ -148,7 +144,6 @@ def body_rate_of(phi: float, theta: float, angle_rates: Array) -> Array:
 
 
 def vee(skew: Array) -> Array:
-    """Return the vector of a skew-symmetric matrix."""
     return np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
 
 

@@ -1,8 +1,8 @@
-"""The interface of a control law, and where control laws are found.
+"""The interface of a control law.
 
-A control law is a class that a package registers under the entry point group `colibri.controllers`. Its instances are
-given the vehicle's state and the references ahead once a control sample, and return the rotor speeds to hold until the
-next. What they remember they return too: a controller has no state of its own, so the same inputs give the same flight.
+A package registers its law, a class, under the entry point group `colibri.controllers`. At each control sample the law
+takes the vehicle's state and the references ahead, and returns the rotor speeds to hold until the next. It has no state
+of its own: its memory is an argument and a result, so equal inputs give equal flights.
 """
 
 from collections.abc import Callable
@@ -15,17 +15,16 @@ import numpy as np
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.types import Array, Quaternion, Vector
 
-Clock: TypeAlias = Callable[[], float]
-"""Returns seconds. A control law may measure itself with it; it must decide nothing by it."""
+Clock: TypeAlias = Callable[[], float]  # seconds, to measure durations; a decision must not depend on it
 Memory = TypeVar("Memory")
 
 
 class Preview(NamedTuple):
-    """Which references a control law wants at each control sample.
+    """The references that a control law takes at each control sample.
 
     Attributes:
-        interval_us: Time between two references, µs. The first is that of the interval that now lies in.
-        samples: How many.
+        interval_us: Time between two references, µs, counted from the start of the present interval.
+        samples: Number of references.
     """
 
     interval_us: int
@@ -37,10 +36,10 @@ class Horizon(NamedTuple):
 
     Attributes:
         position_enu_m, velocity_enu_m_s: (n, 3) each, ENU.
-        acceleration_enu_m_s2, jerk_enu_m_s3, snap_enu_m_s4: (n, 3) each, ENU; zero where planned by differences.
+        acceleration_enu_m_s2, jerk_enu_m_s3, snap_enu_m_s4: (n, 3) each, ENU; zero if planned by differences.
         yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
-        yaw_rate_rad_s: (n,), rad/s; zero where planned by differences, or where yaw is held for want of a direction.
-        yaw_acceleration_rad_s2: (n,), rad/s²; zero where planned by differences, or where yaw is held.
+        yaw_rate_rad_s: (n,), rad/s; zero if planned by differences, or where a standing vehicle holds its yaw.
+        yaw_acceleration_rad_s2: (n,), rad/s²; zero in the same cases.
     """
 
     position_enu_m: Array
@@ -54,7 +53,7 @@ class Horizon(NamedTuple):
 
 
 class AttitudeDemand(NamedTuple):
-    """An attitude to hold and a thrust to make, from now on, at the preview's interval.
+    """Demanded attitude and thrust from now on, at the preview's interval.
 
     Attributes:
         angles: phi, theta, psi, rad, psi unwrapped, (n, 3).
@@ -68,14 +67,14 @@ class AttitudeDemand(NamedTuple):
 
 
 class VehicleState(NamedTuple):
-    """The vehicle's state as a control law takes it.
+    """The state of the vehicle.
 
     Attributes:
         position_enu_m, velocity_enu_m_s: m and m/s, ENU.
         attitude: Unit quaternion wxyz, FLU body to ENU earth.
         euler: phi, theta, psi in rad, psi unwrapped.
         rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
-        airborne: Whether nothing but air and rotors acts on it: it is clear of the ground.
+        airborne: Clear of the ground: only air and rotors act on the vehicle.
     """
 
     position_enu_m: Vector
@@ -87,18 +86,17 @@ class VehicleState(NamedTuple):
 
 
 _ZERO = (0.0, 0.0, 0.0)
-AT_REST = VehicleState(_ZERO, _ZERO, (1.0, 0.0, 0.0, 0.0), _ZERO, _ZERO)
-"""A vehicle that hovers at the origin, level, heading east."""
+AT_REST = VehicleState(_ZERO, _ZERO, (1.0, 0.0, 0.0, 0.0), _ZERO, _ZERO)  # hovering at the origin, level, heading east
 
 
 def still_horizon(samples: int) -> Horizon:
-    """Return references that stay where `AT_REST` is."""
+    """Return references that stay at `AT_REST`."""
     vectors, scalars = np.zeros((samples, 3)), np.zeros(samples)
     return Horizon(vectors, vectors, vectors, vectors, vectors, scalars, scalars, scalars)
 
 
 class Fallback(StrEnum):
-    """What decided in place of a solved QP."""
+    """Source of a decision without a solved QP."""
 
     SHIFTED_PLAN = "shifted plan"
     LQR = "LQR"
@@ -114,7 +112,7 @@ FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for co
 
 
 class Active(NamedTuple):
-    """How many constraints of each kind bind at the solution."""
+    """Numbers of active constraints at the solution, by kind."""
 
     rotors: int = 0
     increments: int = 0
@@ -123,34 +121,29 @@ class Active(NamedTuple):
 
 
 class PlanColumns(NamedTuple):
-    """Where the predicted outputs of a control law hold the attitude.
+    """Columns of the attitude in the predicted outputs of a control law."""
 
-    Attributes:
-        phi, theta, psi: Columns of roll, pitch and yaw (unwrapped), rad.
-        yaw_rate: Column of the body rate r, rad/s.
-    """
-
-    phi: int
-    theta: int
-    psi: int
-    yaw_rate: int
+    phi: int  # rad
+    theta: int  # rad
+    psi: int  # rad, unwrapped
+    yaw_rate: int  # body rate r, rad/s
 
 
 class Diagnostics(NamedTuple):
-    """How a decision came about; a control law without a QP leaves the defaults.
+    """Details of a decision; a control law without a QP leaves the defaults.
 
     Attributes:
-        qp_status: How the QP ended; None if there was none.
-        fallback: What decided in its place; None if it was solved, or there was none.
-        solve_time_s: Time that the QP took, s.
+        qp_status: Result of the QP; None without one.
+        fallback: Source of the decision if the QP was not solved, else None.
+        solve_time_s: Duration of the QP's solution, s.
         cost: The QP's objective at its solution.
-        active: Constraints that bind at the solution.
-        slack: By how much soft limits are exceeded, in parts of each: the largest.
-        predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
-        planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
-        mass_kg: Mass that the vehicle moves like under its thrust; nan for a control law that estimates none.
-        path_lag_s: By which the law's path time was behind the clock; nan for a control law that keeps to the clock.
-        qp_iterations: That the QP's solver took, 0 where none was asked; nan if there was no QP, or it does not say.
+        active: Active constraints at the solution.
+        slack: Largest violation of a soft limit, in parts of the limit.
+        predicted: Outputs predicted over the horizon, (N, p); order and units are documented by the control law.
+        planned_squared: Squared rotor speeds commanded at each step, in parts of the largest, (N, 4).
+        mass_kg: Estimated mass; nan if the control law estimates none.
+        path_lag_s: Lag of path time behind the clock; nan if the law flies by the clock.
+        qp_iterations: Iterations of the QP solver, 0 if none was needed; nan without a QP or a count.
     """
 
     qp_status: QpStatus | None = None
@@ -167,11 +160,11 @@ class Diagnostics(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What a control law decided.
+    """A control law's decision.
 
     Attributes:
         rotor_speeds: In the vehicle's unit and rotor order, within its limits, (4,).
-        attitude_reference: phi, theta, psi that the attitude is steered to, rad.
+        attitude_reference: Commanded phi, theta, psi, rad.
     """
 
     rotor_speeds: Array
@@ -191,82 +184,73 @@ class Controller(Protocol[Memory]):
     preview: Preview
 
     def initial(self, rotor_speed: float) -> Memory:
-        """Return what the law remembers before its first sample, every rotor at `rotor_speed` (vehicle's unit)."""
+        """Return the memory before the first sample, every rotor at `rotor_speed` (vehicle's unit)."""
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample.
 
         Args:
-            memory: What the step before returned.
+            memory: Returned by the previous step.
             time_us: Simulated time, µs, a multiple of the control interval.
-            state: The vehicle when the decision takes effect: now, unless a delay is compensated.
-            references: Those of `preview`, from that instant on; shared, so not to be written to.
+            state: The vehicle at the time the decision takes effect: now, unless a delay is compensated.
+            references: By `preview`, from that time on; shared, so read only.
         """
 
 
 @runtime_checkable
 class AttitudeController(Controller[Memory], Protocol[Memory]):
-    """A control law that can also take an attitude; one that cannot simply flies no mode that needs it.
+    """A control law that can also track an attitude; required by the modes that demand one.
 
-    Its two ways to decide share what they remember: a flight may change between them at any sample.
+    `step` and `step_attitude` share their memory: a flight may switch between them at any sample.
     """
 
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
-        """Decide as `step` does, for a demand at the samples of `preview`; `memory` is of a step of either kind."""
+        """Decide as `step` does, for a demand at the samples of `preview`."""
 
 
 @runtime_checkable
 class ChargeController(Controller[Memory], Protocol[Memory]):
-    """A control law that counts what its battery gives; optional.
+    """A control law that estimates the charge taken from the battery; optional.
 
-    A law that has this goes on with the charge that is left where it restarts in mid-flight, and with what the
-    battery itself reports, where it does.
+    The estimate survives a restart in flight, and is corrected by the battery's own reports.
     """
 
     def charge_ah(self, memory: Memory) -> float:
-        """Return the charge that the law remembers as taken from its battery, Ah."""
+        """Return the estimated charge taken from the battery, Ah."""
 
-    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
-        """Return the memory with another charge taken from the battery, Ah."""
+    def with_charge(self, memory: Memory, charge_ah: float) -> Memory: ...
 
 
 @runtime_checkable
 class MassController(Controller[Memory], Protocol[Memory]):
-    """A control law that estimates its vehicle's mass in flight; optional.
+    """A control law that estimates the vehicle's mass in flight; optional.
 
-    A law that has this goes on with the mass that it has estimated where it restarts in mid-flight. Each take-off
-    begins with the vehicle's own: what was carried may have been left on the ground.
+    The estimate survives a restart in flight. Each take-off starts with the nominal mass: a payload may have been left.
     """
 
-    def mass_kg(self, memory: Memory) -> float:
-        """Return the mass that the law remembers, kg."""
+    def mass_kg(self, memory: Memory) -> float: ...
 
-    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
-        """Return the memory with another mass, kg."""
+    def with_mass(self, memory: Memory, mass_kg: float) -> Memory: ...
 
 
 class Pace(Enum):
-    """How time passes along references, where a control law leaves the choice."""
+    """Progress of time along the references."""
 
     CLOCK = "clock"
-    """As on the clock."""
-    WAITING = "waiting"
-    """More slowly where the vehicle cannot follow."""
-    CATCHING_UP = "catching up"
-    """So, and later faster, until what was lost is made up for."""
+    WAITING = "waiting"  # slower where the vehicle cannot follow
+    CATCHING_UP = "catching up"  # slower there, then faster until the lag is made up
 
 
 @runtime_checkable
 class PathController(Controller[Memory], Protocol[Memory]):
-    """A control law that can fly along references at a speed of its own; optional.
+    """A control law that can choose its speed along the references; optional.
 
-    Where it does, the references that it is given are those of path time, which lags behind the clock. `step` keeps to
-    the clock, with no lag.
+    `step_on_path` takes references by path time, which lags behind the clock; `step` flies by the clock.
 
     Attributes:
-        min_path_speed: The least speed, in parts of the references' own; a law with 1 is not asked to.
+        min_path_speed: Least speed, in parts of the references' own; with 1 the law always flies by the clock.
     """
 
     min_path_speed: float
@@ -274,27 +258,23 @@ class PathController(Controller[Memory], Protocol[Memory]):
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[Memory, Decision]:
-        """Decide as `step` does, and how fast to go on along the references, which begin at path time."""
+        """Decide as `step` does, and choose the speed along the references."""
 
     def path_speed(self, memory: Memory) -> float:
-        """Return the speed along the references, in parts of their own; 1 on the clock."""
+        """Return the speed along the references, in parts of their own; 1 by the clock."""
 
     def lag_us(self, memory: Memory) -> int:
-        """Return by how much path time lags behind the clock, µs, at least 0: what the law may make up for."""
+        """Return the lag of path time behind the clock, µs, at least 0."""
 
-    def with_lag(self, memory: Memory, lag_us: int) -> Memory:
-        """Return the memory with another lag, µs."""
+    def with_lag(self, memory: Memory, lag_us: int) -> Memory: ...
 
 
 @runtime_checkable
 class PlanController(Controller[Memory], Protocol[Memory]):
     """A control law that plans attitudes and thrusts over its horizon; optional.
 
-    Ground stations are shown where its plan leads: its diagnostics hold `predicted` with the attitude in these columns,
-    a control sample apart from now on, and `planned_squared`.
-
-    Attributes:
-        plan_columns: Where `predicted` holds the attitude.
+    Ground stations show its plan: diagnostics then hold `predicted`, a row per control sample from now on, with the
+    attitude in these columns, and `planned_squared`.
     """
 
     plan_columns: PlanColumns
@@ -302,10 +282,6 @@ class PlanController(Controller[Memory], Protocol[Memory]):
 
 @runtime_checkable
 class CompiledController(Controller[Memory], Protocol[Memory]):
-    """A control law with compiled parts, which the process loads before it flies; optional.
+    """A control law with compiled parts, loaded before the flight; optional."""
 
-    A law that is built again for other parameters finds them loaded.
-    """
-
-    def warm_up(self) -> None:
-        """Load what is compiled."""
+    def warm_up(self) -> None: ...

@@ -43,31 +43,24 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class LoopRecord(NamedTuple):
-    """What a control loop needs to go on after a restart, as plain data.
+    """State of a control loop to resume after a restart, as plain data."""
 
-    Attributes:
-        yaw_rad: Unwrapped.
-        controls: Rotor speeds commanded, in parts of the largest.
-        memory: Bytes of the control law's memory; empty where that is not plain data.
-    """
-
-    yaw_rad: float
-    controls: tuple[float, float, float, float]
-    memory: bytes
+    yaw_rad: float  # unwrapped
+    controls: tuple[float, float, float, float]  # rotor speeds, in parts of the largest
+    memory: bytes  # the control law's, serialised; empty if it is not plain data
 
 
 class ControlLoop:
     """One control law flying one vehicle.
 
     Attributes:
-        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
-        takes_attitude: Whether the law can take an attitude and a thrust.
-        plan_columns: Where the law's plan holds the attitude; None for a law that plans none.
+        frame_interval_us: Requested time between frames: it divides the control interval.
+        plan_columns: Columns of the attitude in the law's plan, if it publishes one.
         controls: Rotor speeds commanded now, in parts of the largest.
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
-        """Build the control law as `build_controller` does, with its errors; `clock` measures only."""
+        """Build the control law as `build_controller` does, with its errors."""
         self._name = profile.controller
         self._controller = build_controller(profile, vehicle, clock, law)
         if isinstance(self._controller, CompiledController):
@@ -89,8 +82,7 @@ class ControlLoop:
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
         """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
 
-        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left; else with
-        what the battery has reported of it.
+        The estimated charge is kept, or with `afresh` set to the battery's last report.
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
         if self._charged is not None:
@@ -100,7 +92,7 @@ class ControlLoop:
         self._command(np.full(4, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
-        """Begin anew in mid-flight, every rotor as in hover: with the charge left, the mass estimated, and the lag."""
+        """Restart in flight with rotors at hover speed; keep the estimated charge and mass, and the lag."""
         before = self._memory
         self.begin(self.vehicle.hover_speed, yaw_rad, afresh=False)
         if before is None:
@@ -111,7 +103,7 @@ class ControlLoop:
             self._memory = self._waiting.with_lag(self._memory, self._waiting.lag_us(before))
 
     def know_charge(self, used_ah: float) -> None:
-        """Take in the charge that the battery itself reports, Ah: a law that remembers another goes on with this."""
+        """Correct the estimated charge by the battery's own report, Ah."""
         self._reported_ah = used_ah
         if self._charged is not None and self._memory is not None:
             charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
@@ -119,28 +111,26 @@ class ControlLoop:
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken from the battery: as a law remembers it that does, else as the battery has reported it, Ah."""
+        """Charge taken from the battery, Ah: the law's estimate, else the battery's report."""
         if self._charged is None or self._memory is None:
             return self._reported_ah
         return self._charged.charge_ah(self._memory)
 
     @property
     def lag_us(self) -> int:
-        """How far the law's path time is behind the clock, µs."""
+        """Lag of path time behind the clock, µs."""
         return 0 if self._waiting is None or self._memory is None else self._waiting.lag_us(self._memory)
 
     @property
     def path_speed(self) -> float:
-        """Speed of path time."""
         return 1.0 if self._waiting is None or self._memory is None else self._waiting.path_speed(self._memory)
 
     def take_waited_us(self) -> int:
-        """Return by how much path time has fallen behind since this was last asked, µs."""
+        """Return the growth of the lag since the last call, µs."""
         waited_us, self._waited_us = self._waited_us, 0
         return waited_us
 
     def record(self) -> LoopRecord:
-        """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
         memory = b""
         if self._is_plain:
             try:
@@ -150,7 +140,7 @@ class ControlLoop:
         return LoopRecord(self._yaw_rad, self.controls, memory)
 
     def resume(self, record: LoopRecord, *, seamless: bool) -> None:
-        """Go on with what was remembered: `seamless`, or as one begins in mid-flight."""
+        """Resume from a record: `seamless`, or as `begin_in_flight` does."""
         first = self._controller.initial(self.vehicle.hover_speed)
         kept = of_bytes(type(first), record.memory)
         self._memory = first if kept is None else kept
@@ -160,11 +150,10 @@ class ControlLoop:
             self.begin_in_flight(record.yaw_rad)
 
     def is_due(self, time_us: int) -> bool:
-        """Whether a control sample is at `time_us`."""
         return time_us % self.control_interval_us == 0
 
     def observe(self, frame: StateFrame) -> VehicleState:
-        """Return the state with yaw unwrapped near that of the last frame: a quaternion forgets full turns."""
+        """Return the state of a frame, its yaw unwrapped near that of the previous frame."""
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
@@ -173,10 +162,10 @@ class ControlLoop:
     def decide(self, time_us: int, state: VehicleState, references: Horizon, pace: Pace = Pace.CLOCK) -> Decision:
         """Decide the rotor speeds to hold until the next control sample.
 
-        A law that does not choose its speed along the references keeps to the clock at any pace.
+        A law without a path speed flies by the clock at any pace.
 
         Raises:
-            DecisionError: The control law raised, or gave what no rotor can follow.
+            DecisionError: The control law raised, or decided outside the rotors' limits.
         """
         try:
             if self._waiting is not None and pace is not Pace.CLOCK:
@@ -198,10 +187,10 @@ class ControlLoop:
         return decision
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
-        """Decide the rotor speeds by which a law that takes attitudes follows `demand`.
+        """Decide the rotor speeds that follow an attitude demand; requires `takes_attitude`.
 
         Raises:
-            DecisionError: The control law raised, or gave what no rotor can follow.
+            DecisionError: The control law raised, or decided outside the rotors' limits.
         """
         assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
         try:
@@ -212,13 +201,12 @@ class ControlLoop:
             raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
-        """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
+        """Switch to a law of the same kind and interval with other settings; its memory is kept."""
         self._take_in(controller)
         self.vehicle = vehicle
 
     @property
     def controller(self) -> Controller[Any]:
-        """The law itself."""
         return self._controller
 
     def _take_in(self, controller: Controller[Any]) -> None:
@@ -244,7 +232,7 @@ class ControlLoop:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    """Return the longest interval of whole milliseconds that divides the control interval, at most the one demanded."""
+    """Return the longest interval of whole milliseconds, up to the profile's, that divides the control interval."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us
@@ -253,7 +241,7 @@ def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
 
 
 def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> Controller[Any]:
-    """Return the control law of a profile for a vehicle; `law` makes it, or what is registered under its name.
+    """Return the control law of a profile for a vehicle, built by `law` or by the registered factory.
 
     Raises:
         ControllerError, ProfileError, SolverError: The law, its table, or its solver cannot be used.

@@ -1,4 +1,4 @@
-"""A profile: which control law flies, with which numbers, and how its flights begin; read strictly from TOML."""
+"""Profiles, read strictly from TOML: the control law, its settings and the start of a flight."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
@@ -15,7 +15,7 @@ References: TypeAlias = Literal["by-formula", "by-differences"]
 
 
 class ProfileError(AutopilotError):
-    """A profile that cannot be flown; the message names file and key."""
+    """An invalid profile; the message names file and key."""
 
 
 class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -46,32 +46,27 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A profile.
+    """A profile, with its name.
 
-    A file's name is that which it says of itself, or that of the file; one that Colibri's own profiles have it cannot
-    have, so that a copy is told from what it was copied from.
+    A file's profile is called as its `name` key or its file; names of built-in profiles stay reserved for them.
     """
 
-    file: str = ""
-    """Where it was read; empty for one of Colibri's own."""
+    file: str = ""  # its path; empty for a built-in profile
 
     @property
     def where(self) -> str:
-        """What errors call it."""
         return self.file or f"profile {self.name}"
 
     def table(self, controller: str) -> dict[str, Any]:
-        """Return the numbers of a control law; none for one that the profile does not know."""
         return self.controllers.get(controller, {})
 
     def replace(self, key: str, value: Any) -> "Profile":
-        """Return the profile with another value at a dotted key; the star behind its name tells it from this one.
+        """Return the profile with another value at a dotted key; a star marks its name.
 
-        `controllers.NAME` may be new: the numbers of a control law of one's own. What is in such a table is judged by
-        the law, when it is built.
+        `controllers.NAME` may be new: the settings of your own control law, which checks them when it is built.
 
         Raises:
-            ProfileError: There is no such key, or it cannot have this value.
+            ProfileError: The key is unknown, or the value invalid.
         """
         above, _, law = key.partition(".")
         whole = above == "controllers" and law and "." not in law
@@ -85,7 +80,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return changed
 
     def with_choices(self, controller: str | None, solver: str | None, delay_s: float | None = None) -> "Profile":
-        """Return the profile with another control law, delay, and QP solver; ProfileError if the law solves no QP."""
+        """Return the profile with another control law, delay, and QP solver."""
         told_s = self.delay_s if delay_s is None else delay_s
         chosen = msgspec.structs.replace(self, controller=controller or self.controller, delay_s=told_s)
         if solver is None:
@@ -98,10 +93,10 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def load_profile(given: str | Profile) -> Profile:
-    """Read a profile by its name, or from a file if the name ends in `.toml`; one that is given is returned.
+    """Read a profile by its name, or from a file if the name ends in `.toml`.
 
     Raises:
-        ProfileError: There is no such profile, or the file has a missing, unknown or impossible key.
+        ProfileError: The profile is unknown, or the file has a missing, unknown or invalid key.
     """
     if isinstance(given, Profile):
         return given
@@ -117,17 +112,17 @@ def load_profile(given: str | Profile) -> Profile:
 
 
 def profile_text(name: str) -> str:
-    """Return the file of a profile that comes with Colibri; ProfileError if there is none of that name."""
+    """Return the file of a built-in profile."""
     return named_text("profile", _FOLDER, name, ProfileError)
 
 
 def profile_names() -> list[str]:
-    """Return the names of the profiles that come with Colibri."""
+    """Return the names of the built-in profiles."""
     return toml_names(_FOLDER)
 
 
 def _check_frames(profile: Profile) -> None:
-    """Raise a ProfileError unless frames divide the control interval of the profile's own law."""
+    """Raise a ProfileError unless frames divide the control interval of the profile's law."""
     frame_s = profile.simulation.frame_interval_s
     control_s = profile.table(profile.controller).get("control_interval_s")
     if frame_s is None or not isinstance(control_s, float):

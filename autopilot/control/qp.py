@@ -1,4 +1,4 @@
-"""Quadratic programs by DAQP or Clarabel, or through qpsolvers by any solver. Every result is a value, no exception."""
+"""Quadratic programs by DAQP, Clarabel or any qpsolvers solver; failures are statuses, not exceptions."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -16,10 +16,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
-"""What `pip install colibri-sitl[solvers]` brings, by the names that qpsolvers uses."""
 
-MAX_RESIDUAL = 1e-6
-"""A solution that misses its optimality conditions by more is not accurate."""
+MAX_RESIDUAL = 1e-6  # largest accepted violation of the optimality conditions
 
 MAX_ITERATIONS = 100_000
 
@@ -30,58 +28,42 @@ _PATTERNS = 64
 
 
 class SolverError(AutopilotError):
-    """A solver that cannot be used; the message says what to do."""
+    """A solver that cannot be used; the message names the remedy."""
 
 
 class QpStatus(StrEnum):
-    """How a QP ended."""
+    """Result of a QP."""
 
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
-    TIME_OUT = "time-out"
-    """The solver stopped at its most iterations: counted, not timed, so that a flight stays the same flight."""
-    NOT_ACCURATE = "not accurate"
-    """What the solver gave is no number, or does not satisfy the optimality conditions."""
+    TIME_OUT = "time-out"  # iteration limit: counted, not timed, to keep flights repeatable
+    NOT_ACCURATE = "not accurate"  # not finite, or outside the optimality conditions
 
 
 class Qp(NamedTuple):
-    """min ½ xᵀ H x + fᵀ x subject to G x <= h, lower <= x <= upper.
+    """min ½ xᵀ H x + fᵀ x subject to G x <= h, lower <= x <= upper."""
 
-    Attributes:
-        H: Symmetric, positive definite, (n, n).
-        f: (n,).
-        G: (m, n).
-        h: (m,).
-        lower: (n,); (0,) for no bounds.
-        upper: (n,); (0,) for no bounds.
-    """
-
-    H: Array
-    f: Array
-    G: Array
-    h: Array
-    lower: Array = _NONE
-    upper: Array = _NONE
+    H: Array  # symmetric, positive definite, (n, n)
+    f: Array  # (n,)
+    G: Array  # (m, n)
+    h: Array  # (m,)
+    lower: Array = _NONE  # (n,), or (0,) without bounds
+    upper: Array = _NONE  # (n,), or (0,) without bounds
 
 
 class QpResult(NamedTuple):
-    """What came of a QP.
-
-    Attributes:
-        x: The solution, (n,), or None.
-        iterations: That the solver took, the same wherever the QP is the same; nan where it does not say.
-    """
+    """The result of a QP."""
 
     status: QpStatus
-    x: Array | None
-    iterations: float = nan
+    x: Array | None  # the solution, (n,)
+    iterations: float = nan  # nan if the solver gives no count
 
 
 class QpSolver:
-    """One QP solver, held to a tolerance."""
+    """One QP solver at a tolerance."""
 
     def __init__(self, name: str, tolerance: float, max_iterations: int = MAX_ITERATIONS) -> None:
-        """Use solver `name`, see `check_solver`; it stops at `tolerance`, if it has one, or at `max_iterations`."""
+        """Load solver `name`, or raise a SolverError."""
         check_solver(name)
         from colibri.autopilot.control.qp_residual import residual  # compiled: who only reads a result does without
 
@@ -91,7 +73,6 @@ class QpSolver:
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
-        """Solve a QP."""
         try:
             optimum = self._optimum(qp)
         except (ArithmeticError, ValueError, RuntimeWarning):
@@ -105,7 +86,7 @@ class QpSolver:
 
 
 class _Optimum(NamedTuple):
-    """The solution, None if none was found; the multipliers of rows and of bounds; and how many iterations it took."""
+    """A solution with the multipliers of rows and of bounds, and the iterations it took."""
 
     x: Array | None
     z: Array | None
@@ -120,7 +101,7 @@ def _solver(name: str, options: dict[str, Any]) -> Callable[[Qp], _Optimum]:
 
 
 class _Daqp:
-    """DAQP by its own interface, with what qpsolvers' asks of it: that loads all solvers, and SciPy."""
+    """DAQP by its own interface: qpsolvers' would load every solver, and SciPy."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         import daqp
@@ -140,7 +121,7 @@ class _Daqp:
 
 
 class _Clarabel:
-    """Clarabel by its own interface, asked as by qpsolvers: whose way to it takes longer than Clarabel itself."""
+    """Clarabel by its own interface: the detour by qpsolvers takes longer than Clarabel itself."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         import clarabel
@@ -171,7 +152,7 @@ class _Clarabel:
 
 
 class _Qpsolvers:
-    """Any solver, by qpsolvers."""
+    """Any other solver, by qpsolvers."""
 
     def __init__(self, name: str, options: dict[str, Any]) -> None:
         import qpsolvers
@@ -194,7 +175,7 @@ class _Qpsolvers:
         return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
     def _quietly(self, qp: Qp) -> Any:
-        """Solve without a word: the sparse solvers' interfaces warn of what they do with their matrices."""
+        """Solve without the sparse solvers' warnings about matrix conversions."""
         with catch_warnings():
             simplefilter("ignore")
             return self._solution(qp, _filled("P", qp.H), _filled("G", qp.G))
@@ -215,7 +196,7 @@ def _or_none(vector: Array) -> Array | None:
 
 
 def why_none(qp: Qp) -> QpStatus:
-    """Return why a QP has no solution: no point satisfies its constraints (a linear program tells), or no time."""
+    """Return the status of a QP without solution: infeasible by a linear program, or else out of time."""
     from scipy.optimize import linprog
 
     if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
@@ -229,14 +210,13 @@ def why_none(qp: Qp) -> QpStatus:
 
 
 def installed_solvers() -> list[str]:
-    """Return the names of the QP solvers that can be used here."""
     import qpsolvers
 
     return sorted(qpsolvers.available_solvers)
 
 
 def check_solver(name: str) -> None:
-    """Raise a SolverError if there is no such solver, or it is not installed."""
+    """Raise a SolverError if the solver is unknown or not installed."""
     if name in (_DAQP, _CLARABEL):  # as numpy is, always
         return
     import qpsolvers
@@ -256,7 +236,7 @@ def box(n: int) -> Array:
 
 
 def _filled(role: str, matrix: Array) -> "csc_matrix":
-    """Return a matrix as CSC: to build a new one costs five times what Clarabel takes, so its pattern is kept."""
+    """Return a matrix as CSC. Its pattern is cached: building one takes five times Clarabel's solution."""
     filled = matrix.T != 0.0
     sparse = _pattern(role, matrix.shape, filled.tobytes())
     np.asarray(sparse.data)[:] = matrix.T[filled]
@@ -280,7 +260,7 @@ def _known_solvers() -> frozenset[str]:
 
 
 def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:
-    """Return what each solver calls its tolerances and its most iterations; quadprog has neither."""
+    """Return tolerance and iteration limit by the names each solver gives them; quadprog has neither option."""
     absolute_and_relative = {"eps_abs": tolerance, "eps_rel": tolerance}
     options: dict[str, dict[str, Any]] = {
         "clarabel": {

@@ -1,4 +1,4 @@
-"""How well a point satisfies a QP's optimality conditions, as a compiled kernel."""
+"""Compiled residual of a QP's optimality conditions."""
 
 from math import inf, isfinite
 
@@ -10,22 +10,13 @@ from colibri.common.types import Array
 def residual(
     H: Array, f: Array, G: Array, h: Array, lower: Array, upper: Array, x: Array, z: Array, z_box: Array
 ) -> float:
-    """Return by how much a solution misses the optimality conditions: by its worst constraint, or gradient over f.
-
-    Infinite where x, or the gradient there, is not finite.
+    """Return the largest violation of a constraint, or of stationarity in parts of f; inf if not finite.
 
     Args:
-        H: (n, n).
-        f: (n,).
-        G: (m, n), of G x <= h.
-        h: (m,).
-        lower: (n,), or (0,) for no bounds.
-        upper: (n,), or (0,) for no bounds.
+        H, f, G, h, lower, upper: As in `Qp`.
         x: The solution, (n,).
-        z: Multipliers of G x <= h, (m,), or (0,) where the solver gives none.
-        z_box: Multipliers of the bounds, (n,), negative at a lower one; or (0,).
-
-    Where there are not as many multipliers as constraints, only feasibility counts.
+        z: Multipliers of G x <= h, (m,), or (0,) if unknown: then only feasibility counts.
+        z_box: Multipliers of the bounds, (n,), negative at a lower bound; or (0,).
     """
     n, m = G.shape[1], G.shape[0]
     has_multipliers = z.shape[0] == m and z_box.shape[0] >= lower.shape[0]

@@ -1,4 +1,4 @@
-"""Control laws by name: found as entry points, made, and what they return checked."""
+"""Control laws by name: entry points, construction, and checks of their decisions."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -22,11 +22,11 @@ DEFAULT = "cascade"
 
 
 class ControllerError(AutopilotError):
-    """A control law that cannot be used."""
+    """An unusable control law."""
 
 
 class DecisionError(AutopilotError, InFlightError):
-    """A control law decided in flight what no rotor can follow."""
+    """A decision outside the rotors' limits, or of the wrong type."""
 
 
 class LawError(DecisionError, ForeignError):
@@ -34,7 +34,7 @@ class LawError(DecisionError, ForeignError):
 
 
 class BuildError(ControllerError, ForeignError):
-    """A control law raised while it was built."""
+    """A control law raised during construction."""
 
 
 Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
@@ -42,13 +42,13 @@ Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[An
 
 
 def controller_names() -> list[str]:
-    """Return the names of the control laws that are installed."""
+    """Return the names of the installed control laws."""
     return sorted({entry.name for entry in registered()})
 
 
 @cache
 def registered() -> EntryPoints:
-    """Return the entry points of all control laws; looked up once, for that reads a file of every package there is."""
+    """Return the entry points of all control laws; cached, since it reads a file of every package."""
     return entry_points(group=GROUP)
 
 
@@ -56,7 +56,7 @@ def load_controller(name: str) -> Factory:
     """Return the factory registered as `name`.
 
     Raises:
-        ControllerError: There is none, or its package cannot be loaded.
+        ControllerError: The name is unknown, or its package cannot be loaded.
     """
     for entry in registered().select(name=name):
         try:
@@ -68,22 +68,15 @@ def load_controller(name: str) -> Factory:
 
 
 class Origin(NamedTuple):
-    """Where a control law comes from.
+    """Origin of a control law, for records."""
 
-    Attributes:
-        entry: Module and name.
-        package: With its version.
-        sha256: Of the module's file; empty where it is none.
-    """
-
-    entry: str
-    package: str
-    sha256: str
+    entry: str  # module and name
+    package: str  # with version
+    sha256: str  # of the module's file; empty if there is none
 
 
 @cache
 def origin_of(name: str) -> Origin:
-    """Return where the control law registered as `name` comes from; ControllerError if there is none."""
     for entry in registered().select(name=name):
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
@@ -92,7 +85,7 @@ def origin_of(name: str) -> Origin:
 
 
 def origin_of_factory(law: Factory) -> Origin:
-    """Return where a control law comes from that was handed over, not registered."""
+    """Return the origin of a control law passed as an object."""
     module = getattr(law, "__module__", "")
     file = getattr(modules.get(module), "__file__", None)
     return Origin(f"{module}:{getattr(law, '__qualname__', type(law).__qualname__)}", "", _sha256(file))
@@ -103,7 +96,7 @@ def _sha256(file: str | None) -> str:
 
 
 def check_controller(name: str, controller: object) -> None:
-    """Raise a ControllerError if this is no control law."""
+    """Raise a ControllerError unless the object implements `Controller`."""
     if not isinstance(controller, Controller):
         raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
     interval_us = controller.control_interval_us
@@ -112,7 +105,7 @@ def check_controller(name: str, controller: object) -> None:
 
 
 def in_words(error: BaseException) -> str:
-    """Return an exception as one line: a refusal in its own words, of anything else its type, too."""
+    """Return an exception as one line, with its type unless it is an `Error`."""
     words = " ".join(str(error).split())
     if words and isinstance(error, Error):
         return words
@@ -120,7 +113,7 @@ def in_words(error: BaseException) -> str:
 
 
 def check_answer(name: str, answer: object, time_us: int) -> None:
-    """Raise a DecisionError unless a control law returned what it remembers, and a decision."""
+    """Raise a DecisionError unless a control law returned its memory and a Decision."""
     if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Decision):
         return
     raise DecisionError(
@@ -130,7 +123,7 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
 
 
 def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
-    """Return the rotor speeds of a decision, at `time_us` if in flight; DecisionError if rotors cannot follow them."""
+    """Return four rotor speeds within the vehicle's limits, or raise a DecisionError."""
     speeds = np.asarray(rotor_speeds).tolist()
     if isinstance(speeds, list) and len(speeds) == 4:
         a, b, c, d = speeds

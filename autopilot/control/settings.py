@@ -1,4 +1,4 @@
-"""What the tables of several control laws have in common: the QP solver, the control interval."""
+"""Settings shared by control laws: the QP solver and the control interval."""
 
 from typing import Annotated, TypeAlias
 
@@ -19,12 +19,11 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """More count as a time-out."""
 
     def build(self) -> QpSolver:
-        """Return the solver; SolverError if it cannot be used."""
         return QpSolver(self.solver, self.tolerance, self.max_iterations)
 
 
 def interval_us(interval_s: float) -> int:
-    """Return an interval in µs; SettingsError unless it is whole milliseconds, as MAVLink counts them."""
+    """Return an interval in µs; SettingsError unless whole milliseconds, the resolution of MAVLink."""
     if not (interval_s * 1000.0).is_integer():
         raise SettingsError(f"control_interval_s: must be whole milliseconds, not {interval_s}")
     return round(interval_s * 1e6)

@@ -1,4 +1,4 @@
-"""The attitude LPV-MPC: predicts, condenses, solves and reads the plan."""
+"""The attitude LPV-MPC: predict, condense, solve, and read the plan."""
 
 from math import radians
 from typing import Annotated, Literal, NamedTuple, TypeAlias
@@ -24,10 +24,8 @@ from colibri.plant.vehicle.description import Vehicle
 
 PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
 
-_BINDING = 1e-6
-"""A limit counts as active where this part of it or less is left."""
-_KEPT = 1e-3
-"""A limit of the tilt that is exceeded by this part of it or less counts as kept."""
+_BINDING = 1e-6  # a limit is active if this part of it or less is left
+_KEPT = 1e-3  # the tilt limit may be exceeded by this part of it
 
 
 class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -49,26 +47,19 @@ class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Plan(NamedTuple):
-    """A solved QP.
+    """A solved QP."""
 
-    Attributes:
-        moments: Commanded at each step, N m, (N, 3).
-        states: Predicted, (N + 1, 9).
-        angle_slack: Part by which the limit of tilt, phi and theta is exceeded.
-    """
-
-    moments: Array
-    states: Array
-    angle_slack: float
+    moments: Array  # commanded at each step, N m, (N, 3)
+    states: Array  # predicted, (N + 1, 9)
+    angle_slack: float  # violation of the angle limits, in parts of them
 
 
 class AttitudeMpc:
     """LPV-MPC of roll, pitch and yaw, within the limits of the rotors.
 
     Attributes:
-        problem: What all its QPs share.
-        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds in parts of the largest, (4, 4).
-        gain: K of the LQR that the terminal weight belongs to, (3, 12).
+        from_wrench: U1, N, and U2, U3, U4, N m, to squared speeds in parts of the largest, (4, 4).
+        gain: K of the LQR with the terminal weight as its cost, (3, 12).
     """
 
     def __init__(
@@ -113,11 +104,10 @@ class AttitudeMpc:
         self._qp.lower[:moved] = -self._qp.upper[:moved]
 
     def plan(self, now: InitialState, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
-        """Plan from `now` towards `target`; no plan where the QP is not solved.
+        """Plan from `now` towards `target`; the plan is None if the QP is not solved.
 
-        The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
-        tilt within its limit, thrust gives way: a second plan has the thrust that leaves most for moments. `ahead`
-        are the last plan's states at the samples after this one, (n, 9).
+        The thrust limits the moments that rotors can make. If the plan exceeds the tilt limit, a second one gives up
+        thrust for the largest moments. `ahead`: states of the previous plan at the coming samples, (n, 9).
         """
         self.predict(now, ahead)
         plan, diagnostics = self._solve(now, target)
@@ -129,7 +119,7 @@ class AttitudeMpc:
         return (second, how) if second is not None else (plan, diagnostics)
 
     def _middle_thrust_n(self, now: InitialState) -> float:
-        """Return the thrust, N, that leaves the rotors most for moments of either sign."""
+        """Return the thrust, N, that leaves most room for moments of either sign."""
         middle = 0.5 * (self.problem.min_squared + square(now.max_speed))
         return middle / float(self.problem.from_thrust.max())
 
@@ -144,7 +134,7 @@ class AttitudeMpc:
         return plan, diagnostics._replace(qp_iterations=iterations)
 
     def predict(self, now: InitialState, ahead: Array | None) -> None:
-        """Predict the responses, scheduled along the last plan if there is one."""
+        """Predict the responses, scheduled along the previous plan if there is one."""
         if ahead is not None and len(ahead) and self._along_plan:
             prediction.schedule_along(now.x, ahead, self._schedule)
         else:
@@ -152,10 +142,10 @@ class AttitudeMpc:
         prediction.respond(now, self._schedule, self._body, self.problem.starts, self._interval_s, self._responses)
 
     def condense(self, now: InitialState, target: Target) -> Qp:
-        """Condense what was predicted to a QP; it lies in arrays that the next one overwrites.
+        """Condense the prediction to a QP, in arrays that the next call overwrites.
 
-        The first move may always take back the moments last commanded, however large a fallback left them: without
-        them the rotors make the thrust alone, so that the hard limits can always be kept.
+        The first move may always cancel the last moments, even after a large fallback: thrust alone keeps the hard
+        limits, so the QP is feasible.
         """
         max_squared = square(now.max_speed)
         condensing.condense(self._responses, self._schedule, target, now.u, self._packed, max_squared, self._qp)
@@ -164,7 +154,6 @@ class AttitudeMpc:
     def read(
         self, now: InitialState, target: Target, qp: Qp, z: Array, solve_time_s: float
     ) -> tuple[Plan, Diagnostics]:
-        """Return the plan that the QP's solution `z` (n,) stands for, and its diagnostics."""
         states, moments, squared = condensing.read_plan(self._responses, self._packed, now.u, z, target.thrust_n)
         active = condensing.count_active(qp.G, qp.h, qp.lower, qp.upper, z, self._rotor_rows, _BINDING)
         diagnostics = Diagnostics(
@@ -179,7 +168,7 @@ class AttitudeMpc:
         return Plan(moments, states, float(z[-condensing.SLACKS + condensing.ANGLE_SLACK])), diagnostics
 
     def lqr(self, now: InitialState, target: Target) -> Array:
-        """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""
+        """Return the moments, N m, (3,), of the unconstrained LQR."""
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()
         wanted[list(prediction.ANGLES)] = target.angles[0]
@@ -188,7 +177,7 @@ class AttitudeMpc:
 
 
 def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weight: Array) -> tuple[Array, Array]:
-    """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments, for the same Q and R."""
+    """Return cost S (12, 12) and gain K (3, 12) of the LQR at hover on state and last moments."""
     A = _hover_transition(body, interval_s)
     B = A[:, STATES:]
     C = np.zeros((INPUTS, STATES + INPUTS))
@@ -213,7 +202,7 @@ def _hover_transition(body: Body, interval_s: float) -> Array:
 
 
 def body_of(vehicle: Vehicle) -> Body:
-    """Return the model of `vehicle`: its moments follow like the slower of its rotors' two lags."""
+    """Return the model of `vehicle`, with the slower of its rotors' two lags."""
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
     return Body(*vehicle.body.inertia_kg_m2, lag_1_s)

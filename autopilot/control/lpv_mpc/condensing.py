@@ -1,18 +1,17 @@
-"""The constrained MPC's QP, condensed to the increments and two slacks, as compiled kernels.
+"""The QP of the attitude MPC, condensed to the increments and two slacks, as compiled kernels.
 
     z = [Δu at each move, angle slack, rate slack]
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input. With b moves, n = 3 b + 2
-variables and m rows, the kernels take and fill:
+The cost is the thesis's [3.13-3.20] with a full terminal weight on state and input. Arguments of the kernels, for b
+moves, n = 3 b + 2 variables and m rows:
 
     responses     of `prediction.respond`, (N + 1, 9, 1 + 3 b)
     schedule      phi, theta, p, q, r expected at each step, (N, 5)
     u             moments last commanded, N m, (3,)
     thrust_n      U1 commanded at each step, N, (N,)
-    H, f, G, h    (n, n), (n,), (m, n), (m,); G with zeros where nothing is written
-    lower, upper  of all variables, (n,)
-    max_squared   largest squared rotor speed that can be had; all squared speeds are in parts of the largest
+    G             (m, n), initially zero
+    max_squared   largest available squared rotor speed; all squared speeds are in parts of the largest
 """
 
 from math import sqrt
@@ -30,60 +29,39 @@ from colibri.common.types import Array
 SLACKS = 2
 ANGLE_SLACK, RATE_SLACK = 0, 1
 ROTORS = 4
-LIMITED = 5
-"""Softly limited on both sides: phi and theta with one slack, which the tilt shares; p, q and r with the other."""
+LIMITED = 5  # phi and theta share a slack with the tilt; p, q and r share the other
 _TWO_SIDES = 2
-MOTION_ROWS = 1 + _TWO_SIDES * LIMITED
-"""Of each step that is checked: tilt, then both sides of phi, theta, p, q and r."""
+MOTION_ROWS = 1 + _TWO_SIDES * LIMITED  # of each checked step: tilt, then both sides of phi, theta, p, q and r
 _ANGLE_ROWS = 1 + _TWO_SIDES * 2
 _NO_TILT = 1e-9
 
 
 class Problem(NamedTuple):
-    """What all QPs of a control law share: weights, limits and the steps that they belong to.
+    """Weights and limits shared by all QPs."""
 
-    Attributes:
-        starts: Step of each move, (b,).
-        checked: Steps at which the limits of the motion are held, (c,).
-        output_weight: Diagonal of Q, (3,).
-        increment_weight: Diagonal of R, (3,).
-        terminal_weight: S on state and input, (12, 12), symmetric.
-        max_increment: Largest increments of the first move, N m, (3,).
-        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,); the first also of the tilt.
-        from_thrust: Squared rotor speeds from U1, in parts of the largest, (4,).
-        from_moments: The same from U2, U3, U4, (4, 3).
-        min_squared: Least squared speed, in the same parts.
-    """
-
-    starts: Integers
-    checked: Integers
-    output_weight: Array
-    increment_weight: Array
-    terminal_weight: Array
-    max_increment: Array
-    limits: Array
-    from_thrust: Array
-    from_moments: Array
+    starts: Integers  # step of each move, (b,)
+    checked: Integers  # steps with soft limits, (c,)
+    output_weight: Array  # diagonal of Q, (3,)
+    increment_weight: Array  # diagonal of R, (3,)
+    terminal_weight: Array  # S on state and input, (12, 12), symmetric
+    max_increment: Array  # of the first move, N m, (3,)
+    limits: Array  # of tilt and |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,)
+    from_thrust: Array  # U1 to squared rotor speeds, (4,)
+    from_moments: Array  # U2, U3, U4 to squared rotor speeds, (4, 3)
     min_squared: float
 
 
 class Target(NamedTuple):
-    """What a plan is to reach.
+    """The references of a plan."""
 
-    Attributes:
-        angles: phi, theta, psi after each step, rad, (N, 3).
-        end: State and moments at the end of the horizon, (12,).
-        thrust_n: U1 commanded at each step, N, (N,).
-    """
-
-    angles: Array
-    end: Array
-    thrust_n: Array
+    angles: Array  # phi, theta, psi after each step, rad, (N, 3)
+    end: Array  # state and moments at the end of the horizon, (12,)
+    thrust_n: Array  # U1 commanded at each step, N, (N,)
 
 
 @compiled
 def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem, H: Array, f: Array) -> None:
-    """Fill the part of H and f that belongs to the increments."""
+    """Fill H and f of the increments."""
     steps = responses.shape[0] - 1
     moved = responses.shape[2] - 1
     H[:moved, :moved] = 0.0
@@ -107,7 +85,7 @@ def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem,
 
 @compiled
 def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f: Array) -> None:
-    """Add ½ eᵀSe of the error of state and input at the end, to the lower triangle of H."""
+    """Add ½ eᵀSe of the final error to the lower triangle of H."""
     moved = last.shape[1] - 1
     E = np.zeros((STATES + INPUTS, moved + 1))
     E[:STATES] = last
@@ -127,7 +105,7 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 
 @compiled
 def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array) -> None:
-    """Bound the first increments, (3,), by `max_increment`, N m, (3,), but let them take back all of u."""
+    """Bound the first increments, but let them cancel all of u."""
     for i in range(INPUTS):
         lower[i] = min(-max_increment[i], -u[i])
         upper[i] = max(max_increment[i], -u[i])
@@ -135,10 +113,10 @@ def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array)
 
 @compiled
 def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
-    """Fill the rows that keep every rotor within its limits at every step, from row 0 on; return how many.
+    """Fill the rows of the rotor limits from row 0 on; return their number.
 
-    Linear in squared speed, and with the thrust known only the moments move it. Between two moves the moments stay, so
-    one row a side holds the tightest step of them.
+    With the thrust given, squared speeds are linear in the moments. Moments are constant between two moves, so one row
+    a side with the tightest step suffices.
     """
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     count = 0
@@ -162,11 +140,10 @@ def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float
 
 @compiled
 def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
-    """Write the normal of the tangent to the largest tilt, (2,), in the direction of a tilt; return its distance, rad.
+    """Write the normal, (2,), of the tangent to the tilt limit; return its distance, rad.
 
-    cos(phi) cos(theta) >= cos(max_tilt) is a convex set of (phi, theta). All of it lies on the near side of the
-    tangent, normal . (phi, theta) <= distance, and the tangent touches it where the tilt has the direction of `phi` and
-    `theta`; without any, the normal is zeros. Angles are in rad, `max_tilt` less than a right one.
+    cos(phi) cos(theta) >= cos(max_tilt) is a convex set within normal . (phi, theta) <= distance. The tangent touches
+    it in the direction of the tilt (`phi`, `theta`), rad; at zero tilt the normal is zero. `max_tilt` < π / 2.
     """
     x, y = sin(theta) * cos(phi), sin(phi)
     across = sqrt(x * x + y * y)
@@ -182,9 +159,9 @@ def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> fl
 
 @compiled
 def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int, G: Array, h: Array) -> int:
-    """Fill the soft rows of tilt, angles and rates from row `first`; return the row after them.
+    """Fill the soft rows of tilt, angles and rates from row `first` on.
 
-    The tilt is limited by a tangent in the direction that it is expected to have.
+    The tilt limit is its tangent in the expected direction of tilt.
     """
     states = (ANGLES[0], ANGLES[1], P, Q, R)
     limits = problem.limits
@@ -215,12 +192,7 @@ def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int
 
 @compiled
 def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
-    """Return what increments `z`, (n,), lead to.
-
-    Returns:
-        States predicted, (N + 1, 9); of each step the moments commanded, N m, (N, 3), and the squared rotor speeds
-        commanded, (N, 4).
-    """
+    """Return predicted states, (N + 1, 9), moments, N m, (N, 3), and squared speeds, (N, 4), of a solution."""
     problem = packed[0]
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     steps = responses.shape[0] - 1
@@ -251,7 +223,7 @@ def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Ar
 def count_active(
     G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
 ) -> tuple[int, int, int, int]:
-    """Return how many limits of rotors, increments, angles and rates have less than `binding` left at z, (n,).
+    """Return the numbers of active limits of rotors, increments, angles and rates at z, (n,).
 
     The first `rotor_rows` rows of G are those of `limit_rotors`, the others those of `limit_motion`.
     """
@@ -278,7 +250,7 @@ def count_active(
 def condense(
     responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
 ) -> None:
-    """Fill a whole QP in place; slacks keep their part of H, f and the bounds."""
+    """Fill a QP in place, except the slacks' part of H, f and the bounds."""
     problem = packed[0]
     limit_first_move(u, problem.max_increment, qp.lower, qp.upper)
     quadratic_cost(responses, target, u, problem, qp.H, qp.f)
@@ -288,7 +260,6 @@ def condense(
 
 @compiled
 def objective(H: Array, f: Array, z: Array) -> float:
-    """Return ½ zᵀHz + fᵀz."""
     total = 0.0
     for i in range(z.shape[0]):
         total += f[i] * z[i]

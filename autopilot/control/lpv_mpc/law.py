@@ -1,4 +1,4 @@
-"""The flight profile's control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
+"""The `lpv-mpc` control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
 
 from collections.abc import Mapping
 from math import radians
@@ -34,8 +34,7 @@ from colibri.common.matrices import dot, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_RECOVER_BEYOND = cos(radians(75.0))
-"""A thrust axis further from where it must point, or a steeper pitch, is for the recovery law."""
+_RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis, or a steeper pitch
 _NO_YAW = np.empty(0)
 
 
@@ -55,36 +54,26 @@ class LpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, 
 
 
 class Memory(NamedTuple):
-    """What the law carries from one control sample to the next.
-
-    Attributes:
-        moments: U2..U4 last commanded, N m, (3,).
-        plan: The last plan, made `age` samples ago; None where there is none to build on.
-        age: Samples since that plan.
-    """
+    """State of the law between two control samples."""
 
     tracked: Tracked
-    moments: Array
-    plan: Plan | None
-    age: int
+    moments: Array  # U2..U4 last commanded, N m, (3,)
+    plan: Plan | None  # previous plan, if usable
+    age: int  # samples since that plan
 
 
 class LawInputs(NamedTuple):
-    """What a decision begins with.
-
-    Attributes:
-        now, motion: For the attitude's plan, and for the outer loop.
-    """
+    """Inputs of a decision."""
 
     observed: Observed
-    now: InitialState
-    motion: Motion
+    now: InitialState  # for the attitude MPC
+    motion: Motion  # for the outer loop
 
 
 class Choice(NamedTuple):
-    """What was chosen: squared rotor speeds (4,) in parts of the largest, their moments, and the plan to go on with."""
+    """A plan or a fallback."""
 
-    squared: Array
+    squared: Array  # rotor speeds, parts of the largest, (4,)
     moments: Array
     plan: Plan | None
     age: int
@@ -92,11 +81,7 @@ class Choice(NamedTuple):
 
 
 class LpvMpc(TrackingLaw[Memory]):
-    """The control law. Its predicted outputs are the states of `prediction`.
-
-    Attributes:
-        preview: From now to one sample past the horizon.
-    """
+    """The control law; its predicted outputs are the states of `prediction`."""
 
     plan_columns = PlanColumns(prediction.PHI, prediction.THETA, prediction.PSI, prediction.R)
 
@@ -110,12 +95,10 @@ class LpvMpc(TrackingLaw[Memory]):
         self._outer_loop = OuterLoop(settings.guidance, vehicle, lag, interval_s, self._attitude.horizon)
 
     def initial(self, rotor_speed: float) -> Memory:
-        """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         tracked = self.tracker.initial(rotor_speed)
         return Memory(tracked, tracked.wrench[1:].copy(), None, 0)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
-        """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
         planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
@@ -127,7 +110,6 @@ class LpvMpc(TrackingLaw[Memory]):
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
-        """Decide the same for an attitude and a thrust, which is kept within what the rotors leave to the moments."""
         del time_us
         inputs = self._inputs(memory, state)
         max_speed = self.tracker.battery.max_common_speed(memory.tracked.charge_ah)

@@ -1,4 +1,4 @@
-"""The outer loop of one vehicle: what `position_loop` computes, with the limits that the battery leaves."""
+"""The outer loop of one vehicle: `position_loop` within the limits of the battery."""
 
 from math import radians
 from typing import Annotated, NamedTuple
@@ -32,20 +32,15 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Setpoint(NamedTuple):
-    """What the outer loop demands.
+    """Demands of the outer loop."""
 
-    Attributes:
-        force: Of the thrust now, N, ENU, (3,).
-        aligned: Cosine of the angle from the thrust to it.
-    """
-
-    force: Array
-    aligned: float
+    force: Array  # of the thrust now, N, ENU, (3,)
+    aligned: float  # cosine of the angle between it and the thrust axis
     target: Target
 
 
 class OuterLoop:
-    """From references, or a demanded attitude, to the setpoint of the attitude."""
+    """From references, or an attitude demand, to the attitude setpoint."""
 
     def __init__(self, settings: GuidanceSettings, vehicle: Vehicle, lag: RotorLag, interval_s: float, n: int) -> None:
         k1_s2, k2_s = gains(settings.poles)
@@ -64,13 +59,12 @@ class OuterLoop:
     def track(
         self, motion: Motion, references: Horizon, planned_yaw: Array, disturbances: Array, max_speed: float
     ) -> Setpoint:
-        """Return the setpoint that leads to references.
+        """Return the setpoint for references at the samples from now to one past the horizon.
 
         Args:
-            references: At each sample from now to one past the horizon.
-            planned_yaw: By the last plan, from now, rad, (m,); (0,) without one.
-            disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
-            max_speed: That all rotors can turn at, in parts of the largest.
+            planned_yaw: Yaw of the previous plan from now on, rad, (m,); (0,) without one.
+            disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, (6,).
+            max_speed: Available to all rotors at once, in parts of the largest.
         """
         p, v, a, *_, yaw, _, _ = references
         out = self._demands()
@@ -80,7 +74,7 @@ class OuterLoop:
         return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
 
     def hold(self, motion: Motion, demand: AttitudeDemand, disturbance_n_m: Array, max_speed: float) -> Setpoint:
-        """Return the setpoint that a demanded attitude is, its thrust within the same limits as when tracking."""
+        """Return the setpoint of an attitude demand, its thrust within the same limits."""
         out = self._demands()
         aligned = position_loop.hold_attitude(
             motion, (demand.angles, demand.thrust_n), disturbance_n_m, self._packed, self.limits(max_speed), out
@@ -93,7 +87,7 @@ class OuterLoop:
         return Demands(np.empty((n, 3)), np.empty((n, 3)), np.empty(self._steps), end)
 
     def limits(self, max_speed: float) -> ForceLimits:
-        """Return the limits of what is demanded, where all rotors can turn at `max_speed`, in parts of the largest."""
+        """Return the force limits for an available rotor speed, in parts of the largest."""
         max_n = self._span_n * square(max_speed)
         margin_n = self._thrust_margin * (max_n - self._min_n)
         min_n = self._min_n + margin_n

@@ -1,13 +1,15 @@
-"""The outer loop over a horizon: references, feedback and limits to attitudes and thrusts, as compiled kernels.
+"""The outer loop over a horizon: references and feedback to attitudes and thrusts, as compiled kernels.
 
-Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch about the yaw
-that is predicted, so that thrust points right whatever yaw does. The errors ahead are those of the closed loop.
-Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
+Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch at the predicted
+yaw, so that thrust points right while yaw lags. Future errors follow the closed loop. Flatness of a quadrotor:
+Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
 
-Samples are from now to one past the horizon of N steps, n = N + 2. Each kernel fills its last argument. At each sample:
-forces, N, ENU, (n, 3); angles phi, theta, psi, rad, (n, 3); references of position, velocity and acceleration, m, ENU,
-(n, 3) each, and yaw, rad, (n,). Of the vehicle now: `up`, its z axis, ENU, (3,); disturbances that the model does not
-explain, acceleration, m/s², ENU, (3,), before moment, N m, FLU, (3,).
+Samples are from now to one past the horizon of N steps, n = N + 2. Each kernel fills its last argument:
+
+    forces       at each sample, N, ENU, (n, 3)
+    angles       phi, theta, psi at each sample, rad, (n, 3)
+    references   position, velocity, acceleration, m, ENU, (n, 3) each, and yaw, rad, (n,)
+    up           body z axis now, ENU, (3,)
 """
 
 from math import floor, pi, sqrt
@@ -24,63 +26,36 @@ from colibri.common.types import Array
 
 
 class Loop(NamedTuple):
-    """What stays the same in the outer loop, over a horizon of N steps.
+    """Constants of the outer loop over N steps."""
 
-    Attributes:
-        k1_s2, k2_s: Gains on the position error, 1/s², and on its rate, 1/s.
-        errors_ahead: Of `error_transition`, (N + 2, 2, 2).
-        max_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
-            acceleration of a reference that far away are followed in the same proportion, which keeps one that no
-            vehicle can follow from leading this one astray.
-        airframe: The vehicle.
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        follows: Part of the way to its command that thrust goes in a step.
-        interval_s: Between two samples.
-    """
-
-    k1_s2: float
-    k2_s: float
-    errors_ahead: Array
-    max_error_m: float
+    k1_s2: float  # on the position error
+    k2_s: float  # on its rate
+    errors_ahead: Array  # of `error_transition`, (N + 2, 2, 2)
+    max_error_m: float  # of approach; the feed-forward of farther references shrinks in proportion
     airframe: Airframe
-    inertia: Array
-    follows: float
+    inertia: Array  # kg m², (3,)
+    follows: float  # part of the thrust's way to its command in a step
     interval_s: float
 
 
 class Motion(NamedTuple):
-    """The vehicle's motion now.
+    """The present motion of the vehicle."""
 
-    Attributes:
-        position, velocity: m and m/s, ENU, (3,) each.
-        up: Body z axis, ENU, (3,).
-        yaw_rad: psi, unwrapped.
-        thrust_n: U1, N.
-        mass_kg: That the vehicle moves like.
-    """
-
-    position: Array
-    velocity: Array
-    up: Array
-    yaw_rad: float
-    thrust_n: float
+    position: Array  # m, ENU, (3,)
+    velocity: Array  # m/s, ENU, (3,)
+    up: Array  # body z axis, ENU, (3,)
+    yaw_rad: float  # psi, unwrapped
+    thrust_n: float  # U1
     mass_kg: float
 
 
 class Demands(NamedTuple):
-    """What the outer loop demands over the horizon, from now on; each array is filled.
+    """Demands over the horizon, filled in place."""
 
-    Attributes:
-        forces: N, ENU, (N + 2, 3).
-        angles: phi, theta, psi, rad, (N + 2, 3).
-        thrusts: To command at each step, N, (N,).
-        end: State and moments at the end, see `end_of_motion`, (12,).
-    """
-
-    forces: Array
-    angles: Array
-    thrusts: Array
-    end: Array
+    forces: Array  # N, ENU, (N + 2, 3)
+    angles: Array  # phi, theta, psi, rad, (N + 2, 3)
+    thrusts: Array  # commanded at each step, N, (N,)
+    end: Array  # of `end_of_motion`, (12,)
 
 
 @compiled
@@ -92,7 +67,7 @@ def wanted_forces(
     limits: ForceLimits,
     forces: Array,
 ) -> None:
-    """Fill `forces` with what the thrust must do at each sample."""
+    """Fill the thrust forces at each sample; `disturbance_m_s2` is an acceleration, ENU, (3,)."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
     near = min(1.0, loop.max_error_m / max(norm(e), loop.max_error_m))
@@ -114,7 +89,7 @@ def wanted_forces(
 
 @compiled
 def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Array) -> None:
-    """Fill roll and pitch that point body z along each force, by the yaw predicted; and the yaw wanted, rad, (n,)."""
+    """Fill roll and pitch that point body z along each force at the predicted yaw, and the wanted yaw."""
     for n in range(forces.shape[0]):
         c, s = cos(yaw_predicted[n]), sin(yaw_predicted[n])
         x, y, z = forces[n]
@@ -128,10 +103,10 @@ def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Ar
 def thrust_commands(
     thrust_n: float, forces: Array, up: Array, follows: float, limits: ForceLimits, commands: Array
 ) -> None:
-    """Fill `commands`, N, (N,), so that the lagging thrust, now `thrust_n`, is the wanted one at the end of each step.
+    """Fill the commands, N, (N,), that bring the lagging thrust to its reference at each step's end.
 
-    The next thrust is the part of the force along the body's z axis; those after it assume the attitude. `follows` is
-    the part of the way to its command that thrust goes in a step.
+    The first reference is the force's component along the present z axis; later ones assume the planned attitude.
+    `follows` is the part of the way to its command that thrust goes in a step.
     """
     for n in range(commands.shape[0]):
         force = forces[n + 1]
@@ -144,9 +119,9 @@ def thrust_commands(
 
 @compiled
 def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interval_s: float, end: Array) -> None:
-    """Fill `end`, (12,), with the state and the moments that follow the angles at the last but one sample.
+    """Fill state and moments at the last but one sample, from the angles around it, (12,).
 
-    That is phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4, for the inertia Ix, Iy, Iz, kg m², (3,).
+    Order: phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4.
     """
     before, here, after = angles[-3], angles[-2], angles[-1]
     rate = (after - before) / (2.0 * interval_s)
@@ -163,9 +138,9 @@ def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interva
 
 @compiled
 def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
-    """Fill `ahead`, (n,), with the yaw expected; return the full turns between the yaw wanted, (n,), and this, rad.
+    """Fill the expected yaw, (n,); return the full turns between it and the wanted yaw, rad.
 
-    As planned, (m,), and after the plan's end, or without one (m = 0), turning as the yaw that is wanted does.
+    It follows the plan, (m,), and beyond its end the rate of the wanted yaw, (n,).
     """
     ahead[0] = yaw_rad
     for n in range(1, ahead.shape[0]):
@@ -185,9 +160,10 @@ def guide(
     limits: ForceLimits,
     out: Demands,
 ) -> float:
-    """Compute all demands of references; return the cosine of the angle from the thrust to where it must point.
+    """Compute all demands of references; return the cosine of the angle from thrust axis to force.
 
-    `planned_yaw` is that of `yaw_ahead`, and `packed` the `Loop`.
+    `planned_yaw` as in `yaw_ahead`; `disturbances` acceleration, m/s², ENU, and moment, N m, FLU, (6,); `packed` the
+    `Loop`.
     """
     loop = packed[0]
     wanted_forces(motion, references, disturbances[:3], loop, limits, out.forces)
@@ -210,9 +186,9 @@ def hold_attitude(
     limits: ForceLimits,
     out: Demands,
 ) -> float:
-    """Compute the demands of given angles, (n, 3), and thrust, N, (n,); return the same cosine as `guide`.
+    """Compute the demands of angles, (n, 3), and thrusts, N, (n,); return the cosine as in `guide`.
 
-    Of the forces only the first is filled; psi is in the full turn that the vehicle is in. `packed` is the `Loop`.
+    Only the first force is filled; psi moves to the vehicle's present turn. `packed` is the `Loop`.
     """
     loop = packed[0]
     angles, force, up = out.angles, out.forces[0], motion.up

@@ -1,13 +1,13 @@
 """The attitude over a horizon: an LPV model with exact kinematics and rotor lag, as compiled kernels.
 
-The thesis's model [3.3] takes the Euler rates for the body rates, which at 40 degrees of tilt couples yaw into pitch.
-Here the body rates are the states, and T(phi, theta) of [2.7] stands in the kinematic rows of A, so that nothing is
-left out; the moments follow the commanded ones as the rotors do. State, 9:
+The thesis's model [3.3] equates Euler rates and body rates, which at 40 degrees of tilt couples yaw into pitch. Here
+body rates are states, T(phi, theta) of [2.7] is in the kinematic rows of A, and moments follow their commands as the
+rotors do. State, 9:
 
     [phi p theta q psi r M1 M2 M3]        rad, rad/s, N m
 
-Scheduling: phi, theta, p, q, r at each step of the horizon. Source of scheduling along the last plan: Cisneros, Voss
-and Werner, "Efficient nonlinear model predictive control via quasi-LPV representation", CDC 2016.
+Scheduled by phi, theta, p, q, r at each step, along the previous plan: Cisneros, Voss and Werner, "Efficient nonlinear
+model predictive control via quasi-LPV representation", CDC 2016.
 """
 
 from typing import NamedTuple, TypeAlias
@@ -26,50 +26,34 @@ STATES = 9
 INPUTS = 3
 ANGLES = (PHI, THETA, PSI)
 RATES = (P, Q, R)
-SCHEDULE = (PHI, THETA, P, Q, R)
-"""The states that the model depends on, in the columns of a schedule."""
+SCHEDULE = (PHI, THETA, P, Q, R)  # the scheduling states, in the column order of a schedule
 
-_TAYLOR_TERMS = 4
-"""What is left out is (h / lag)⁵ / 120: 3e-5 of the moment's effect at 8 ms and a lag of 25 ms."""
-_MIN_COSINE = 0.1
-"""Of pitch: the model holds up to 84 degrees."""
+_TAYLOR_TERMS = 4  # remainder (h / lag)⁵ / 120: 3e-5 of the moment's effect at 8 ms and a lag of 25 ms
+_MIN_COSINE = 0.1  # of pitch: valid up to 84 degrees
 
 
 class Body(NamedTuple):
-    """The vehicle's numbers in the model.
+    """Parameters of the model."""
 
-    Attributes:
-        ix, iy, iz: Moments of inertia, kg m².
-        lag_1_s: Rate at which moments follow their commands, 1/s; 0 where they follow at once.
-    """
-
-    ix: float
-    iy: float
-    iz: float
-    lag_1_s: float
+    ix: float  # kg m²
+    iy: float  # kg m²
+    iz: float  # kg m²
+    lag_1_s: float  # rate of the moments towards their commands; 0: immediate
 
 
 class InitialState(NamedTuple):
-    """Where a prediction begins.
+    """Start of a prediction."""
 
-    Attributes:
-        x: State, (9,).
-        u: Moments last commanded, N m, (3,).
-        disturbance_n_m: Moment that the model does not explain, constant over the horizon, (3,).
-        momentum: h of the rotors along body z, N m s.
-        max_speed: Largest rotor speed that can be had, in parts of the vehicle's largest.
-    """
-
-    x: Array
-    u: Array
-    disturbance_n_m: Array
-    momentum: float
-    max_speed: float
+    x: Array  # state, (9,)
+    u: Array  # moments last commanded, N m, (3,)
+    disturbance_n_m: Array  # constant over the horizon, (3,)
+    momentum: float  # h of the rotors along body z, N m s
+    max_speed: float  # available, in parts of the vehicle's largest
 
 
 @compiled
 def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> None:
-    """Write A(schedule) X, (9, k), for states in the columns of X, (9, k), and one row of the schedule, (5,)."""
+    """Write A(schedule) X, (9, k), for a state in each column of X, (9, k), and one row of the schedule, (5,)."""
     phi, theta, p, q, r = schedule
     s, c = sin(phi), cos(phi)
     cosine = max(cos(theta), _MIN_COSINE)
@@ -94,17 +78,14 @@ def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> 
 def respond(
     now: InitialState, schedule: Array, body: Body, starts: Integers, interval_s: float, responses: Array
 ) -> None:
-    """Predict: column 0 without any increment, the others for a unit increment of one input at one move.
+    """Predict: column 0 without increments, the others for a unit increment of one input at one move.
 
-    Discretised with zero-order hold, the exponential by its Taylor series applied to all columns at once.
+    Zero-order hold, its exponential by a Taylor series applied to all columns at once.
 
     Args:
-        now: Where the prediction begins.
         schedule: Of each step, (N, 5).
-        body: The vehicle.
-        starts: Step at which each move happens, ascending from 0, (b,).
-        interval_s: Of a step.
-        responses: Is filled: (N + 1, 9, 1 + 3 b); column 1 + 3 j + i is input i at move j.
+        starts: Step of each move, ascending from 0, (b,).
+        responses: Output, (N + 1, 9, 1 + 3 b); column 1 + 3 j + i is input i at move j.
     """
     columns = responses.shape[2]
     commanded = np.zeros((INPUTS, columns))
@@ -145,8 +126,8 @@ def respond(
 def schedule_along(x: Array, ahead: Array, schedule: Array) -> None:
     """Fill `schedule`, (N, 5), with the scheduling states in the middle of each step.
 
-    They lie between the present state `x`, (9,), and the states `ahead` that the last plan predicted for the next
-    samples, (N - 1, 9), which are held after its end.
+    They are means of neighbouring states: now, `x`, (9,), and at the coming samples of the previous plan, `ahead`, (n,
+    9); the last of these is repeated.
     """
     steps = schedule.shape[0]
     for step in range(steps):

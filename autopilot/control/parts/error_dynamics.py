@@ -1,4 +1,4 @@
-"""How the position error is to die: as a double integrator whose poles are placed."""
+"""Position error dynamics: a double integrator with placed poles."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from colibri.common.types import Array
 
 
 def gains(poles: tuple[float, float]) -> tuple[float, float]:
-    """Return the gains on an error, 1/s², and on its rate, 1/s, by which it dies with these poles, 1/s."""
+    """Return the gains on an error, 1/s², and on its rate, 1/s, for two poles, 1/s."""
     first, second = poles
     return first * second, -(first + second)
 
 
 def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
-    """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
+    """Return the transition matrices of an error and its rate from now to each sample, (samples, 2, 2)."""
     first, second = poles
     t = interval_s * np.arange(samples, dtype=np.float64)
     if first == second:

@@ -1,8 +1,8 @@
-"""When no plan can be had: an attitude law for any attitude, and a mixer that gives up what matters least.
+"""The recovery: an attitude law for any attitude, and a mixer with priorities.
 
-The law turns the thrust axis the shortest way to where it must point (reduced attitude: Chaturvedi, Sanyal and
-McClamroch, IEEE Control Systems 31(3), 2011) and only damps the rotation about it. The mixer keeps the moments that
-turn the thrust axis, moves the thrust as far as they need, and gives yaw what is left.
+The law turns the thrust axis the shortest way to its reference (reduced attitude: Chaturvedi, Sanyal and McClamroch,
+IEEE Control Systems 31(3), 2011) and damps the yaw rate. The mixer keeps the tilting moments, shifts the thrust as they
+require, and gives yaw the remainder.
 """
 
 from math import sqrt
@@ -28,18 +28,18 @@ class RecoverySettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class TurnGains(NamedTuple):
-    """How the thrust axis is turned: rad/s for each rad, 1/s on the rates, the fastest turn in rad/s."""
+    """Gains of the turn."""
 
-    angle: float
-    rate: float
+    angle: float  # rad/s for each rad
+    rate: float  # 1/s
     max_rate_rad_s: float
 
 
 @compiled
 def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGains) -> Array:
-    """Return the moment, N m, FLU, (3,), that turns the body's z axis to a direction, (3,), of length 1, FLU.
+    """Return the moment, N m, FLU, (3,), that turns body z to a unit direction, FLU, (3,).
 
-    `rate` and `inertia` are p, q, r, rad/s, and Ix, Iy, Iz, kg m², (3,) each.
+    `rate` is p, q, r, rad/s, (3,), `inertia` Ix, Iy, Iz, kg m², (3,).
     """
     across = sqrt(direction[0] * direction[0] + direction[1] * direction[1])
     wanted = np.zeros(3)
@@ -68,8 +68,8 @@ def mix_with_priority(
 ) -> Array:
     """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
 
-    Wanted are U1, N, and U2, U3, U4, N m, (3,); squared speeds, parts of the largest, of them are `rotors_from_thrust`,
-    (4,), times the first and `rotors_from_moments`, (4, 3), times the others.
+    `moment_n_m` is U2, U3, U4, N m, (3,). `rotors_from_thrust`, (4,), and `rotors_from_moments`, (4, 3), map U1 and
+    moments to squared speeds in parts of the largest.
     """
     tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
     yaw = rotors_from_moments[:, 2] * moment_n_m[2]

@@ -1,4 +1,4 @@
-"""The discrete-time linear-quadratic regulator, by structure-preserving doubling of its Riccati equation.
+"""The discrete-time LQR, by structure-preserving doubling of its Riccati equation.
 
 E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Structure-preserving algorithms for periodic discrete-time algebraic
 Riccati equations, International Journal of Control 77(8), 2004.
@@ -11,19 +11,14 @@ from colibri.common.matrices import inverse, matmul, solve
 from colibri.common.types import Array
 
 _DOUBLINGS = 40
-_RESIDUE = 1e-15
-"""Of the cost matrix: a doubling that adds no more has converged."""
+_RESIDUE = 1e-15  # converged if a doubling adds less than this part of the cost matrix
 
 
 @compiled_for("Tuple((float64[:, ::1], float64[:, ::1]))(" + ", ".join(["float64[:, :]"] * 4) + ")")
 def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
-    """Return the cost matrix S, (n, n), and the gain K, (m, n), of u = -K x for x[k+1] = A x[k] + B u[k].
+    """Return cost S, (n, n), and gain K, (m, n), of u = -K x for x[k+1] = A x[k] + B u[k].
 
-    Args:
-        A: (n, n); (A, B) can be stabilised, and what (Q, A) does not show is stable.
-        B: (n, m).
-        Q: Weight of the state, symmetric, (n, n).
-        R: Weight of the input, symmetric and positive definite, (m, m).
+    Requires a stabilisable (A, B), a detectable (Q, A), symmetric Q, (n, n), and positive definite R, (m, m).
     """
     eye = np.eye(A.shape[0])
     F, G, S = A.copy(), matmul(matmul(B, inverse(R)), B.T), Q.copy()

@@ -1,4 +1,4 @@
-"""The QP of a plan: variables that are planned, and after them slacks by which soft limits may be exceeded."""
+"""The empty QP of a plan: planned variables, then slacks of soft limits."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ _MAX_SLACK = 100.0
 
 
 def empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:
-    """Return a QP in `moved` variables and the slacks, with all that stays the same in it."""
+    """Return a QP with the constant terms of its slacks filled in."""
     n = moved + slacks
     H, f = np.zeros((n, n)), np.zeros(n)
     H[moved:, moved:] = slack_weight * np.eye(slacks)

@@ -1,4 +1,4 @@
-"""The force that the thrust must make, within its limits, as compiled kernels. Forces are in N, ENU, (3,)."""
+"""The force of the thrust, N, ENU, (3,), within its limits, as compiled kernels."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -10,28 +10,21 @@ from colibri.common.jit import compiled
 from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
-_DRAG_PASSES = 2
-"""Drag depends on the direction of the force that has to overcome it."""
+_DRAG_PASSES = 2  # drag depends on the direction of the force against it
 
 
 class ForceLimits(NamedTuple):
-    """Limits of the force that is asked of the thrust.
+    """Limits of the demanded force."""
 
-    Attributes:
-        tilt_tangent: Tangent of its largest tilt.
-        min_n, max_n: Least and largest thrust, N.
-        min_up_n: Least vertical part, N, where references ask: less would have no direction to speak of.
-    """
-
-    tilt_tangent: float
+    tilt_tangent: float  # of the largest tilt
     min_n: float
     max_n: float
-    min_up_n: float
+    min_up_n: float  # of references: a smaller vertical force has no useful direction
 
 
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force in place, its vertical part first: height before place."""
+    """Limit a force in place, its vertical part first: height before position."""
     force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
     horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
     left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
@@ -43,7 +36,7 @@ def limit_force(force: Array, limits: ForceLimits) -> None:
 
 @compiled
 def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, forces: Array) -> None:
-    """Make forces, (n, 3), that would do without drag those that do with it, at velocities, m/s, ENU, (n, 3)."""
+    """Add the force against drag at velocities, m/s, ENU, (n, 3), to forces, (n, 3), within limits."""
     free = np.empty(3)
     for n in range(forces.shape[0]):
         force = forces[n]

@@ -1,4 +1,4 @@
-"""What the control laws that plan with a model of the vehicle have in common: settings, memory, warm-up, recovery."""
+"""Shared parts of the model-based control laws: settings, memory, warm-up, recovery."""
 
 from typing import Protocol, Self, TypeVar
 
@@ -26,11 +26,10 @@ class TrackingSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class TrackingMemory(Protocol):
-    """What a law with a tracker carries from one control sample to the next, a named tuple."""
+    """Memory of a law with a tracker, a named tuple."""
 
     @property
-    def tracked(self) -> Tracked:
-        """What is remembered of the vehicle."""
+    def tracked(self) -> Tracked: ...
 
     def _replace(self, *, tracked: Tracked) -> Self: ...
 
@@ -39,7 +38,7 @@ Memory = TypeVar("Memory", bound=TrackingMemory)
 
 
 class TrackingLaw(AttitudeController[Memory]):
-    """What control laws that follow their vehicle by `tracker` have in common."""
+    """Base of control laws with a `tracker` of their vehicle."""
 
     def __init__(self, settings: TrackingSettings, fallback: RecoverySettings, vehicle: Vehicle) -> None:
         self._interval_s = settings.control_interval_s
@@ -49,9 +48,9 @@ class TrackingLaw(AttitudeController[Memory]):
         self._turn = TurnGains(fallback.turn_1_s, fallback.rate_1_s, fallback.max_rate_rad_s)
 
     def recovered(self, force: Array, observed: Observed, from_wrench: Array, least: float, most: float) -> Array:
-        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there.
+        """Turn the thrust axis the shortest way to `force`; thrust is the force's component along it.
 
-        Return squared rotor speeds between `least` and `most`, (4,); `from_wrench` maps U1..U4 to them, (4, 4).
+        Return squared rotor speeds between `least` and `most`, (4,).
         """
         direction = matvec(observed.rotation.T, force / norm(force))
         moments = turning_moment(direction, observed.rigid[10:], self.tracker.inertia, self._turn)
@@ -60,7 +59,7 @@ class TrackingLaw(AttitudeController[Memory]):
         return mix_with_priority(thrust_n, moments, from_thrust, from_moments, least, most)
 
     def warm_up(self) -> None:
-        """Load what is compiled: three steps from hover, the last of them upside down, and one for an attitude."""
+        """Load compiled code: three steps from hover, the last upside down, and one for an attitude."""
         memory, references = self.initial(self.tracker.vehicle.hover_speed), still_horizon(self.preview.samples)
         for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
             memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)
@@ -68,17 +67,13 @@ class TrackingLaw(AttitudeController[Memory]):
         self.step_attitude(memory, 0, AT_REST, AttitudeDemand(level, level, no_thrust))
 
     def charge_ah(self, memory: Memory) -> float:
-        """Return the charge taken from the battery, Ah."""
         return memory.tracked.charge_ah
 
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
-        """Return the memory with another charge taken from the battery, Ah."""
         return memory._replace(tracked=memory.tracked._replace(charge_ah=charge_ah))
 
     def mass_kg(self, memory: Memory) -> float:
-        """Return the mass that the vehicle moves like."""
         return memory.tracked.mass_kg
 
     def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
-        """Return the memory with another mass."""
         return memory._replace(tracked=memory.tracked._replace(mass_kg=mass_kg))

@@ -1,4 +1,4 @@
-"""How control laws follow their vehicle from sample to sample: rotors, disturbances, mass and battery."""
+"""Tracking of the vehicle from sample to sample: rotors, disturbances, mass and battery."""
 
 from typing import NamedTuple
 
@@ -27,51 +27,35 @@ _NOTHING = np.empty(0)
 
 
 class Tracked(NamedTuple):
-    """What is remembered of the vehicle.
+    """State of the tracker."""
 
-    Attributes:
-        speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
-        wrench, mean_wrench: U1, N, and U2..U4, N m, now, and over the interval that ends now, (4,) each.
-        measured: What the observer measured a sample ago, (9,); None before the first.
-        estimate: Of the observer a sample ago, (12,).
-        mass_kg: That the vehicle moves like.
-    """
-
-    speeds: Array
-    wrench: Array
-    mean_wrench: Array
-    measured: Array | None
-    estimate: Array
+    speeds: Array  # of the rotors, parts of the largest, (4,)
+    wrench: Array  # now: U1, N, and U2..U4, N m, (4,)
+    mean_wrench: Array  # over the interval that ends now, (4,)
+    measured: Array | None  # by the observer a sample ago, (9,)
+    estimate: Array  # of the observer a sample ago, (12,)
     charge_ah: float
     mass_kg: float
 
 
 class Observed(NamedTuple):
-    """What is known of the vehicle now.
+    """The estimated state of the vehicle now."""
 
-    Attributes:
-        rigid: Position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU: (13,).
-        rotation: Body to earth, (3, 3).
-        measured, estimate: Of the observer, (9,) and (12,).
-        mass_kg: That the vehicle moves like.
-        max_speed: That a rotor can reach while all keep their power, in parts of the largest.
-    """
-
-    rigid: Array
-    rotation: Array
-    measured: Array
-    estimate: Array
+    rigid: Array  # position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU: (13,)
+    rotation: Array  # body to earth, (3, 3)
+    measured: Array  # of the observer, (9,)
+    estimate: Array  # of the observer, (12,)
     mass_kg: float
-    max_speed: float
+    max_speed: float  # available to a rotor while all keep their power, in parts of the largest
     current_a: float
 
 
 class VehicleTracker:
-    """Follows one vehicle.
+    """Tracks one vehicle.
 
     Attributes:
         inertia: Ix, Iy, Iz, kg m², (3,).
-        allocation: From squared rotor speeds, parts of the largest, to U1, N, and U2..U4, N m, (4, 4).
+        allocation: Squared rotor speeds, parts of the largest, to U1, N, and U2..U4, N m, (4, 4).
         momentum: Angular momentum of each rotor at the largest speed, along body z, N m s, (4,).
     """
 
@@ -88,13 +72,11 @@ class VehicleTracker:
         self._rotors = packed(Rotors(self.lag, self.allocation))
 
     def initial(self, rotor_speed: float) -> Tracked:
-        """Return what is remembered of a vehicle whose rotors all turn at `rotor_speed` (its unit)."""
         speeds = np.full(4, rotor_speed / self.vehicle.rotors.max_speed)
         wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES)
         return Tracked(speeds, wrench, wrench, None, estimate, 0.0, self.vehicle.body.mass_kg)
 
     def observe(self, tracked: Tracked, state: VehicleState) -> Observed:
-        """Return what is known of the vehicle in this state."""
         before, attitude = tracked.measured, state.attitude
         rigid = np.array((*state.position_enu_m, *state.velocity_enu_m_s, *attitude, *state.rate_flu_rad_s))
         rotation, measured, estimate = np.empty((3, 3)), np.empty(MEASURED), np.empty(ESTIMATES)
@@ -120,10 +102,7 @@ class VehicleTracker:
         return Observed(*known, mass_kg, max_speed, current_a)
 
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
-        """Return rotor commands, in the vehicle's unit, (4,), and what is remembered a sample later.
-
-        `squared` are the squared speeds that the plan commands, (4,).
-        """
+        """Return rotor commands, in the vehicle's unit, for squared speeds (4,), and the next tracker state."""
         _, _, measured, estimate, mass_kg, max_speed, current_a = observed
         actuated = np.empty((4, 4))
         top = self.vehicle.rotors.max_speed
@@ -155,10 +134,8 @@ def look(
 ) -> tuple[float, float, float]:
     """Fill `rotation`, `measured` and `estimate` of `Observed`; return its mass, largest speed and current.
 
-    `rigid` is of `Observed`, too. Of `Tracked` are speeds, wrenches, mass, what was measured `before`, (9,), or (0,)
-    before the first, and the estimate then. `airborne` is a vehicle on which nothing but air and rotors acts, `open_v`
-    its battery's voltage without load, `momentum` of the tracker. `Observer`, `MassModel` and `BatteryNumbers` are
-    packed.
+    Inputs are fields of `Tracked` and `Observed`; `before` is the previous `measured`, (9,), or (0,) at the start,
+    `open_v` the battery's voltage without load. `Observer`, `MassModel` and `BatteryNumbers` are packed.
     """
     R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
     for i in range(3):
