@@ -1,13 +1,12 @@
-"""Whether a rotor is lost: detected by thrust and moments that the commanded rotors should make and the vehicle misses.
+"""Detection of a lost rotor from missing thrust and moments.
 
-Newton and Euler, backwards: from one control sample to the next the vehicle's velocity and rates say which force along
-its z axis and which moments acted. What the rotors were commanded to make, their lag followed, is taken off; a dead
-rotor i leaves a residual -fᵢ aᵢ of its own direction aᵢ = (1, yᵢ, -xᵢ, κᵢ), fᵢ being the thrust that it should have.
+Newton's and Euler's equations, inverted, give force along z and moments between two control samples. The residual
+against the commanded rotors, their lag included, is -fᵢ aᵢ for a dead rotor i: fᵢ is its expected thrust and aᵢ = (1,
+yᵢ, -xᵢ, κᵢ).
 
-For each rotor a CUSUM (E. S. Page, Continuous inspection schemes, Biometrika 41, 1954) sums the log likelihood of "it
-makes nothing" over that of "it is weak by a quarter, and the moments of inertia are whatever explains the rest". So
-it grows for a rotor that has less than 0.375 of its thrust, which is about what a hover on four needs, and for
-nothing else. One sample adds a bounded amount, so that no single jump, of a knock or of the estimate, makes an alarm.
+For each rotor a CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a
+quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover on four
+rotors. One sample adds a bounded amount: a single jump of the estimate cannot raise the alarm.
 """
 
 from typing import NamedTuple
@@ -24,44 +23,29 @@ from colibri.common.matrices import put
 from colibri.common.types import Array, FourRotors, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
-ALARM = 20.0
-"""Logarithm of the odds: e²⁰ samples are a century."""
-MAX_EVIDENCE = 10.0
-"""Of one sample: an alarm takes two."""
-_WEAK = 0.25
-"""Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is distinguished."""
-_INERT, _AGILE = -0.4, 1.0
-"""A vehicle may turn by so much less or more than it is expected to: moments of inertia that are 1.67 or 0.5 times."""
-_NOISE_PART = 1.0 / 64.0
-"""Of what one sample says of the noise: sensors that fail are to be doubted, and not the rotors."""
+ALARM = 20.0  # log odds: e²⁰ samples are a century
+MAX_EVIDENCE = 10.0  # from one sample: an alarm takes two
+_WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way from here to 1
+_INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
+_NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 """Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
 it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
 
 
 class Signature(NamedTuple):
-    """What the rotors of one vehicle are to the watch; forces in N at the largest speed.
+    """Effect of a vehicle's rotors; forces in N at the largest speed."""
 
-    Attributes:
-        full_thrust_n: Of each rotor, (4,).
-        effect: Force along z, moments about x, y, z of each newton, (4, 4), column i that of rotor i.
-        momentum: Angular momentum of each rotor at the largest speed, N m s, (4,).
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        variances: Of the residual, N² and N² m², (4,).
-        mass_kg, gravity_m_s2: Of the vehicle.
-    """
-
-    full_thrust_n: Array
-    effect: Array
-    momentum: Array
-    inertia: Array
-    variances: Array
+    full_thrust_n: Array  # of each rotor, (4,)
+    effect: Array  # force along z and moments about x, y, z for each N of rotor i in column i, (4, 4)
+    momentum: Array  # of each rotor at the largest speed, N m s, (4,)
+    inertia: Array  # kg m², (3,)
+    variances: Array  # of the residual, N² and N² m², (4,)
     mass_kg: float
     gravity_m_s2: float
 
 
 def signature_of(vehicle: Vehicle) -> Signature:
-    """Return the signature of a vehicle's rotors."""
     allocation = vehicle.allocation()
     effect = allocation / allocation[0]
     lift_n = vehicle.body.mass_kg * vehicle.gravity_m_s2 / 4.0
@@ -80,7 +64,7 @@ def signature_of(vehicle: Vehicle) -> Signature:
 
 
 class Numbers(NamedTuple):
-    """What stays the same from sample to sample."""
+    """Constants of the detector."""
 
     signature: Signature
     lag: RotorLag
@@ -88,29 +72,21 @@ class Numbers(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is remembered from sample to sample.
+    """State of the detector."""
 
-    Attributes:
-        speeds: Rotor speeds, as their lag has them, parts of the largest, (4,).
-        motion: Velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU), (9,).
-        evidence: What each rotor's CUSUM has come to, (4,).
-        residual: Of force and moments, N and N m, (4,).
-        noise: Variances of what changes in it from sample to sample, (4,).
-    """
-
-    speeds: Array
-    motion: Array
-    evidence: Array
-    residual: Array
-    noise: Array
+    speeds: Array  # of the rotors, parts of the largest, (4,)
+    motion: Array  # velocity, m/s, ENU; rates, rad/s, FLU; body z axis, ENU: (9,)
+    evidence: Array  # CUSUM of each rotor, (4,)
+    residual: Array  # force and moments, N and N m, (4,)
+    noise: Array  # variances of the residual's changes, (4,)
 
 
 class RotorWatch:
     """Watches the rotors of one vehicle.
 
     Attributes:
-        lost: The rotor that is lost, 0..3; None while all turn. Once lost it stays so.
-        max_evidence: The most that any CUSUM has ever come to.
+        lost: The lost rotor, 0..3, permanently; None while all turn.
+        max_evidence: Largest CUSUM so far.
     """
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
@@ -126,30 +102,30 @@ class RotorWatch:
 
     @property
     def speeds(self) -> Array:
-        """Rotor speeds now, as their lag has them, in parts of the largest, (4,)."""
+        """Present rotor speeds, in parts of the largest, (4,)."""
         return self._kept.speeds.copy()
 
     @speeds.setter
     def speeds(self, speeds: Array) -> None:
+        """Present rotor speeds, in parts of the largest, (4,)."""
         self._kept.speeds[:] = speeds
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go on with other numbers of the vehicle."""
         self._battery = BatteryModel(vehicle)
         lag = rotor_lag(vehicle, self._interval_s)
         self._numbers = packed(Numbers(signature_of(vehicle), lag, self._interval_s))
 
     def begin(self, controls: FourRotors) -> None:
-        """Reset, with the rotors at `controls`, parts of the largest: no sample was before."""
+        """Reset, with the rotors at `controls`, parts of the largest."""
         kept = self._kept
         self.speeds = np.array(controls)
         kept.evidence[:] = kept.residual[:] = kept.noise[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
-        """Take in a control sample; return the rotor that is lost, None while all turn.
+        """Process a control sample; return the lost rotor.
 
-        `controls` are since the sample before, parts of the largest speed; `airborne`: nothing but air touches it.
+        `controls` applied since the previous sample, parts of the largest speed.
         """
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
@@ -189,10 +165,10 @@ def _take_in(
     battery: Packed,
     memory: Packed,
 ) -> tuple[int, float]:
-    """Carry the `Memory` on by a sample; return which rotor is likeliest to be lost, and its evidence.
+    """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence.
 
-    `controls` are those since the sample before, `open_v` is the battery's voltage without load, `numbers` are the
-    `Numbers`, `battery` the `BatteryNumbers`. A sample that `counts` adds evidence; one that does not takes all away.
+    `open_v` is the battery's voltage without load; `numbers`, `battery` are packed `Numbers` and `BatteryNumbers`.
+    Unless a sample `counts`, evidence is reset.
     """
     it, of = memory[0], numbers[0]
     speeds_before, before = it.speeds.copy(), it.motion.copy()
@@ -208,7 +184,6 @@ def _take_in(
 
 @compiled
 def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag, battery: Packed) -> Array:
-    """Return the rotor speeds (4,) one control sample after `controls`, on a battery with an open voltage."""
     max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
@@ -220,10 +195,9 @@ def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag,
 def _add_evidence(
     memory: Memory, before: Array, speeds_before: Array, of: Signature, interval_s: float
 ) -> tuple[int, float]:
-    """Add a sample to the CUSUMs, in place; return the rotor of the largest, and what that has come to.
+    """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value.
 
-    It adds how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms. Motion
-    and speeds of `memory` are those of now, of `before` and `speeds_before` a sample ago; the residual is that before.
+    `before` and `speeds_before`: motion and speeds a sample ago.
     """
     evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
     thrust_n = np.empty(4)

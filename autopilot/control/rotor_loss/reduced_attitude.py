@@ -1,15 +1,13 @@
-"""The attitude of a quadrotor on three rotors: yaw is given up, the vehicle spins, and its thrust circles a direction.
+"""The attitude of a quadrotor on three rotors: yaw is given up, and the spinning thrust axis tracks a direction.
 
-Beyond the loss of a rotor there is no equilibrium but a periodic solution (M. W. Mueller and R. D'Andrea, Stability
-and control of a quadrocopter despite the complete loss of one, two, or three propellers, ICRA 2014): the vehicle turns
-about an axis that stands still in its body and on earth, off the rotors' axis by a cone that the thrust of the rotor
-opposite to the lost one opens. That thrust brakes the spin: without any, the gyroscope would leave its range.
+The motion is periodic (M. W. Mueller and R. D'Andrea, Stability and control of a quadrocopter despite the complete loss
+of one, two, or three propellers, ICRA 2014): the vehicle turns about an axis fixed in body and earth. The thrust of the
+rotor opposite the lost one tilts this axis by the cone angle from the rotors' axis; its torque keeps the spin within
+the gyroscope's range.
 
-The law is an LQR on what deviates from the periodic solution of the moment's spin: scheduled by the spin (LPV), from
-none at all right after the loss to the final one, with the rotors' lag and the sampling inside the model.
-
-Of the rotors that are left, a and b stand beside the lost one and o opposite. The state is h, the wanted direction of
-the thrust as the body sees it (x, y), the rates p and q, and two forces that follow their commands: d = f_b - f_a, f_o.
+The law is an LQR about the periodic solution, scheduled by the spin (LPV) from zero right after the loss, with rotor
+lag and sampling in the model. Rotors a and b are beside the lost one, o opposite. State: h, the demanded thrust
+direction in body axes (x, y), the rates p and q, and the lagging forces d = f_b - f_a and f_o.
 """
 
 from math import copysign, hypot, inf, sqrt
@@ -24,66 +22,43 @@ from colibri.common.matrices import dot, expm, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_SPINS_RAD_S = np.arange(-8.0, 45.0)
-"""That gains are found for. The torque of the rotors that are left turns the vehicle towards positive ones."""
-_NO_CONE_RAD_S, _WHOLE_CONE_RAD_S = 5.0, 15.0
-"""The cone opens between these: what spins slowly would tilt far for little thrust."""
+_SPINS_RAD_S = np.arange(-8.0, 45.0)  # with gains; positive in the direction of the remaining torque
+_NO_CONE_RAD_S, _WHOLE_CONE_RAD_S = 5.0, 15.0  # the cone opens between these: at a slow spin it would take a large tilt
 _MAX_CONE_RAD = 0.35
-_SCARCE = 0.03
-"""Of the cost's measure of f_o where the solution has none: there it can push, and not pull."""
+_SCARCE = 0.03  # least weight factor of f_o, where the solution has no thrust to take away
 _TIGHTEST = 1e-3
 _BISECTIONS = 50
 _SAME_SAMPLE = 1e-9
-_LEAST_MOMENTUM = 1e-12
-"""N m s: where the gyroscopic moments of body and rotors cancel, the steady rates have a pole."""
+_LEAST_MOMENTUM = 1e-12  # N m s: steady rates have a pole where the gyroscopic moments of body and rotors cancel
 
 
 class ThreeRotorsError(AutopilotError):
-    """A vehicle that no law can land on three rotors; the message says why."""
+    """A vehicle that cannot land on three rotors; the message gives the reason."""
 
 
 class Weights(NamedTuple):
-    """What is much of each: the quadratic cost weighs with one over its square.
+    """Tolerated deviations; the cost weighs with one over their squares."""
 
-    Attributes:
-        direction: Error of direction, rad.
-        rate: Error of p and q, rad/s.
-        force_part: Deviation of the forces, in parts of a quarter of the weight.
-    """
-
-    direction: float = 0.12
-    rate: float = 3.0
-    force_part: float = 0.6
+    direction: float = 0.12  # rad
+    rate: float = 3.0  # p and q, rad/s
+    force_part: float = 0.6  # in parts of a quarter of the weight
 
 
 class Trio(NamedTuple):
-    """The three rotors that are left, by number.
-
-    Attributes:
-        lost: The one that is not.
-        a, b: Those beside it.
-        o: The opposite one, of the same hand.
-        sign: +1 where their torque spins the vehicle counter-clockwise seen from above, -1 otherwise.
-    """
+    """The three remaining rotors, by number."""
 
     lost: int
-    a: int
-    b: int
-    o: int
-    sign: float
+    a: int  # beside the lost one
+    b: int  # the other one beside it
+    o: int  # opposite
+    sign: float  # +1 if their torque spins the vehicle counter-clockwise seen from above, else -1
 
 
 class Solution(NamedTuple):
-    """The periodic solution of a spin.
+    """The periodic solution of a spin."""
 
-    Attributes:
-        h: Direction of the mean thrust as the body sees it, x and y, (2,).
-        rate: p and q, rad/s, (2,).
-        opposite_n: Thrust of the opposite rotor, N.
-    """
-
-    h: Array
-    rate: Array
+    h: Array  # direction of the mean thrust in body x and y, (2,)
+    rate: Array  # p and q, rad/s, (2,)
     opposite_n: float
 
 
@@ -97,7 +72,7 @@ class ReducedAttitude:
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
     ) -> None:
-        """Find the gains for a vehicle without rotor `lost`, 0..3, in some ms; ThreeRotorsError if there are none.
+        """Compute the gains without rotor `lost`, 0..3, in some ms, or raise a ThreeRotorsError.
 
         `follows` is the part of the way to its command that a force goes in a sample; `spin_rad_s` > 0 the final spin.
         """
@@ -116,9 +91,9 @@ class ReducedAttitude:
             raise ThreeRotorsError(f"no law turns it without rotor {lost + 1}")
 
     def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:
-        """Return the commands of d and f_o, N, before any limit.
+        """Return the commands of d and f_o, N, without limits.
 
-        The mean thrust is to point along `direction`, FLU, of length 1; `forces` are d and f_o now, N, (2,).
+        `direction` of the mean thrust is a unit vector, FLU; `forces` are d and f_o now, N, (2,).
         """
         spin = float(rate[2]) * self.trio.sign
         solution = self.solution(spin)
@@ -131,7 +106,7 @@ class ReducedAttitude:
         return d, f_o + solution.opposite_n
 
     def solution(self, spin: float) -> Solution:
-        """Return the periodic solution of a spin, rad/s, positive where the rotors turn the vehicle to."""
+        """Return the periodic solution of a spin, rad/s, positive along the rotors' torque."""
         opened = (spin - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         if opened <= 0.0:
             return Solution(np.zeros(2), np.zeros(2), 0.0)
@@ -146,7 +121,7 @@ class ReducedAttitude:
         return Solution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
 
     def _steady_rate(self, r: float) -> Array:
-        """Return p and q for each newton of the opposite rotor, (2,), at which p' = q' = 0 while r stays."""
+        """Return p and q for each N of the opposite rotor, (2,), with p' = q' = 0 at spin r."""
         ix, iy, iz = self._inertia
         x, y = self._per_opposite
         about_x, about_y = (_off_zero(r * (iz - i) + self._momentum) for i in (ix, iy))
@@ -192,7 +167,7 @@ class ReducedAttitude:
 
 
 def trio_without(vehicle: Vehicle, lost: int) -> Trio:
-    """Return the rotors left without `lost`; ThreeRotorsError if they do not turn in two pairs."""
+    """Return the rotors left without `lost`; ThreeRotorsError unless they turn in two pairs."""
     torque = vehicle.allocation()[3]
     same = [i for i in range(4) if torque[i] * torque[lost] > 0.0]
     others = [i for i in range(4) if i not in same]
@@ -204,9 +179,9 @@ def trio_without(vehicle: Vehicle, lost: int) -> Trio:
 
 
 def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
-    """Return the thrust of the opposite rotor, N, at which drag and the rotors' torque balance at a spin.
+    """Return the opposite rotor's thrust, N, that balances drag and rotor torque at a spin.
 
-    All three carry the weight. The drag of a rotor in its plane acts at its hub, which moves at ω × r: -c Ω r² about z.
+    All three carry the weight. In-plane drag acts at each hub, which moves at ω × r: a yaw moment of -c Ω r².
     """
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     low, high = 0.0, 0.5 * weight_n
@@ -226,13 +201,11 @@ def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
 
 
 def _speeds(weight_n: float, thrust: Array, opposite_n: float) -> Array:
-    """Return the speeds of a, b and o that carry the weight, the vehicle's unit, (3,)."""
     pair_n = 0.5 * (weight_n - opposite_n)
     return np.sqrt(np.array([pair_n, pair_n, opposite_n]) / thrust)
 
 
 def _momentum(vehicle: Vehicle, trio: Trio, opposite_n: float) -> float:
-    """Return the angular momentum of the rotors along body z, N m s, as they carry the weight."""
     left = list(trio[1:4])
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     return dot(vehicle.rotor_momentum()[left], _speeds(weight_n, vehicle.allocation()[0, left], opposite_n))

@@ -1,4 +1,4 @@
-"""The loss of a rotor: detected, and the vehicle landed on the other three, whatever control law flew before."""
+"""The loss of a rotor: detection, and landing on the other three with any control law."""
 
 from functools import lru_cache
 from math import isfinite
@@ -11,10 +11,8 @@ from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors, law_w
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
-MAX_INTERVAL_S = 0.02
-"""A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
-_CLEAR_M = 0.3
-"""Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
+MAX_INTERVAL_S = 0.02  # longest control interval for the landing: half a radian at four turns a second
+_CLEAR_M = 0.3  # least height for detection: touching ground looks like a rotor
 
 Laws: TypeAlias = tuple[ReducedAttitude, ...]
 """Of a vehicle's attitude without each of its rotors, (4,)."""
@@ -22,25 +20,22 @@ Laws: TypeAlias = tuple[ReducedAttitude, ...]
 
 @lru_cache(maxsize=4)
 def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
-    """Return the laws of a vehicle, each built once; ThreeRotorsError if there are none."""
     return tuple(law_without(vehicle, lost, interval_s) for lost in range(4))
 
 
 class Permission(Protocol):
-    """The conditions under which a vehicle may be landed on three rotors."""
+    """Condition for a landing on three rotors."""
 
     @property
-    def land_on_three(self) -> bool:
-        """Whether a rotor that is lost is noticed, and the vehicle landed on the others."""
-        ...
+    def land_on_three(self) -> bool: ...
 
 
 class RotorLoss:
-    """Watches the rotors of one vehicle, and flies it once one is lost.
+    """Watches the rotors of one vehicle, and flies it after the loss of one.
 
     Attributes:
-        enabled: Whether anything is done, or noticed.
-        impossible: Why the vehicle cannot be landed on three rotors; empty if it can.
+        enabled: Whether losses are detected and handled.
+        impossible: Reason why the vehicle cannot land on three rotors; empty if it can.
     """
 
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
@@ -52,29 +47,27 @@ class RotorLoss:
 
     @property
     def lost(self) -> int | None:
-        """The rotor that is lost, 0..3; None while all turn, as far as is known."""
+        """The lost rotor, 0..3."""
         return self.watch.lost
 
     @property
     def flies(self) -> bool:
-        """Whether the vehicle is flown on three rotors now."""
         return self._three is not None and not self._three.landed
 
     @property
     def landed(self) -> bool:
-        """Whether it has come down on three rotors."""
         return self._three is not None and self._three.landed
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go on with other numbers of the vehicle; one that is flown on three rotors goes on with those it has."""
+        """Change the vehicle's parameters; a landing in progress keeps the old ones."""
         self._adopt_laws(vehicle)
         self.watch.adopt(vehicle)
 
     def try_out(self, vehicle: Vehicle) -> None:
-        """Lose each rotor of a vehicle of other numbers in hover, for two samples; nothing is kept but its laws.
+        """Simulate the loss of each rotor in hover for two samples with a changed vehicle.
 
         Raises:
-            ThreeRotorsError: It cannot be landed on three rotors, where the one that is flown can.
+            ThreeRotorsError: The changed vehicle cannot land on three rotors, but the present one can.
         """
         trial = RotorLoss(vehicle, round(self._interval_s * 1e6))
         if trial.impossible and not self.impossible:
@@ -91,35 +84,33 @@ class RotorLoss:
                 raise ThreeRotorsError(f"no law flies it without rotor {lost + 1}")
 
     def obey(self, permission: Permission) -> None:
-        """Watch, and land on three rotors, from now on only where that is allowed."""
         self.enabled = permission.land_on_three
         if not self.enabled:
             self.forget()
 
     def begin(self, controls: FourRotors) -> None:
-        """Begin after frames that were missed, the rotors turning at `controls`."""
+        """Restart after missed frames, the rotors turning at `controls`."""
         self.watch.begin(controls)
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
-        """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
+        """Resume after a restart with a lost rotor, the others turning at `speeds`."""
         self.watch.lost, self.watch.speeds = lost, speeds
         if flying and not self.impossible:
             self._take_over(lost, state, ground_m)
 
     def forget(self) -> None:
-        """Take all rotors for whole again."""
         self.watch.lost = None
         self._three = None
 
     def look(
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float
     ) -> bool:
-        """Take in a control sample; return whether a rotor is known to be lost since this very one.
+        """Process a control sample; return whether a loss was detected in it.
 
         Args:
-            controls: What the rotors were commanded to since the sample before, parts of the largest speed.
-            airborne: Whether nothing but air touches the vehicle.
-            ground_m: Height of the ground, z of ENU, as far as it is known.
+            controls: Applied since the previous sample, parts of the largest speed.
+            airborne: Clear of the ground.
+            ground_m: Height of the ground, z of ENU.
         """
         if not self.enabled or self.impossible or self.watch.lost is not None:
             return False
@@ -131,13 +122,13 @@ class RotorLoss:
         return True
 
     def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
-        """Return the controls to hold until the next control sample, and the decision that they are."""
+        """Return the controls to hold until the next control sample, and their decision."""
         assert self._three is not None, "decided only while three rotors fly"
         decision = self._three.step(state, charge_ah)
         return self._three.controls, decision
 
     def end(self) -> None:
-        """Stop flying on three rotors; what is lost stays lost."""
+        """Stop flying on three rotors; the rotor stays lost."""
         self._three = None
 
     def _adopt_laws(self, vehicle: Vehicle) -> None:

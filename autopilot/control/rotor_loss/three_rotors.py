@@ -1,4 +1,4 @@
-"""Landing on three rotors: place and height above the reduced attitude, and how the rotors share what is demanded."""
+"""Landing on three rotors: position and height control, and the allocation to the rotors."""
 
 from math import hypot, radians
 
@@ -17,38 +17,27 @@ from colibri.common.types import Array, Vector
 from colibri.plant.vehicle.description import Vehicle
 
 _MAX_SPIN_RAD_S = 28.0
-_SPIN_PART = 0.8
-"""Of the gyroscope's range: the rest is for transients."""
+_SPIN_PART = 0.8  # of the gyroscope's range; the rest is for transients
 _SPUN_UP_RAD_S = 10.0
-_SPIN_UP_THRUST = 1.3
-"""Parts of the weight: before it spins the thrust axis can only be turned one way, so the spin must come at once."""
+_SPIN_UP_THRUST = 1.3  # parts of the weight: until it spins, the thrust axis can turn in one direction only
 _MIN_UPRIGHT = 0.5
 _AT_LIMIT = 1e-9
 
-_PLACE_RAD_S = 1.0
-"""Frequency of the position loop, critically damped."""
-_CLIMB_1_S, _LIFT_M_S2 = 3.0, 4.0
-"""Gain on the vertical speed, and the largest vertical acceleration demanded."""
-_TILT_DEG, _MAX_TILT_DEG = 6.0, 8.0
-"""Largest tilt of the mean thrust for the sake of place, and for place and wind together; the cone comes on top."""
-_FARTHER_DEG_M, _FAR_M, _WIND_TILT_DEG = 2.0, 1.5, 16.0
-"""More tilt for each metre that the vehicle is farther than this from its place; and the largest tilt at all."""
-_WIND_RAD_S, _MAX_WIND_M_S2 = 1.5, 2.0
-"""Frequency at which what the model does not explain, mostly wind, is observed, and the largest of it estimated."""
-_SETTLE_S, _SINK_M_S, _LAND_M_S, _LAND_ABOVE_M = 1.5, 1.0, 0.6, 2.0
-"""So long it stays at its height; then it sinks, and slower where the ground is this close."""
-_KNOCK = 0.5
-"""Upward acceleration of one sample that nothing but the ground makes, where it is near, in parts of gravity."""
-_STAYS_M_S, _STAYS_S = 0.2, 1.5
-"""A vehicle commanded to sink that is so slow for so long is held by the ground; rates do not count."""
+_PLACE_RAD_S = 1.0  # bandwidth of the position loop, critically damped
+_CLIMB_1_S, _LIFT_M_S2 = 3.0, 4.0  # gain on vertical speed, largest vertical acceleration
+_TILT_DEG, _MAX_TILT_DEG = 6.0, 8.0  # largest tilt for position, then for position and wind; cone excluded
+_FARTHER_DEG_M, _FAR_M, _WIND_TILT_DEG = 2.0, 1.5, 16.0  # extra tilt per metre beyond _FAR_M; largest tilt
+_WIND_RAD_S, _MAX_WIND_M_S2 = 1.5, 2.0  # bandwidth and limit of the disturbance observer
+_SETTLE_S, _SINK_M_S, _LAND_M_S, _LAND_ABOVE_M = 1.5, 1.0, 0.6, 2.0  # hover time, sink rates high and low
+_KNOCK = 0.5  # touch-down: upward acceleration in one sample near the ground, parts of gravity
+_STAYS_M_S, _STAYS_S = 0.2, 1.5  # touch-down: slower than this for so long in spite of the commanded sink rate
 
 
 class ThreeRotors:
-    """Flies one vehicle that has lost a rotor, until the ground holds it.
+    """Flies one vehicle without a rotor until touch-down.
 
     Attributes:
         controls: Rotor commands, parts of the largest speed.
-        landed: Whether the ground holds it.
     """
 
     def __init__(
@@ -60,7 +49,7 @@ class ThreeRotors:
         state: VehicleState,
         ground_m: float,
     ) -> None:
-        """`speeds` are the rotors' now, parts of the largest, (4,); `ground_m` the height of the ground, z of ENU."""
+        """`speeds` of the rotors now, parts of the largest, (4,); `ground_m` z of ENU."""
         self._vehicle, self._interval_s = vehicle, interval_s
         self._lag = rotor_lag(vehicle, interval_s)
         self.law = law
@@ -82,7 +71,6 @@ class ThreeRotors:
         self.controls = (0.0, 0.0, 0.0, 0.0)
 
     def step(self, state: VehicleState, charge_ah: float) -> Decision:
-        """Decide the rotor speeds to hold until the next control sample."""
         self._elapsed_s += self._interval_s
         R = np.array(rotation_matrix(state.attitude))
         self._observe(state)
@@ -101,7 +89,6 @@ class ThreeRotors:
         return Decision(speeds, angles_of(direction, state.euler[2]), Diagnostics(fallback=Fallback.THREE_ROTORS))
 
     def _commands(self, thrust_n: float, direction: Array, rate: Array, charge_ah: float) -> Array:
-        """Return the commands of the rotors, parts of the largest, (4,)."""
         lost, a, b, o, _ = self.law.trio
         forces = self._full_n * self._speeds**2
         d, f_o = self.law.command(direction, rate, np.array([forces[b] - forces[a], forces[o]]))
@@ -117,7 +104,7 @@ class ThreeRotors:
         return commands
 
     def _turn(self, commands: Array, up: Array) -> None:
-        """Follow the rotors, and what their thrust makes of the velocity until the next sample."""
+        """Predict rotor speeds, and the acceleration by their thrust until the next sample."""
         before, self._speeds = self._speeds, follow(self._speeds, commands, self._lag)
         thrust_n = 0.5 * dot(self._full_n, before**2 + self._speeds**2)
         self._explained = thrust_n / self._weight_n * self._gravity * up
@@ -132,7 +119,6 @@ class ThreeRotors:
         self._wind = np.clip(self._wind + self._gains[1] * missed, -_MAX_WIND_M_S2, _MAX_WIND_M_S2)
 
     def _acceleration(self, state: VehicleState) -> Array:
-        """Return the acceleration demanded, m/s², ENU, (3,)."""
         w = _PLACE_RAD_S
         velocity = np.array(state.velocity_enu_m_s)
         error = self._place - np.array(state.position_enu_m)
@@ -145,7 +131,7 @@ class ThreeRotors:
         return wanted
 
     def _max_tilt_m_s2(self, off_m: float) -> float:
-        """Return the largest horizontal acceleration so far from the place: upright first, unless it is blown away."""
+        """Return the largest horizontal acceleration: small near the place, larger when blown away."""
         tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(off_m - _FAR_M, 0.0)
         return self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG)))
 
@@ -155,7 +141,6 @@ class ThreeRotors:
         return -_SINK_M_S if state.position_enu_m[2] - self._ground_m > _LAND_ABOVE_M else -_LAND_M_S
 
     def _watch_ground(self, state: VehicleState) -> None:
-        """Land where the ground knocks at a vehicle that is low, or holds one that is commanded to sink."""
         sinks = self._climb_m_s(state) < 0.0
         slow = hypot(*state.velocity_enu_m_s) < _STAYS_M_S
         self._held_s = self._held_s + self._interval_s if sinks and slow else 0.0
@@ -165,7 +150,6 @@ class ThreeRotors:
 
 
 def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
-    """Return the law for a vehicle without rotor `lost`, 0..3, in some ms; ThreeRotorsError if there is none."""
     measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
     follows = rotor_lag(vehicle, interval_s).planned
     return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Weights())
@@ -174,10 +158,10 @@ def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitu
 def shared(
     trio: Trio, thrust_n: float, d: float, f_o: float, full_n: Array, squared_limits: tuple[float, float]
 ) -> Array:
-    """Return squared rotor speeds, parts of the largest, (4,): what turns the thrust axis first, then thrust.
+    """Return squared rotor speeds, parts of the largest, (4,): thrust direction first, then thrust.
 
-    Demanded are the thrust of all together, that of b less that of a, `d`, and that of o, N; each rotor's at its
-    largest speed is `full_n`, N, (4,). `squared_limits` are the least and largest squared speed, parts of the largest.
+    Demanded are total thrust, `d`, thrust of b minus that of a, and `f_o`, N; `full_n` is each rotor's largest, N,
+    (4,).
     """
     minimum, maximum = squared_limits
     min_n = minimum * max(full_n[trio.a], full_n[trio.b])
@@ -192,7 +176,7 @@ def shared(
 
 
 def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
-    """Return where a vehicle that brakes like that comes to rest, m, ENU, (3,)."""
+    """Return the position, m, ENU, (3,), where a constant deceleration stops the vehicle."""
     x, y, z = state.position_enu_m
     vx, vy, _ = state.velocity_enu_m_s
     time_s = hypot(vx, vy) / (2.0 * braking_m_s2)
@@ -206,7 +190,7 @@ def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:
 
 
 def angles_of(direction: Array, psi: float) -> Vector:
-    """Return phi, theta, psi at which the body's z axis points there."""
+    """Return phi, theta, psi with the body z axis along a direction, ENU, (3,)."""
     x, y, z = direction.tolist()
     forward, left = cos(psi) * x + sin(psi) * y, cos(psi) * y - sin(psi) * x
     return (atan2(-left, hypot(forward, z)), atan2(forward, z), psi)

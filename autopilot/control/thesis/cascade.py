@@ -1,4 +1,4 @@
-"""The thesis's second strategy: position by feedback linearisation, attitude by LPV-MPC, one after the other."""
+"""The thesis's second strategy: position by feedback linearisation, then attitude by LPV-MPC."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -25,19 +25,14 @@ class CascadeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class CascadeMemory(NamedTuple):
-    """What the cascade carries from one control sample to the next.
+    """State of the cascade between two control samples."""
 
-    Attributes:
-        rotor_speeds: The last ones commanded, in the vehicle's unit, (4,).
-        demand: What the outer loop demanded, held along the outer sample; None before its first.
-    """
-
-    rotor_speeds: Array
-    demand: AttitudeAndThrust | None
+    rotor_speeds: Array  # last commanded, in the vehicle's unit, (4,)
+    demand: AttitudeAndThrust | None  # of the present outer sample
 
 
 class Cascade:
-    """The control law. Its predicted outputs are phi, theta, psi in rad.
+    """The control law; its predicted outputs are phi, theta, psi in rad.
 
     Attributes:
         control_interval_us: The inner sample.
@@ -60,13 +55,11 @@ class Cascade:
         self._mixer = Mixer(vehicle)
 
     def initial(self, rotor_speed: float) -> CascadeMemory:
-        """Return the memory of a cascade whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         return CascadeMemory(np.full(4, rotor_speed), None)
 
     def step(
         self, memory: CascadeMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[CascadeMemory, Decision]:
-        """Decide the rotor speeds to hold until the next control sample."""
         sample = (time_us // self.control_interval_us) % self._samples
         demand = memory.demand
         if demand is None or sample == 0:

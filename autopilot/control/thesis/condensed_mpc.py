@@ -9,8 +9,7 @@ from colibri.autopilot.control.qp import Qp, QpSolver, box
 from colibri.common.matrices import dot, matmul, matvec
 from colibri.common.types import Array
 
-_BINDING = 1e-6
-"""A bound counts as active where this part of it or less is left."""
+_BINDING = 1e-6  # a bound is active if this part of it or less is left
 
 
 class Weights(NamedTuple):
@@ -22,23 +21,16 @@ class Weights(NamedTuple):
 
 
 class CondensedQp(NamedTuple):
-    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (N · m,).
+    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (N · m,)."""
 
-    Attributes:
-        H: (N · m, N · m).
-        f: (N · m,).
-        free: Outputs predicted without any increment, (N · p,).
-        Gamma: What the increments add to them, (N · p, N · m).
-    """
-
-    H: Array
-    f: Array
-    free: Array
-    Gamma: Array
+    H: Array  # (N · m, N · m)
+    f: Array  # (N · m,)
+    free: Array  # outputs predicted without increments, (N · p,)
+    Gamma: Array  # effect of the increments on them, (N · p, N · m)
 
 
 class IncrementModel(NamedTuple):
-    """A model whose state x̃ = [x; u₋₁] holds the last input, so that the decision is its increment.
+    """A model with state x̃ = [x; u₋₁] and the increment of the input as its input.
 
     Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0].
     """
@@ -49,9 +41,9 @@ class IncrementModel(NamedTuple):
 
 
 def augment(transition: Array, C: Array) -> IncrementModel:
-    """Return the increment model of a discretised model [[Ad, Bd], [0, I]], (n + m, n + m), and its output C, (p, n).
+    """Return the increment model of a discretised model [[Ad, Bd], [0, I]] and its output C, (p, n).
 
-    The transition is Ã as it stands, and its last m columns are B̃.
+    The transition is Ã itself, and its last m columns are B̃.
     """
     outputs, n = C.shape
     inputs = len(transition) - n
@@ -62,7 +54,7 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
     """Eliminate the states: outputs over the horizon are an affine function of the increments.
 
     With Y = Phi x + Gamma Δu: H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in.
-    `x` is the augmented state, (n,), `reference` the output wanted at each step, (N, p).
+    `x` is the augmented state, `reference` the output at each step, (N, p).
     """
     p, m = model.C.shape[0], model.B.shape[1]
     responses = np.empty((horizon + 1, *model.C.shape))
@@ -86,19 +78,13 @@ def _along(horizon: int, weights: Weights) -> Array:
 
 
 class Solution(NamedTuple):
-    """What the MPC decided.
+    """A solution of the MPC."""
 
-    Attributes:
-        increment: The first increment, to be applied now, (m,); zero if the QP was not solved.
-        diagnostics: How it came about; `predicted` holds the outputs over the horizon, (N, p).
-    """
-
-    increment: Array
-    diagnostics: Diagnostics
+    increment: Array  # the first, (m,); zero if the QP was not solved
+    diagnostics: Diagnostics  # `predicted` holds the outputs over the horizon, (N, p)
 
 
 def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solution:
-    """Solve a condensed QP with every increment within ±`bound`, (m,)."""
     m = len(bound)
     horizon = len(qp.f) // m
     max_increment = np.concatenate([bound] * horizon)

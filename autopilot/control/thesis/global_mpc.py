@@ -1,8 +1,8 @@
-"""The thesis's first strategy, kept to see it fail: one LPV-MPC for position and yaw, THESIS [3.1, 3.4].
+"""The thesis's first strategy, kept because it fails: one LPV-MPC for position and yaw, THESIS [3.1, 3.4].
 
-It never tilts. With phi = theta = 0 the rows of B that push x and y sideways are zero, so the frozen model knows no
-input that moves them; and phi and theta are no outputs, so nothing asks for tilt either. Height fails too: at hover
-B[z', U1] = -g/U1 + 1/m is zero, and below hover thrust it has the wrong sign. Only yaw is left to be followed.
+It never tilts. With phi = theta = 0 the rows of B for x' and y' are zero in the frozen model, and phi and theta are not
+outputs, so the cost does not demand tilt. Height fails too: B[z', U1] = -g/U1 + 1/m is zero at hover, and has the wrong
+sign below hover thrust. Only yaw is tracked.
 """
 
 from collections.abc import Mapping
@@ -29,11 +29,9 @@ from colibri.plant.vehicle.description import Vehicle
 
 PerOutput = tuple[Positive, Positive, Positive, Positive]
 
-_MIN_THRUST = 0.01
-"""The model divides by the last thrust: it never takes it for smaller than this part of the weight, of either sign."""
+_MIN_THRUST = 0.01  # least magnitude of the last thrust, a divisor in the model, in parts of the weight
 
-_UNBOUNDED = 1e6
-"""The thesis bounds no increment, and solvers want a bound: this many times what the rotors can do never binds."""
+_UNBOUNDED = 1e6  # the thesis bounds no increment; this multiple of the largest wrench never binds
 
 
 class GlobalSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -49,24 +47,14 @@ class GlobalSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class GlobalMemory(NamedTuple):
-    """What the MPC carries from one control sample to the next.
+    """State of the MPC between two control samples."""
 
-    Attributes:
-        wrench: The last U1 (N), U2, U3, U4 (N m) decided, (4,). As in the thesis nothing bounds them, so U1 may be
-            negative; it is the rotors that are cut at their limits.
-        rotor_speeds: The last ones commanded, in the vehicle's unit, (4,).
-    """
-
-    wrench: Array
-    rotor_speeds: Array
+    wrench: Array  # last U1 (N), U2..U4 (N m) decided, (4,); unbounded as in the thesis, so U1 may be negative
+    rotor_speeds: Array  # last commanded, in the vehicle's unit, (4,)
 
 
 class GlobalMpc:
-    """The control law. Its predicted outputs are x, y, z in m and psi in rad.
-
-    Attributes:
-        preview: Now, and the horizon.
-    """
+    """The control law; its predicted outputs are x, y, z in m and psi in rad."""
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         self._settings = read_settings(table, GlobalSettings)
@@ -84,14 +72,12 @@ class GlobalMpc:
         )
 
     def initial(self, rotor_speed: float) -> GlobalMemory:
-        """Return the memory of a controller whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(4, rotor_speed)
         return GlobalMemory(self._mixer.wrench(speeds), speeds)
 
     def step(
         self, memory: GlobalMemory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[GlobalMemory, Decision]:
-        """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         phi, theta, psi = state.euler
         rates = euler_rates(phi, theta, state.rate_flu_rad_s)

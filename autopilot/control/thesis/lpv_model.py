@@ -20,7 +20,7 @@ def attitude_model(
     """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point.
 
     State [phi phi' theta theta' psi psi'] in rad and rad/s, inputs U2, U3, U4 in N m. The rotors' momentum is h along
-    body z, the vehicle's `rotor_momentum` times its rotor speeds: THESIS's Ω J.
+    body z: THESIS's Ω J.
     """
     ix, iy, iz = inertia_kg_m2
     h = rotor_momentum_n_m_s
@@ -50,8 +50,7 @@ def global_model(
     """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
 
     State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2..U4 in N m.
-    Thrust enters the position through B alone, at the present tilt; gravity is divided by the last thrust to fit in.
-    `attitude` are A and B of `attitude_model`, `thrust_n` is the last U1, above zero.
+    Thrust acts on the position through B alone, at the present tilt; gravity is divided by the last U1 to fit in.
     """
     phi, theta, psi = euler
     A, B = np.zeros((12, 12)), np.zeros((12, 4))
@@ -66,8 +65,8 @@ def global_model(
 def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> Array:
     """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k], (n + m, n + m).
 
-    Zero-order hold is exact for an input held over `interval_s`: the exponential of [[A, B], [0, 0]] (Van Loan, 1978);
-    forward Euler is its first-order term. The block is at once the Ã of a model in input increments.
+    Zero-order hold is the exponential of [[A, B], [0, 0]] (Van Loan, 1978); forward Euler its first-order term. The
+    result is also Ã of the increment model.
     """
     n, m = B.shape
     block = np.zeros((n + m, n + m))

@@ -8,8 +8,7 @@ from colibri.common.kernels import atan, cos, sin
 from colibri.common.types import Vector
 from colibri.plant.vehicle.description import Vehicle
 
-_MIN_LIFT = 0.05
-"""The demanded lift never falls below this part of gravity: the law has no answer for a vehicle that must push down."""
+_MIN_LIFT = 0.05  # least demanded lift in parts of gravity: the law is undefined for downward thrust
 
 
 class PositionSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -22,15 +21,15 @@ class PositionSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class AttitudeAndThrust(NamedTuple):
-    """The demand of the outer loop on the inner one: roll and pitch in rad, U1 in N."""
+    """Demand of the outer loop."""
 
-    phi: float
-    theta: float
-    thrust_n: float
+    phi: float  # rad
+    theta: float  # rad
+    thrust_n: float  # U1
 
 
 class PositionController:
-    """Places the poles of a double integrator on each axis and turns the acceleration into tilt and thrust."""
+    """Turns the acceleration of a pole-placed double integrator into tilt and thrust."""
 
     def __init__(self, settings: PositionSettings, vehicle: Vehicle) -> None:
         self._k1, self._k2 = gains(settings.poles)

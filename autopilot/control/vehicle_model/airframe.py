@@ -1,4 +1,4 @@
-"""The airframe's numbers as the control laws' kernels take them."""
+"""Parameters of the airframe for compiled kernels."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -9,22 +9,16 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Airframe(NamedTuple):
-    """Mass, gravity and drag of a vehicle.
-
-    Attributes:
-        drag_xy, drag_z: Drag of the airframe along body x and y, and along z, N s/m.
-        rotor_drag: Of all rotors in their plane, N s/m, at a thrust of 1 N: it grows with the root of the thrust.
-    """
+    """Mass, gravity and drag of a vehicle."""
 
     mass_kg: float
     gravity_m_s2: float
-    drag_xy: float
-    drag_z: float
-    rotor_drag: float
+    drag_xy: float  # along body x and y, N s/m
+    drag_z: float  # N s/m
+    rotor_drag: float  # in-plane, all rotors, N s/m at 1 N of thrust: it grows with the thrust's root
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    """Return the numbers of `vehicle`."""
     mass_kg, gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
     if vehicle.drag is None:
         return Airframe(mass_kg, gravity, 0.0, 0.0, 0.0)
@@ -36,7 +30,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
 
 @compiled
 def drag_force(airframe: Airframe, velocity: Array | Vector, up: Array | Vector, thrust_n: float) -> Vector:
-    """Return the drag, N, on a vehicle that moves at `velocity`, m/s, and makes `thrust_n` along `up`; all are ENU."""
+    """Return the drag, N, at `velocity`, m/s, and a thrust along `up`; all ENU."""
     along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
     across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
     return (

@@ -1,7 +1,6 @@
-"""The battery as the vehicle file has it: the charge that the rotors took, and how fast they can turn on the rest.
+"""The battery model: charge taken by the rotors, and the rotor speed that the voltage allows.
 
-No frame has the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
-charge taken, and the rotors' top speed in proportion to V.
+Frames carry no voltage, so it is predicted: V = V0 - R I, V0 linear in the charge taken, top speed proportional to V.
 """
 
 from math import sqrt
@@ -15,31 +14,26 @@ from colibri.plant.vehicle.description import Battery, Vehicle
 _SECONDS_PER_HOUR = 3600.0
 _INTERVALS = 100
 _BISECTIONS = 40
-_APART = 0.02
-"""Model and battery may differ by this part of the charge; the model is the smoother of both."""
+_APART = 0.02  # largest difference from the battery's report, in parts of the capacity: the model is smoother
 
 
 def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
-    """Return the charge taken, Ah, estimated from a model's integral and from what the battery itself reports."""
+    """Return the charge taken, Ah: the model's, unless the battery reports a different one."""
     if vehicle.battery is None:
         return model_ah
     return reported_ah if abs(reported_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
 
 
 class BatteryNumbers(NamedTuple):
-    """What kernels take of a battery, beside its open voltage; the defaults are those of a vehicle that has none.
+    """Battery parameters for kernels; the defaults stand for a vehicle without a battery."""
 
-    Attributes:
-        full_power_w: Of a rotor at its largest speed.
-    """
-
-    full_power_w: float = 0.0
+    full_power_w: float = 0.0  # of a rotor at its largest speed
     full_voltage_v: float = 1.0
     resistance_ohm: float = 0.0
 
 
 class BatteryModel:
-    """The battery of one vehicle; one that has none never tires.
+    """The battery of one vehicle; without one, power is unlimited.
 
     Attributes:
         numbers: Its `BatteryNumbers`, packed.
@@ -58,29 +52,29 @@ class BatteryModel:
         self.numbers = packed(numbers)
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
-        """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
+        """Return the charge taken, Ah, after a time at rotor speeds (4,), parts of the largest."""
         _, current_a = self.terminal(charge_ah, speeds)
         return charged(charge_ah, current_a, duration_s)
 
     def open_voltage_v(self, charge_ah: float) -> float:
-        """Return the voltage without load once `charge_ah` is taken; 1 without a battery."""
+        """Return the voltage without load; 1 without a battery."""
         return 1.0 if self._battery is None else open_voltage_v(self._battery, charge_ah)
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
-        """Return the terminal voltage, V, and the current, A, at rotor speeds (4,), parts of the largest; 0 without."""
+        """Return terminal voltage, V, and current, A, at rotor speeds (4,), parts of the largest."""
         if self._battery is None:
             return 0.0, 0.0
         at_terminal: tuple[float, float] = terminal(open_voltage_v(self._battery, charge_ah), speeds, self.numbers)
         return at_terminal
 
     def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
-        """Return the speed that a rotor can reach while all keep the power of `speeds`, (4,); parts of the largest."""
+        """Return the available speed of a rotor while all keep the power of `speeds`, (4,)."""
         if self._battery is None:
             return 1.0
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
 
     def max_common_speed(self, charge_ah: float) -> float:
-        """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
+        """Return the speed available to all rotors at once, in parts of the largest."""
         if self._battery is None:
             return 1.0
         whole, part = divmod(charge_ah / self._step_ah, 1.0)
@@ -90,13 +84,13 @@ class BatteryModel:
         return before + part * (after - before)
 
     def _balanced(self, battery: Battery, point: int) -> float:
-        """Return the balance at so many steps of charge; found when first needed, so that it is quick to begin."""
+        """Return the balance at a charge step; cached, since all of them would delay the start."""
         if point not in self._max_speeds:
             self._max_speeds[point] = self._balance(battery, self._step_ah * point)
         return self._max_speeds[point]
 
     def _balance(self, battery: Battery, charge_ah: float) -> float:
-        """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""
+        """Find the speed, in parts of the largest, at equal parts of the voltage."""
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
@@ -108,25 +102,23 @@ class BatteryModel:
 
 
 def charged(charge_ah: float, current_a: float, duration_s: float) -> float:
-    """Return the charge taken, Ah, after `duration_s` at a current."""
     return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
 
 def open_voltage_v(battery: Battery, charge_ah: float) -> float:
-    """Return the voltage without load once `charge_ah` is taken."""
     used = min(charge_ah / battery.capacity_ah, 1.0)
     return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
 
 
 @compiled
 def loaded_voltage_v(open_v: float, power_w: float, resistance_ohm: float) -> float:
-    """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
+    """Return the terminal voltage at a power: V² - V0 V + R P = 0, at least half of V0."""
     return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * resistance_ohm * power_w)))
 
 
 @compiled
 def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float]:
-    """Return the terminal voltage, V, and the current, A, at rotor speeds (4,); `packed` is the `BatteryNumbers`."""
+    """Return terminal voltage, V, and current, A, at rotor speeds (4,); `packed` is the `BatteryNumbers`."""
     cubes = 0.0
     for speed in speeds:
         cubes += speed * speed * speed
@@ -137,9 +129,10 @@ def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float
 
 @compiled
 def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
-    """Fill the largest squared speeds that a rotor can reach, (N,), while all have the power of those expected, (n, 4).
+    """Fill the largest available squared rotor speeds, (N,), while all rotors have the expected power.
 
-    Squared speeds are in parts of the largest; those expected stay after the last. `packed` is the `BatteryNumbers`.
+    `expected` squared speeds, (n, 4), in parts of the largest; the last limit is repeated. `packed` is the
+    `BatteryNumbers`.
     """
     numbers = packed[0]
     for n in range(limits.shape[0]):

@@ -1,7 +1,7 @@
-"""What the model does not explain: constant acceleration (wind) and moment (a weak rotor), observed.
+"""Observer of constant disturbances: acceleration (wind) and moment (a weak rotor).
 
-A Luenberger observer on the velocity and one on the body rates, each with its disturbance as a further state and both
-poles at one place. They are driven by what the rotors really did, within their limits, so nothing winds up.
+One Luenberger observer on the velocity and one on the body rates, each with its disturbance as a state and a double
+pole. Inputs are the rotors' actual forces within their limits, which prevents windup.
 """
 
 from typing import NamedTuple
@@ -32,32 +32,20 @@ class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Observer(NamedTuple):
-    """The observer's gains on the velocity and on the rate, each with its disturbance; its limits; the vehicle.
+    """Gains and limits of the observers, and the vehicle."""
 
-    Attributes:
-        velocity: Part of the velocity's innovation that is corrected at once.
-        acceleration: Disturbance for each m/s of innovation, 1/s.
-        rate: Part of the rate's innovation that is corrected at once.
-        angular_acceleration: Disturbance for each rad/s of innovation, 1/s.
-        max_acceleration_m_s2, max_moment_n_m: Largest disturbances estimated.
-        airframe: Gravity and drag are of it.
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        interval_s: Between two samples.
-    """
-
-    velocity: float
-    acceleration: float
-    rate: float
-    angular_acceleration: float
+    velocity: float  # gain of the innovation
+    acceleration: float  # gain of the disturbance, 1/s
+    rate: float  # gain of the innovation
+    angular_acceleration: float  # gain of the disturbance, 1/s
     max_acceleration_m_s2: float
     max_moment_n_m: float
     airframe: Airframe
-    inertia: Array
+    inertia: Array  # kg m², (3,)
     interval_s: float
 
 
 def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> Observer:
-    """Return the disturbance observer of `vehicle` that takes a step every `interval_s`."""
     on_velocity, on_acceleration = gains(settings.acceleration_rad_s, interval_s)
     on_rate, on_turn = gains(settings.moment_rad_s, interval_s)
     return Observer(
@@ -74,7 +62,7 @@ def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float)
 
 
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
-    """Return the gains, on what is observed and on its disturbance (1/s), of an observer with both poles there."""
+    """Return the gains on the observed state and on its disturbance (1/s) for a double pole."""
     pole = exp(-frequency_rad_s * interval_s)
     return 1.0 - pole * pole, square(1.0 - pole) / interval_s
 
@@ -89,10 +77,10 @@ def observe(
     mass_kg: float,
     packed: Packed,
 ) -> Array:
-    """Return the estimate (12,) now, from that of the sample before and what was measured then and now, (9,) each.
+    """Return the new estimate (12,), from the previous one and both measurements, (9,) each.
 
-    Over the interval, `wrench` is the mean U1 (N), U2, U3, U4 (N m), (4,), `momentum` h of the rotors along body z,
-    N m s, of a vehicle of `mass_kg`. `packed` is the `Observer`.
+    Means over the interval: `wrench` U1 (N), U2, U3, U4 (N m), (4,), and `momentum` h of the rotors along body z, N m
+    s. `packed` is the `Observer`.
     """
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s

@@ -1,12 +1,11 @@
-"""The mass that a vehicle moves like, followed slowly: what of the observed disturbance lies along the thrust.
+"""Slow estimate of the vehicle's mass from the disturbance along the thrust.
 
-A wrong mass shows as an acceleration in proportion to the thrust, which varies as that does, so no observer of a
-constant can follow it. Hence the specific thrust κ, in parts of that of the nominal mass, goes where the disturbance d
-leads it along the body's z axis; what it then explains is taken out of d:
+A wrong mass acts as an acceleration in proportion to the thrust, which an observer of constants cannot follow. The
+specific thrust κ, in parts of the nominal mass's, integrates the disturbance d along body z, and d loses that part:
 
     κ' = rate (d z_b) / (T / m_nominal),  d' = -κ' T / m_nominal z_b,  m = m_nominal / κ
 
-Where d is of the mass alone this is a lag, κ' = rate (κ_true - κ), at any thrust.
+For a disturbance by the mass alone this is a lag at any thrust: κ' = rate (κ_true - κ).
 """
 
 from typing import Annotated, NamedTuple
@@ -18,8 +17,7 @@ from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_LEAST_THRUST = 0.5
-"""In parts of the nominal weight: less thrust tells less of the mass, and counts as this much."""
+_LEAST_THRUST = 0.5  # least thrust counted, in parts of the nominal weight: a smaller one reveals little of the mass
 
 
 class MassSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -33,26 +31,17 @@ class MassSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class MassModel(NamedTuple):
-    """What stays the same as a mass is followed.
-
-    Attributes:
-        nominal_kg: The vehicle's, as its file has it.
-        least_thrust_n: Thrust counts as no less.
-        rate_1_s: At which specific thrust is followed; 0: the nominal mass is kept.
-        min_specific, max_specific: Least and largest specific thrust, in parts of the nominal one.
-        interval_s: Between two samples.
-    """
+    """Constants of the mass estimate."""
 
     nominal_kg: float
     least_thrust_n: float
-    rate_1_s: float
-    min_specific: float
-    max_specific: float
+    rate_1_s: float  # 0: the nominal mass is kept
+    min_specific: float  # in parts of the nominal one
+    max_specific: float  # in parts of the nominal one
     interval_s: float
 
 
 def mass_model(settings: MassSettings, vehicle: Vehicle, interval_s: float) -> MassModel:
-    """Return how the mass of `vehicle` is followed every `interval_s`."""
     nominal_kg = vehicle.body.mass_kg
     return MassModel(
         nominal_kg,
@@ -66,10 +55,10 @@ def mass_model(settings: MassSettings, vehicle: Vehicle, interval_s: float) -> M
 
 @compiled
 def follow_mass(mass_kg: float, disturbance_m_s2: Array, up: Array, thrust_n: float, packed: Packed) -> float:
-    """Return the mass, kg, a sample later; to be asked only of a vehicle on which nothing but air and rotors acts.
+    """Return the next mass, kg; only for an airborne vehicle.
 
-    `disturbance_m_s2` is the acceleration that the model with this mass does not explain, ENU, (3,); what it would not
-    with the mass returned is written back. `up` is the body z axis, ENU, (3,), `packed` the `MassModel`.
+    `disturbance_m_s2`, ENU, (3,), loses the part that the new mass explains. `up` is the body z axis, ENU, (3,),
+    `packed` the `MassModel`.
     """
     model = packed[0]
     before, specific = model.nominal_kg / mass_kg, 1.0

@@ -1,4 +1,4 @@
-"""Thrust and moments -> rotor speeds within their limits: the inverse of THESIS [2.2]."""
+"""Thrust and moments to rotor speeds within their limits: the inverse of THESIS [2.2]."""
 
 import numpy as np
 
@@ -18,9 +18,9 @@ class Mixer:
         self._squared_max = square(vehicle.rotors.max_speed)
 
     def rotor_speeds(self, wrench: Array) -> Array:
-        """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m), or come closest.
+        """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m).
 
-        What one rotor cannot do is cut at that rotor's limit.
+        Each speed is clipped to the rotor's limits.
         """
         return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
@@ -34,10 +34,10 @@ class Mixer:
 
 
 def exact_inverse(allocation: Array) -> Array:
-    """Invert an allocation (4, 4) so that a symmetrical airframe stays symmetrical to the last bit.
+    """Invert an allocation (4, 4), keeping the symmetry of an airframe to the last bit.
 
-    The rows of a symmetrical allocation are orthogonal, and A⁻¹ = Aᵀ (A Aᵀ)⁻¹ then only divides; elimination would
-    leave a moment of 1e-17 N m where none was demanded, enough to drift in open loop.
+    With orthogonal rows A⁻¹ = Aᵀ (A Aᵀ)⁻¹ only divides. Elimination would leave moments of 1e-17 N m, enough to drift
+    in open loop.
     """
     scale = np.sqrt((allocation * allocation).sum(axis=1))
     unit = allocation / scale[:, None]

@@ -1,8 +1,8 @@
-"""The vehicle's equations of motion as the autopilot models them, x' = f(x), and x carried forward by them.
+"""The autopilot's model of the vehicle's equations of motion, x' = f(x), and its integration.
 
-x is position, m, and velocity, m/s, ENU; the attitude quaternion, FLU body to ENU; body rates, rad/s, FLU; and rotor
-speeds in the vehicle's unit: 17 values. Rotors lag, drag, and turn the body by their momentum; they reach what the
-battery's voltage allows. There is neither wind nor ground: what is not modelled is a disturbance.
+x, 17: position, m, and velocity, m/s, ENU; attitude quaternion, FLU to ENU; body rates, rad/s, FLU; rotor speeds, the
+vehicle's unit. Modelled are rotor lag, drag, rotor momentum and the voltage's limit on rotor speed, but neither wind
+nor ground.
 """
 
 from math import ceil, sqrt
@@ -23,40 +23,25 @@ _ROUNDING = 1e-6
 
 
 class MotionModel(NamedTuple):
-    """The numbers of a vehicle in its equations of motion; what is not modelled leaves no trace.
-
-    Attributes:
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        allocation: From squared rotor speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
-        momentum: Angular momentum of each rotor along body z, with its sign, N m s per speed unit, (4,).
-        arms_m: Forward and left of each rotor, (4, 2).
-        drag: Of the airframe along the FLU axes, N s/m, (3,).
-        rotor_drag: Of one rotor in its plane, N per m/s and per speed unit.
-        lag_up_s, lag_down_s: Time constants of rotors that speed up and slow down; 0 where they follow at once.
-        top_speed: Of a rotor, at the battery's full voltage.
-        power_w: Electrical power of each rotor, W per speed unit cubed, (4,).
-        full_voltage_v: Open-circuit voltage of the full battery.
-        resistance_ohm: Of the battery.
-    """
+    """Parameters of a vehicle; zero for effects without a model."""
 
     mass_kg: float
     gravity_m_s2: float
-    inertia: Array
-    allocation: Array
-    momentum: Array
-    arms_m: Array
-    drag: Array
-    rotor_drag: float
+    inertia: Array  # kg m², (3,)
+    allocation: Array  # squared rotor speeds to U1 (N), U2, U3, U4 (N m), (4, 4)
+    momentum: Array  # of each rotor along body z, signed, N m s per speed unit, (4,)
+    arms_m: Array  # forward and left of each rotor, (4, 2)
+    drag: Array  # along the FLU axes, N s/m, (3,)
+    rotor_drag: float  # of one rotor in its plane, N per m/s and per speed unit
     lag_up_s: float
     lag_down_s: float
-    top_speed: float
-    power_w: Array
-    full_voltage_v: float
+    top_speed: float  # at the battery's full voltage
+    power_w: Array  # electrical, W per speed unit cubed, (4,)
+    full_voltage_v: float  # without load
     resistance_ohm: float
 
 
 def motion_model(vehicle: Vehicle) -> MotionModel:
-    """Return the numbers of `vehicle`."""
     rotors, drag, battery = vehicle.rotors, vehicle.drag, vehicle.battery
     allocation = vehicle.allocation()
     torque = np.abs(allocation[3]) * vehicle.rad_s_per_speed_unit
@@ -82,14 +67,12 @@ def motion_model(vehicle: Vehicle) -> MotionModel:
 def carry(
     x: Array, durations_s: Array, commands: Array, disturbance: Array, open_voltage_v: float, packed: Packed
 ) -> Array:
-    """Return x, (17,), after commands that follow each other, by the classical Runge-Kutta rule.
+    """Return x, (17,), after a series of commands, by the classical Runge-Kutta rule.
 
     Args:
-        x: Now.
-        durations_s: How long each command acts, (n,).
-        commands: Rotor speeds commanded, the vehicle's unit, (n, 4).
-        disturbance: Acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, beside the model's, (6,).
-        open_voltage_v: Of the battery without load.
+        durations_s: Of each command, (n,).
+        commands: Rotor speeds, the vehicle's unit, (n, 4).
+        disturbance: Acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, (6,).
         packed: The `MotionModel`.
     """
     x = x.copy()
@@ -114,7 +97,6 @@ def carry(
 
 @compiled
 def thrust_n(speeds: Array, packed: Packed) -> float:
-    """Return the thrust of rotor speeds (4,), the vehicle's unit."""
     thrust = 0.0
     for i in range(4):
         thrust += packed[0].allocation[0, i] * speeds[i] * speeds[i]
@@ -167,7 +149,7 @@ def _write_derivative(
 
 @compiled
 def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> float:
-    """Return the speed that the battery lets a rotor reach while all turn at `speeds`, (4,)."""
+    """Return the speed that the battery allows a rotor while all turn at `speeds`, (4,)."""
     power_w = 0.0
     for i in range(4):
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
@@ -177,7 +159,7 @@ def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> floa
 
 @compiled
 def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: MotionModel) -> None:
-    """Turn rotors without lag at what is commanded, as far as the battery lets them."""
+    """Set rotors without lag to their commands, within the limit of the battery."""
     if model.lag_up_s > 0.0:
         return
     top = _top_speed(target, open_voltage_v, model)

@@ -1,9 +1,8 @@
-"""The rotors as the autopilot models them: their lag followed, and inverted, as compiled kernels.
+"""The rotor lag and its inverse, as compiled kernels.
 
-The control law plans with forces that follow their commands as one linear lag, the slower of the rotors' two. Each
-rotor is then commanded so that its squared speed, which makes the force, is at the next sample where the plan has it:
-two time constants and the root between speed and force so cost nothing. Speeds now, (4,), squared speeds that the
-plan commands, (4,), and limits are in parts of the largest speed.
+Control laws plan forces with one linear lag, the slower of the rotors' two. Each rotor's command then brings its
+squared speed, the force, to the planned value at the next sample, in spite of two time constants and the square root.
+All speeds are in parts of the largest, (4,).
 """
 
 from math import sqrt
@@ -19,34 +18,22 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class RotorLag(NamedTuple):
-    """How far towards its command a rotor goes in one control sample, and where it must stay.
+    """Response of a rotor in one control sample, and its limit."""
 
-    Attributes:
-        up, down: Part of the way while it speeds up, and while it slows down.
-        planned: Part of the way that the plan has force go.
-        min_speed: Least speed.
-    """
-
-    up: float
-    down: float
-    planned: float
+    up: float  # part of the way to a higher command
+    down: float  # part of the way to a lower one
+    planned: float  # part of the way of the force in the plan
     min_speed: float
 
 
 class Rotors(NamedTuple):
-    """The rotors of a vehicle.
-
-    Attributes:
-        lag: Over a control sample.
-        allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
-    """
+    """The rotors of a vehicle."""
 
     lag: RotorLag
-    allocation: Array
+    allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4)
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
-    """Return the lag of a vehicle's rotors over a control sample."""
     lag = vehicle.rotors.lag
     up = 1.0 - exp(-interval_s / lag.time_constant_up_s) if lag else 1.0
     down = 1.0 - exp(-interval_s / lag.time_constant_down_s) if lag else 1.0
@@ -55,7 +42,7 @@ def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
 
 @compiled
 def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
-    """Return the speeds (4,) one control sample after `commands` (4,) were given at `speeds` (4,)."""
+    """Return the speeds one control sample later."""
     after = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
         way = commands[i] - speeds[i]
@@ -65,7 +52,7 @@ def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
 
 @compiled
 def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float) -> Array:
-    """Return the commands (4,), up to `max_speed`, that bring squared speed where the plan has it a sample later."""
+    """Return the commands that bring squared speeds to their planned values a sample later."""
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
         squared = speeds[i] * speeds[i]
@@ -78,9 +65,9 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float
 
 @compiled
 def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
-    """Write commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4, 4).
+    """Write commands, speeds and wrench a sample later, and the mean wrench until then, (4, 4).
 
-    Commands are in the vehicle's unit, of which `top` is the largest; `packed` are the `Rotors`.
+    Commands are in the vehicle's unit, `top` its largest speed; `packed` is the `Rotors`.
     """
     lag, allocation = packed[0].lag, packed[0].allocation
     commands, after, wrench, mean = out[0], out[1], out[2], out[3]
