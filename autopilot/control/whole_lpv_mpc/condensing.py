@@ -1,14 +1,12 @@
-"""The whole-vehicle MPC's QP, condensed to corrections of the rotor commands, as compiled kernels.
+"""The whole-vehicle QP, condensed to changes of the corrections, as compiled kernels.
 
-    z = changes of the corrections: of each rotor in each block, then two slacks where soft limits are held
+    z = changes of the corrections: of each rotor in each block, then two slacks if limits are soft
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-A command is what the references ask for plus a correction that a block of steps has in common. The QP is about the
-nominal motion, whose corrections are those of the last plan. With b blocks the kernels take and fill:
+Arguments of the kernels, for b blocks and n = 4 b variables, or 4 b + 2 with slacks:
 
     motion, speeds   nominal, (N + 1, 13) and (N + 1, 4), of `model.roll_out`
     responses        of `deviations.respond`, (N + 1, 12, 4 b)
-    H, f, lower, upper, G, h    (n, n), (n,), (n,), (n,), (m, n), (m,), with n = 4 b, or 4 b + 2 with slacks
 """
 
 from math import floor, pi, sqrt
@@ -28,88 +26,53 @@ from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
 
-STATES = DEVIATIONS + ROTORS
-"""Of the terminal cost: position, velocity, rotation, all in body axes, rates, squared rotor speeds."""
+STATES = DEVIATIONS + ROTORS  # of the terminal cost: position, velocity, rotation, rates, body axes; squared speeds
 SLACKS = 2
 TILT_SLACK, RATE_SLACK = 0, 1
-MOTION_ROWS = 7
-"""Of each step that is checked: tilt, and both sides of p, q and r."""
-PREDICTED = 16
-"""Position, m, velocity, m/s, ENU; phi, theta, psi, rad; p, q, r, rad/s; squared rotor speeds."""
+MOTION_ROWS = 7  # of each checked step: tilt, and both sides of p, q and r
+PREDICTED = 16  # position and velocity, ENU; phi, theta, psi; p, q, r; squared rotor speeds
 
 
 class Weights(NamedTuple):
-    """Of the errors at each step that counts, and of the corrections.
+    """Weights of the errors at each counted step, and of the corrections."""
 
-    Attributes:
-        position, velocity: 1/m² and s²/m².
-        tilt: Of a demanded attitude, 1/rad².
-        heading: 1/rad².
-        rate: s²/rad².
-        thrust: Of a demanded thrust, 1/N².
-        first, next: Of the first correction's difference from the last plan's, and of each other's from the one before.
-    """
-
-    position: float
-    velocity: float
-    tilt: float
-    heading: float
-    rate: float
-    thrust: float
-    first: float
-    next: float
+    position: float  # 1/m²
+    velocity: float  # s²/m²
+    tilt: float  # of a demanded attitude, 1/rad²
+    heading: float  # 1/rad²
+    rate: float  # s²/rad²
+    thrust: float  # of a demanded thrust, 1/N²
+    first: float  # change from the previous plan
+    next: float  # change from block to block
 
 
 class Problem(NamedTuple):
-    """What all QPs of one kind share.
+    """Constants of all QPs of one kind."""
 
-    Attributes:
-        starts: Step at which each block begins, and N, (b + 1,).
-        counted: Steps at which errors count, (c,).
-        checked: Steps at which soft limits are held, (d,).
-        weights: Of the errors.
-        terminal: S on the error at the end, (16, 16), symmetric.
-        allocation: Thrust of each rotor at its largest speed, N, (4,).
-        levels: Squared speed at each step that a unit correction of each block leads to, (b, N + 1).
-        min_cos_tilt: Of the soft limit.
-        max_rate: Of |p|, |q|, |r|, rad/s, (3,).
-    """
-
-    starts: Integers
-    counted: Integers
-    checked: Integers
+    starts: Integers  # step of each block, and N, (b + 1,)
+    counted: Integers  # steps with errors in the cost, (c,)
+    checked: Integers  # steps with soft limits, (d,)
     weights: Weights
-    terminal: Array
-    allocation: Array
-    levels: Array
+    terminal: Array  # S on the error at the end, (16, 16), symmetric
+    allocation: Array  # thrust of each rotor at its largest speed, N, (4,)
+    levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
     min_cos_tilt: float
-    max_rate: Array
+    max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
 
 
 class Target(NamedTuple):
-    """What the motion is to follow; samples are from now to one past the horizon, n = N + 2.
+    """The references of the motion, from now to one sample past the horizon, n = N + 2."""
 
-    Attributes:
-        position, velocity, acceleration: m, m/s, m/s², ENU, (n, 3).
-        forces: Of the thrust, N, ENU, (n, 3).
-        attitudes: Body to earth, (n, 3, 3).
-        yaw_rad: (n,), in any turn.
-        rates: rad/s, FLU, at samples 1 to N, (N, 3).
-        squared: Squared rotor speeds at samples 0 to N, (N + 1, 4).
-        thrusts_n: U1, (n,).
-        end_squared: Squared rotor speeds at the end, (4,).
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    forces: Array
-    attitudes: Array
-    yaw_rad: Array
-    rates: Array
-    squared: Array
-    thrusts_n: Array
-    end_squared: Array
+    position: Array  # m, ENU, (n, 3)
+    velocity: Array  # m/s, ENU, (n, 3)
+    acceleration: Array  # m/s², ENU, (n, 3)
+    forces: Array  # of the thrust, N, ENU, (n, 3)
+    attitudes: Array  # body to earth, (n, 3, 3)
+    yaw_rad: Array  # in any turn, (n,)
+    rates: Array  # rad/s, FLU, at samples 1 to N, (N, 3)
+    squared: Array  # rotor speeds at samples 0 to N, (N + 1, 4)
+    thrusts_n: Array  # U1, (n,)
+    end_squared: Array  # rotor speeds at the end, (4,)
 
 
 @inlined
@@ -123,10 +86,7 @@ def cost(
     H: Array,
     f: Array,
 ) -> None:
-    """Fill H and f of the corrections' changes.
-
-    `corrections` are that which flew last and then the nominal ones, (b + 1, 4).
-    """
+    """Fill H and f; `corrections` are the last one flown, then the nominal ones, (b + 1, 4)."""
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
     H[:, :] = 0.0
@@ -146,7 +106,6 @@ def cost(
 
 @compiled
 def _blocks(starts: Integers, step: int) -> int:
-    """Return how many blocks have begun before a step."""
     blocks = 0
     while blocks < starts.shape[0] - 1 and starts[blocks] < step:
         blocks += 1
@@ -157,9 +116,9 @@ def _blocks(starts: Integers, step: int) -> int:
 def _add_motion(
     motion: Array, responses: Array, n: int, target: Target, weights: Weights, used: int, row: Array, H: Array, f: Array
 ) -> None:
-    """Add ½ weight (error + row z)² of place, velocity, rates and heading at step n, to the lower triangle of H.
+    """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n, lower triangle.
 
-    All rows are added in one loop: it takes as long to bring an element of H as to add one of them to it.
+    One loop over all rows: loading an element of H takes as long as adding one row.
     """
     on_place, on_velocity, on_rate, on_heading = weights.position, weights.velocity, weights.rate, weights.heading
     x, X = motion[n], responses[n]
@@ -217,13 +176,12 @@ def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array)
 
 @compiled
 def _nearest(angle: float) -> float:
-    """Return the same angle between -pi and pi."""
     return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
 
 
 @compiled
 def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
-    """Return the rotation vector, rad, (3,), from the wanted attitude to R, of less than 90 degrees."""
+    """Return the rotation vector, rad, (3,), from the wanted attitude to R, under 90 degrees."""
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
     return error
@@ -231,7 +189,7 @@ def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) ->
 
 @inlined
 def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
-    """Add ½ eᵀ S e of the error at the end, in the body axes there; four of its numbers in one loop, as in a step."""
+    """Add ½ eᵀ S e of the error at the end, in its body axes; four rows in a loop, as in `_add_motion`."""
     S = problem.terminal
     steps, moved = target.rates.shape[0], X.shape[1]
     inputs = moved // problem.levels.shape[0]
@@ -273,7 +231,7 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
 
 @compiled
 def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
-    """Add what corrections cost that differ from the last plan's, and from the ones before."""
+    """Add the cost of changes from the previous plan, and from block to block."""
     for block in range(problem.starts.shape[0] - 1):
         weight = problem.weights.first if block == 0 else problem.weights.next
         for rotor in range(ROTORS):
@@ -289,9 +247,9 @@ def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f:
 
 @compiled
 def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
-    """Fill the bounds that keep each command within its limits, and move the nominal corrections within them.
+    """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
 
-    `commands` are those of the references, (N, 4), within `limits`, (N, 2); `corrections` those of each block, (b, 4).
+    `commands` of the references, (N, 4), within `limits`, (N, 2); `corrections` of each block, (b, 4).
     """
     inputs = lower.shape[0] // corrections.shape[0]
     for block in range(corrections.shape[0]):
@@ -307,7 +265,7 @@ def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, 
 
 @compiled
 def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
-    """Whether the plan that z, (4 b,), stands for goes beyond a soft limit at a step that is checked."""
+    """Whether the plan by z, (4 b,), exceeds a soft limit at a checked step."""
     rates, turned = np.empty(3), np.empty(2)
     for step in problem.checked:
         x, X = motion[step], responses[step]
@@ -355,7 +313,7 @@ def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h:
 def read_plan(
     motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
 ) -> None:
-    """Write the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
+    """Write the `PREDICTED` states by z, (N + 1, 16), yaw unwrapped from `psi` on."""
     inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
     for step in range(motion.shape[0]):
         x, X, state = motion[step], responses[step], states[step]

@@ -1,14 +1,10 @@
-"""How the whole vehicle deviates from its nominal motion, as compiled kernels.
+"""Deviations of the whole vehicle from its nominal motion, as compiled kernels.
 
-About the nominal motion the deviations are linear, with the model's matrices at the middle of each step; their 12
-states are
+Linear, with the matrices at the middle of each step, and driven by the squared rotor speeds. State, 12:
 
     [position, m, ENU; velocity, m/s, ENU; rotation vector, rad, FLU; body rates, rad/s, FLU]
 
-and the rotors' squared speeds, in parts of the vehicle's largest, drive them.
-
-The last index of every array is that of what is computed side by side, steps or columns of the response: a loop over it
-is vectorised where all arrays are of one record.
+The last index of every array runs over steps or columns of the response, so that loops over it are vectorised.
 """
 
 from math import sqrt
@@ -26,23 +22,9 @@ POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
 
 
 class Transition(NamedTuple):
-    """Every step of the deviations, by its blocks that are not known beforehand: (3, 3, N), or (3, 4, N) of the rotors.
+    """The blocks of the transition of every step, (3, 3, N), or (3, 4, N) from the rotors."""
 
-    Attributes:
-        drag: Of velocity on velocity, beyond the unit matrix.
-        velocity_rotation, velocity_rate: Of rotation and rates on velocity.
-        position_rotation, position_rate: The same on position.
-        rotation, rotation_rate: Of rotation and rates on rotation.
-        rate: Of rates on rates.
-        force, place: Of the mean squared speeds over the step on velocity and position.
-        moment, turn: The same on rates and rotation.
-        spin: Of the change of squared speeds over the step on the rate r, (4, N).
-        up: The body's z axis, ENU, (3, N).
-        V, W, G: Derivatives that all are made of: of velocity and rotation by rotation, and of rates by rates.
-        VW, VG, WW, WG, GG: Their products.
-    """
-
-    drag: Array
+    drag: Array  # velocity to velocity, without the unit matrix
     velocity_rotation: Array
     velocity_rate: Array
     position_rotation: Array
@@ -50,16 +32,16 @@ class Transition(NamedTuple):
     rotation: Array
     rotation_rate: Array
     rate: Array
-    force: Array
-    place: Array
-    moment: Array
-    turn: Array
-    spin: Array
-    up: Array
-    V: Array
-    W: Array
-    G: Array
-    VW: Array
+    force: Array  # mean squared speeds over the step to velocity
+    place: Array  # to position
+    moment: Array  # to rates
+    turn: Array  # to rotation
+    spin: Array  # change of squared speeds to the rate r, (4, N)
+    up: Array  # body z axis, ENU, (3, N)
+    V: Array  # derivative of velocity by rotation
+    W: Array  # derivative of rotation by rotation
+    G: Array  # derivative of rates by rates
+    VW: Array  # products, as those below
     VG: Array
     WW: Array
     WG: Array
@@ -67,7 +49,6 @@ class Transition(NamedTuple):
 
 
 def empty_transition(steps: int) -> Transition:
-    """Return the arrays of so many steps."""
     nine, twelve = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, ROTORS, steps)) for _ in range(4)]
     return Transition._make([*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:]])
 
@@ -76,7 +57,7 @@ def empty_transition(steps: int) -> Transition:
 def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
     """Fill the transitions of a nominal motion, (N + 1, 13), with squared rotor speeds, (N + 1, 4).
 
-    Taylor's series to the third power of the step, its matrices those of the step's middle.
+    Taylor series to the third power of the step.
     """
     _differentiate(motion, speeds, model, out)
     V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
@@ -137,7 +118,6 @@ def _differentiate(motion: Array, speeds: Array, model: Model, out: Transition) 
 
 @inlined
 def _multiply(A: Array, B: Array, product: Array) -> None:
-    """Write A B of every step, (3, 3, N)."""
     for i in range(3):
         for j in range(3):
             for n in range(product.shape[2]):
@@ -146,7 +126,7 @@ def _multiply(A: Array, B: Array, product: Array) -> None:
 
 @inlined
 def _drive(model: Model, out: Transition) -> None:
-    """Fill what the rotors do."""
+    """Fill the effects of the rotors."""
     inertia, allocation, h = model.inertia, model.allocation, model.interval_s
     for i in range(3):
         for rotor in range(ROTORS):
@@ -169,16 +149,12 @@ def _drive(model: Model, out: Transition) -> None:
 def respond(
     motion: Array, speeds: Array, means: Array, levels: Array, packed: Packed, T: Transition, responses: Array
 ) -> None:
-    """Write how the motion deviates for a unit change of one rotor's command held for one block.
+    """Write the deviations by a unit change of one rotor's command in one block.
 
     Args:
-        motion: Nominal, (N + 1, 13).
-        speeds: Nominal squared rotor speeds, (N + 1, 4).
-        means: Of each block, the mean squared speed over each step that its unit change leads to, (b, N).
+        means: Mean squared speed over each step by a unit change of each block, (b, N).
         levels: The same at the beginning of each step and after the last, (b, N + 1).
-        packed: The `Model`.
-        T: Is filled.
-        responses: Is filled, (N + 1, 12, 4 b); column 4 j + i is rotor i in block j.
+        responses: Output, (N + 1, 12, 4 b); column 4 j + i is rotor i in block j.
     """
     model = packed[0]
     inputs = responses.shape[2] // means.shape[0]
@@ -231,7 +207,7 @@ def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
 
 @compiled
 def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
-    """Fill the transition of one step level at a thrust, and in X, (2, 12, 12), what becomes of each deviation."""
+    """Fill T with one level step at a thrust, and X, (2, 12, 12), with the response to each deviation."""
     model = packed[0]
     level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
     level[:, 6] = 1.0
@@ -245,7 +221,7 @@ def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
 
 
 def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:
-    """Return A, (16, 16), and B, (16, 4), of one step of deviations and squared rotor speeds, level at a thrust."""
+    """Return A, (16, 16), and B, (16, 4), of deviations and squared speeds in a level step at a thrust."""
     T, X = empty_transition(1), np.empty((2, DEVIATIONS, DEVIATIONS))
     _hover(thrust_n, packed, T, X)
     lag, n = packed[0]["lag"], DEVIATIONS + ROTORS

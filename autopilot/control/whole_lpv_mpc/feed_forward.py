@@ -1,9 +1,9 @@
-"""The rotor commands that references alone ask for, as compiled kernels: a quadrotor with drag is differentially flat.
+"""Rotor commands of the references by differential flatness, with drag, as compiled kernels.
 
-The force that the thrust must make gives its direction, and with the yaw the attitude; successive attitudes give the
-body rates and their change, these the moments, and with the thrust the squared rotor speeds; commands lead them by the
-rotors' lag. Derivatives beyond the acceleration are differences between samples, so that drag is in all of them.
-Source of the flat outputs: Mellinger and Kumar, ICRA 2011; with drag: Faessler, Franchi and Scaramuzza, RA-L 2018.
+Thrust force and yaw give the attitude; successive attitudes the body rates and accelerations, and so the moments; with
+the thrust these give the squared rotor speeds. Commands lead them by the rotor lag. Derivatives beyond acceleration are
+differences between samples, which include drag. Mellinger and Kumar, ICRA 2011; with drag: Faessler, Franchi and
+Scaramuzza, RA-L 2018.
 
 Samples are from now to one past the horizon of N steps, n = N + 2. Squared speeds are in parts of the largest.
 """
@@ -20,50 +20,31 @@ from colibri.common.kernels import cos, sin
 from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
-_JUMP_M_S = 0.02
-"""A change of velocity from one reference to the next that is so much more than their accelerations make is a jump."""
+_JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
 class Guidance(NamedTuple):
-    """What stays the same between references and what they ask for.
+    """Constants of the approach to references."""
 
-    Attributes:
-        k1_s2, k2_s: Gains on a large position error, 1/s², and on its rate, 1/s.
-        max_error_m: An error that is larger counts as this one.
-        follow_within_m: Of a reference that is farther than this, only a part of the motion counts.
-        max_acceleration_m_s2: With which an error dies.
-        exact_within_m: A reference as near as this is taken as it is.
-        interval_s: Between samples.
-        recovery_1_s2, recovery_1_s: Gains of the recovery, which turns slower than plans do.
-        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
-    """
-
-    k1_s2: float
-    k2_s: float
-    max_error_m: float
-    follow_within_m: float
-    max_acceleration_m_s2: float
-    exact_within_m: float
+    k1_s2: float  # on a large position error
+    k2_s: float  # on its rate
+    max_error_m: float  # of approach
+    follow_within_m: float  # the motion of farther references counts in proportion
+    max_acceleration_m_s2: float  # of a decaying error
+    exact_within_m: float  # nearer references are tracked directly
     interval_s: float
-    recovery_1_s2: float
+    recovery_1_s2: float  # gains of the recovery, slower than plans
     recovery_1_s: float
-    from_wrench: Array
+    from_wrench: Array  # U1, N, and U2..U4, N m, to squared speeds, (4, 4)
 
 
 class Flat(NamedTuple):
-    """What references ask for; each array is filled.
+    """Flat outputs of references, filled in place."""
 
-    Attributes:
-        forces: Of the thrust, N, ENU, (n, 3).
-        attitudes: Body to earth, (n, 3, 3).
-        rates: Of the body, rad/s, FLU, at samples 1 to N, (N, 3).
-        squared: Squared rotor speeds at samples 0 to N, (N + 1, 4).
-    """
-
-    forces: Array
-    attitudes: Array
-    rates: Array
-    squared: Array
+    forces: Array  # of the thrust, N, ENU, (n, 3)
+    attitudes: Array  # body to earth, (n, 3, 3)
+    rates: Array  # rad/s, FLU, at samples 1 to N, (N, 3)
+    squared: Array  # rotor speeds at samples 0 to N, (N + 1, 4)
 
 
 @compiled
@@ -78,18 +59,9 @@ def follow(
     out: Packed,
     force: Array,
 ) -> None:
-    """Fill what follows references at their times, and the force, N, ENU, (3,), along which thrust must point now.
+    """Fill the `Target` of references by the clock, and the force, N, ENU, (3,), to align thrust with now.
 
-    Args:
-        now: The vehicle, `planning.Now`.
-        position: Of the references, as all that follows, ENU, (n, 3), or more than are needed.
-        velocity: ENU, (n, 3).
-        acceleration: ENU, (n, 3).
-        yaw_rad: (n,).
-        law: The `Guidance`.
-        vehicle: The `Model`.
-        out: The `Target`; is filled, but for thrusts.
-        force: Is filled.
+    `position`, `velocity`, `acceleration` are ENU, (n, 3), `yaw_rad` (n,), all with at least n rows.
     """
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     n = target.yaw_rad.shape[0]
@@ -114,10 +86,7 @@ def ask(
     packed: Packed,
     out: Flat,
 ) -> None:
-    """Fill `out` from references of velocity and acceleration, ENU, (n, 3), and yaw, rad, (n,).
-
-    `from_wrench` is from U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4); `packed` is the `Model`.
-    """
+    """Fill `out` from references of velocity and acceleration, ENU, (n, 3), and yaw, rad, (n,)."""
     model = packed[0]
     airframe = model.airframe
     for n in range(yaw_rad.shape[0]):
@@ -165,10 +134,9 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
 
 @compiled
 def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
-    """Fill the commands, (N, 4), that bring rotors from one of the squared speeds, (N + 1, 4), to the next.
+    """Fill the commands, (N, 4), from one of the squared speeds, (N + 1, 4), to the next, within limits, (N, 2).
 
-    `left` is the part of the way that the lag leaves after a step, and `limits` the least and the largest squared speed
-    of each step, (N, 2).
+    `left` is the part of the way that the lag leaves after a step.
     """
     for n in range(commands.shape[0]):
         for rotor in range(ROTORS):
@@ -178,7 +146,7 @@ def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
 
 @compiled
 def point(force: Array, yaw_rad: float, attitude: Array) -> None:
-    """Write the attitude, body to earth, (3, 3), whose z axis points along a force, (3,), at a yaw as Euler's angle."""
+    """Write the attitude, (3, 3), with its z axis along a force, (3,), and the yaw as Euler angle."""
     s, c = sin(yaw_rad), cos(yaw_rad)
     total = norm(force)
     z0, z1, z2 = force[0] / total, force[1] / total, force[2] / total
@@ -192,7 +160,7 @@ def point(force: Array, yaw_rad: float, attitude: Array) -> None:
 
 @compiled
 def rate_between(before: Array, after: Array, interval_s: float, rate: Array) -> None:
-    """Write the body rate, rad/s, FLU, (3,), that turns one attitude, (3, 3), into the next: by less than 90°."""
+    """Write the body rate, rad/s, FLU, (3,), between two attitudes, (3, 3), under 90° apart."""
     squared = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -208,10 +176,9 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
 
 @compiled
 def before_jump(references: tuple[Array, Array, Array, Array], interval_s: float) -> tuple[Array, Array, Array, Array]:
-    """Return references, ENU, (n, 3) each, and of yaw, (n,), as they go on from before a jump of the velocity.
+    """Return references, ENU, (n, 3) each, and yaw, (n,), extrapolated past a jump of the velocity.
 
-    No vehicle follows a jump, as at the end of a track that does not slow down: one that bends towards what comes after
-    it is off what comes before.
+    No vehicle follows a jump, as at the end of a track: tracking it would spoil the samples before.
     """
     position, velocity, acceleration, yaw_rad = references
     n = position.shape[0]
@@ -244,13 +211,11 @@ def approach(
     packed: Packed,
     near: tuple[Array, Array, Array],
 ) -> None:
-    """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
+    """Write references, ENU, (n, 3) each, that lead from the vehicle to the given ones.
 
-    References that are near enough are taken as they are. The farther they are, the more does the error die as the
-    gains have it in place of at once, and as much slower as it takes to keep to the largest acceleration. An error that
-    is larger than the largest dies at the speed at which the largest begins to. Of the motion of a reference that is
-    farther than what is followed only a part counts: one that no vehicle can follow must not lead this one astray.
-    `packed` is the `Guidance`.
+    Near references stay as given. For farther ones the error decays with the gains, slowed down to the largest
+    acceleration; an error above the largest closes at constant speed. The motion of references out of reach counts in
+    proportion: an impossible one must not lead the vehicle astray. `packed` is the `Guidance`.
     """
     law = packed[0]
     away, squared = np.empty(3), 0.0
@@ -290,7 +255,7 @@ def approach(
 
 @compiled
 def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
-    """Return how many times slower an error must die so that its acceleration is within the largest; 1 or more."""
+    """Return the time scale, at least 1, that keeps the acceleration of a decaying error within its limit."""
     half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
     return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
 
@@ -300,9 +265,9 @@ def demanded_force(
     rigid: Array, near: tuple[Array, Array, Array], disturbance: Disturbance, packed: Packed, limits: ForceLimits,
     vehicle: Packed,
 ) -> Array:  # fmt: skip
-    """Return the force, N, ENU, (3,), by which the error now would die as the recovery has it: where thrust must point.
+    """Return the force, N, ENU, (3,), with the recovery's error dynamics, to align thrust with.
 
-    `near` are references that `approach` has written, `packed` is the `Guidance`.
+    `near` are references by `approach`; `packed` is the `Guidance`.
     """
     law, airframe, force = packed[0], vehicle[0].airframe, np.empty(3)
     for i in range(3):
@@ -316,7 +281,7 @@ def demanded_force(
 
 @compiled
 def stand(angles: Array, thrust_n: Array, limits: ForceLimits, out: Flat) -> None:
-    """Fill attitudes and forces of demanded angles phi, theta, psi, rad, (n, 3), and thrusts, N, (n,)."""
+    """Fill attitudes and forces of demanded angles, rad, (n, 3), and thrusts, N, (n,)."""
     for n in range(thrust_n.shape[0]):
         phi, theta, psi = angles[n]
         sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)

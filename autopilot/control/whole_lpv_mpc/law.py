@@ -1,4 +1,4 @@
-"""The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks about one plan."""
+"""The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks."""
 
 from collections.abc import Mapping
 from math import ceil, nan, radians
@@ -38,10 +38,8 @@ from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotati
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_RECOVER_BEYOND = cos(radians(75.0))
-"""A thrust axis further from where it must point is for the recovery law."""
-_AS_PLANNED = cos(radians(15.0))
-"""Unless the last plan has led there, to within this."""
+_RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
+_AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
 _SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
 """At first, no rotor has more than so many shares of the thrust that must point along its axis, or than such a part of
 its share in hover: where little thrust is to be made, moments must not make much of it. A vehicle that stands, and does
@@ -80,39 +78,27 @@ class WholeLpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=T
 
 
 class Memory(NamedTuple):
-    """What the law carries from one control sample to the next.
-
-    Attributes:
-        plan: The last plan, made `age` samples ago; None where there is none to build on.
-        age: Samples since that plan.
-        lag_us: By which path time is behind the clock, µs.
-    """
+    """State of the law between two control samples."""
 
     tracked: Tracked
-    plan: Plan | None
-    age: int
-    lag_us: int
+    plan: Plan | None  # previous plan, if usable
+    age: int  # samples since that plan
+    lag_us: int  # of path time behind the clock
 
 
 class Inputs(NamedTuple):
-    """What a decision begins with.
-
-    Attributes:
-        psi: Yaw, rad, unwrapped.
-        max_n: Largest thrust.
-    """
+    """Inputs of a decision."""
 
     observed: Observed
-    psi: float
-    max_n: float
+    psi: float  # yaw, rad, unwrapped
+    max_n: float  # largest thrust
 
 
 class WholeLpvMpc(TrackingLaw[Memory]):
-    """The control law. Its predicted outputs are those of `condensing.PREDICTED`.
+    """The control law; its predicted outputs are `condensing.PREDICTED`.
 
     Attributes:
-        preview: From now to one sample past the horizon.
-        min_path_speed: The least speed along the references, in parts of their own.
+        min_path_speed: Least speed along the references, in parts of their own.
     """
 
     plan_columns = PlanColumns(6, 7, 8, 11)
@@ -152,29 +138,23 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         self._model_kg = self._mpc.model["airframe"]["mass_kg"]
 
     def warm_up(self) -> None:
-        """Load what is compiled."""
         super().warm_up()
         self._mpc.warm_up()
 
     def initial(self, rotor_speed: float) -> Memory:
-        """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         return Memory(self.tracker.initial(rotor_speed), None, 0, 0)
 
     def lag_us(self, memory: Memory) -> int:
-        """Return by how much path time is behind the clock, µs."""
         return memory.lag_us
 
     def path_speed(self, memory: Memory) -> float:
-        """Return the speed along the references, in parts of their own."""
         plan = memory.plan
         return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
 
     def with_lag(self, memory: Memory, lag_us: int) -> Memory:
-        """Return the memory with another lag, µs."""
         return memory._replace(lag_us=lag_us)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
-        """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
         return self._decide(memory, inputs, self._targets.on_clock(self._now, references))
@@ -182,7 +162,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[Memory, Decision]:
-        """Decide the same, and the speed along the references."""
         del time_us
         inputs = self._inputs(memory, state)
         kept = memory.plan.speeds if memory.plan else None
@@ -193,7 +172,6 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
-        """Decide the same for an attitude and a thrust, which is kept within what the rotors can make."""
         del time_us
         inputs = self._inputs(memory, state)
         wanted = self._targets.of_demand(self._filled(inputs), demand)
@@ -242,7 +220,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def _choose(
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and diagnostics."""
+        """Plan, or fall back; return squared rotor speeds, the plan to continue, its age, and diagnostics."""
         _, target, force, path = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):

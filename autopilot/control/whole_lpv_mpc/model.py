@@ -1,9 +1,7 @@
-"""The whole vehicle as its control law models it, and its nominal motion, as compiled kernels.
+"""The whole vehicle's model and its nominal motion, as compiled kernels.
 
-The nominal motion is a Runge-Kutta rollout of the rigid body under the commands that are expected, from the state now;
-`deviations` has what is linear about it. The rotors' squared speeds drive the body. They follow their commands as one
-linear lag, so that they are known functions of the commands: see `Lag`. Squared speeds are in parts of the vehicle's
-largest.
+The nominal motion is a Runge-Kutta rollout of the rigid body from the present state with the expected commands. Squared
+rotor speeds, in parts of the largest, follow their commands as one linear lag.
 """
 
 from math import sqrt
@@ -17,76 +15,51 @@ from colibri.common.matrices import put
 from colibri.common.types import Array
 
 ROTORS = 4
-RIGID = 13
-"""States of a nominal motion: position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU."""
+RIGID = 13  # position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU
 _VELOCITY, _QUATERNION, _BODY_RATE = 3, 6, 10
-LEAST_SPEED = 1e-3
-"""A rotor that stands has no speed to divide by."""
+LEAST_SPEED = 1e-3  # of a rotor as a divisor
 
 
 class Lag(NamedTuple):
-    """How squared rotor speeds s follow commands u that are held for a step of h: ds/dt = (u - s) / τ.
+    """Lag of squared rotor speeds s for commands u held over a step h: ds/dt = (u - s) / τ."""
 
-    Attributes:
-        left: exp(-h / τ), the part of u - s that is left after a step; 0 for rotors that follow at once.
-        left_half: The same after half a step.
-        left_mean: Its mean over the step.
-        rate_1_s: 1 / τ; 0 for rotors that follow at once.
-    """
-
-    left: float
-    left_half: float
-    left_mean: float
-    rate_1_s: float
+    left: float  # exp(-h / τ), the part of u - s left after a step; 0 without lag
+    left_half: float  # after half a step
+    left_mean: float  # mean over the step
+    rate_1_s: float  # 1 / τ; 0 without lag
 
 
 class Model(NamedTuple):
-    """A vehicle's numbers.
-
-    Attributes:
-        airframe: Mass, gravity and drag.
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        allocation: From squared speeds to U1, N, and U2, U3, U4, N m, (4, 4).
-        momentum: Angular momentum of each rotor along body z at its largest speed, N m s, (4,).
-        lag: Of the rotors.
-        interval_s: Of a step.
-    """
+    """Parameters of a vehicle."""
 
     airframe: Airframe
-    inertia: Array
-    allocation: Array
-    momentum: Array
+    inertia: Array  # kg m², (3,)
+    allocation: Array  # squared speeds to U1, N, and U2, U3, U4, N m, (4, 4)
+    momentum: Array  # of each rotor along body z at its largest speed, N m s, (4,)
     lag: Lag
     interval_s: float
 
 
 class Disturbance(NamedTuple):
-    """What the model does not explain, constant over the horizon: m/s², ENU, (3,), and N m, FLU, (3,)."""
+    """Observed disturbance, constant over the horizon."""
 
-    acceleration: Array
-    moment: Array
+    acceleration: Array  # m/s², ENU, (3,)
+    moment: Array  # N m, FLU, (3,)
 
 
 class Drive(NamedTuple):
-    """What the rotors do at the beginning, the middle and the end of each step, (3, N).
+    """Effects of the rotors at the beginning, middle and end of each step, (3, N)."""
 
-    Attributes:
-        thrust, roll, pitch, yaw: U1, N, and U2, U3, U4, N m.
-        momentum, spin_up: Angular momentum along body z, N m s, and its rate, N m.
-        halfway: Squared rotor speeds in the middle of each step, (N, 4).
-    """
-
-    thrust: Array
-    roll: Array
-    pitch: Array
-    yaw: Array
-    momentum: Array
-    spin_up: Array
-    halfway: Array
+    thrust: Array  # U1, N
+    roll: Array  # N m
+    pitch: Array  # N m
+    yaw: Array  # N m
+    momentum: Array  # along body z, N m s
+    spin_up: Array  # its rate, N m
+    halfway: Array  # squared rotor speeds in the middle of each step, (N, 4)
 
 
 def empty_drive(steps: int) -> Drive:
-    """Return the arrays of so many steps."""
     return Drive._make([*(np.zeros((3, steps)) for _ in range(6)), np.zeros((steps, ROTORS))])
 
 
@@ -101,17 +74,9 @@ def roll_out(
     motion: Array,
     speeds: Array,
 ) -> None:
-    """Write the nominal motion under commands.
+    """Write the nominal motion from `rigid`, (13,), and `squared` rotor speeds, (4,), by commands, (N, 4).
 
-    Args:
-        rigid: State now, (13,).
-        squared: Squared rotor speeds now, (4,).
-        commands: Squared speeds commanded at each step, (N, 4).
-        disturbance: On the vehicle.
-        packed: The `Model`.
-        drive: Is filled.
-        motion: Is filled with the state now and after each step, (N + 1, 13).
-        speeds: Is filled with the squared rotor speeds at the same times, (N + 1, 4).
+    `motion`, (N + 1, 13), and `speeds`, squared, (N + 1, 4), begin with the present ones.
     """
     model = packed[0]
     lag, h = model.lag, model.interval_s
@@ -149,7 +114,7 @@ def roll_out(
 
 @inlined
 def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) -> None:
-    """Fill what rotors do that turn at `squared` in a part of each step, (N, 4), and are commanded to `commands`."""
+    """Fill the effects of squared speeds in one part of each step, (N, 4)."""
     allocation, rate_1_s = model.allocation, model.lag.rate_1_s
     for n in range(commands.shape[0]):
         thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0

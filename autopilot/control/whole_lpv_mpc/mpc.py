@@ -1,4 +1,4 @@
-"""The whole-vehicle LPV-MPC: rolls the last plan out, linearises about it, condenses, solves and reads the plan."""
+"""The whole-vehicle LPV-MPC: linearise about the previous plan, condense, solve and read the new plan."""
 
 from math import radians
 from typing import Annotated, NamedTuple
@@ -56,35 +56,21 @@ class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class Plan(NamedTuple):
-    """A solved QP.
+    """A solved QP."""
 
-    Attributes:
-        commands: Squared speeds commanded at each step, (N, 4).
-        states: Predicted, (N + 1, 16), see `condensing.PREDICTED`.
-        speeds: Along the path, (N + 2,); None on the clock.
-    """
-
-    commands: Array
-    states: Array
-    speeds: Array | None = None
+    commands: Array  # squared speeds at each step, (N, 4)
+    states: Array  # `condensing.PREDICTED`, (N + 1, 16)
+    speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
 class Corrections(NamedTuple):
-    """How a QP ended.
+    """Result of the QPs of a plan."""
 
-    Attributes:
-        status: Of the last one that was solved.
-        z: Corrections of the last commands, (n,); None where there are none.
-        iterations: That solvers took; 0 where none was asked.
-        slack: By how much soft limits are exceeded, in parts of each: the largest.
-        binding: How many soft limits of tilt and of rates bind.
-    """
-
-    status: QpStatus
-    z: Array | None
-    iterations: float
-    slack: float = 0.0
-    binding: tuple[int, int] = (0, 0)
+    status: QpStatus  # of the last QP
+    z: Array | None  # changes of the corrections, (n,)
+    iterations: float  # 0 without a solver
+    slack: float = 0.0  # largest violation of a soft limit, in parts of it
+    binding: tuple[int, int] = (0, 0)  # active soft limits of tilt and of rates
 
 
 class _Qps(NamedTuple):
@@ -99,10 +85,8 @@ class WholeMpc:
     """LPV-MPC of position, attitude and rotors together.
 
     Attributes:
-        model: The vehicle's numbers, as one record.
-        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
-        starts: Step at which each block begins, and N, (b + 1,).
-        terminal_on_hold: S of a demanded attitude, see `Problem`.
+        from_wrench: U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
+        terminal_on_hold: Terminal cost S for a demanded attitude.
     """
 
     def __init__(
@@ -165,7 +149,7 @@ class WholeMpc:
         self._none = np.empty((0, ROTORS))
 
     def _terminal(self, weights: Weights, count_every: int, thrust_n: float) -> Array:
-        """Return S, (16, 16): the cost of the LQR that goes on level at `thrust_n` after the horizon."""
+        """Return S, (16, 16): the cost of the LQR in level flight at `thrust_n` after the horizon."""
         A, B = deviations.hover_transition(thrust_n, self.model)
         Q = np.zeros((condensing.STATES, condensing.STATES))
         of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
@@ -191,15 +175,13 @@ class WholeMpc:
         *,
         on_track: bool = True,
     ) -> tuple[Plan | None, Diagnostics]:
-        """Plan from `now` towards `target`; no plan where the QP is not solved.
-
-        Where the plan within the rotors' limits alone exceeds a soft limit, a second one has these, too.
+        """Plan from `now` towards `target`; the plan is None if the QP is not solved.
 
         Args:
-            last: Commands of the last plan, from now on, (n, 4); None without one.
+            last: Commands of the previous plan from now on, (n, 4).
             psi: Yaw now, rad, unwrapped.
-            path: The nominal speeds along the path, where they are free.
-            on_track: Whether the place counts, or the attitude and the thrust.
+            path: Nominal speeds along the path, if they are free.
+            on_track: Track position, or else attitude and thrust.
         """
         qps = self._on_path if path else self._on_clock if on_track else self._on_hold
         last = self._none if last is None else last
@@ -227,15 +209,15 @@ class WholeMpc:
         return Plan(commands, states, speeds), diagnostics
 
     def warm_up(self) -> None:
-        """Load what is compiled for soft limits, which no flight may have for long; after a first plan."""
+        """Load compiled code of the soft limits, rarely needed in flight; after a first plan."""
         planning.limit(self._on_clock.kind)
         planning.count_active(self._on_clock.kind, np.zeros(len(self._on_clock.free.f)))
 
     def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
-        """Return the corrections of the last commands that cost least.
+        """Return the optimal changes of the corrections.
 
-        No solver is asked where the minimum within no limits is within the rotors'; soft limits are added where it, or
-        the solver's, exceeds one.
+        An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again
+        with them.
         """
         minimum = np.empty(len(free.f))
         is_free = planning.is_free(kind, minimum)
@@ -252,7 +234,7 @@ class WholeMpc:
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:
-    """Return the model of `vehicle`: its squared rotor speeds follow like the slower of its rotors' two lags."""
+    """Return the model of `vehicle`, with the slower of its rotors' two lags."""
     times = vehicle.rotors.lag
     lag = Lag(0.0, 0.0, 0.0, 0.0)
     if times:
@@ -270,9 +252,9 @@ def model_of(vehicle: Vehicle, interval_s: float) -> Model:
 
 
 def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
-    """Return what a unit command held for each block does: mean squared speed over each step, and at each end.
+    """Return the effect of a unit command in each block: mean squared speeds over steps, and at their ends.
 
-    They are (b, N) and (b, N + 1); the mean is never 0 from the block's begin on.
+    Shapes (b, N) and (b, N + 1); the mean is above 0 from the block's begin on.
     """
     blocks, steps = len(starts) - 1, int(starts[-1])
     means, levels = np.zeros((blocks, steps)), np.zeros((blocks, steps + 1))

@@ -1,12 +1,10 @@
-"""The speed along the path as a part of the plan, as compiled kernels.
+"""The speed along the path as a variable of the plan, as compiled kernels.
 
-Path time passes at σ seconds a second, and lags behind the clock by what is less than 1. References are functions of
-path time; σ is linear in time within a block, from the end of one to the end of the next, so that the vehicle's motion
-along its path has an acceleration:
+Path time θ passes at σ seconds a second. References are functions P of path time; σ is linear within a block:
 
     p(t) = P(θ(t)),   dp/dt = σ P',   d²p/dt² = σ² P'' + dσ/dt P',   dθ/dt = σ
 
-The σ at the end of each block are variables of the QP beside the corrections of its rotors.
+The σ at the end of each block are variables of the QP beside the rotors' corrections.
 """
 
 from math import floor
@@ -39,37 +37,31 @@ class PathSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class SpeedEffects(NamedTuple):
-    """What each σ at the end of a block does to the speeds and to path time.
+    """Effect of each σ at the end of a block on every sample, (N + 2, b)."""
 
-    Attributes:
-        shares: Part of the σ at the end of each block in that of each sample, (N + 2, b).
-        passed: Path time, s, that a unit of each σ has made pass until each sample, (N + 2, b).
-    """
-
-    shares: Array
-    passed: Array
+    shares: Array  # on the speed
+    passed: Array  # on path time, s
 
 
 class PathLimits(NamedTuple):
-    """Of one QP: bounds of σ, the reward on path time, 1/s, and the price of a change."""
+    """Bounds of σ and its cost."""
 
     lower: float
     upper: float
-    reward: float
-    change: float
+    reward: float  # on path time, 1/s
+    change: float  # on the square of a change
 
 
 class PathNow(NamedTuple):
-    """Of one QP: nominal σ and slopes at each sample, (N + 2,) and (N + 2, 6), which part counts, and the limits."""
+    """The path in one QP."""
 
-    speeds: Array
-    slopes: Array
-    part: float
+    speeds: Array  # nominal σ, (N + 2,)
+    slopes: Array  # P', P'', (N + 2, 6)
+    part: float  # of the motion of the references that counts
     limits: PathLimits
 
 
 def speed_effects(starts: Integers, interval_s: float) -> SpeedEffects:
-    """Return what the σ at the ends of blocks that begin at `starts`, (b + 1,), do."""
     blocks, samples = len(starts) - 1, int(starts[-1]) + 2
     shares = np.zeros((samples, blocks))
     for block in range(blocks):
@@ -87,7 +79,7 @@ def speed_effects(starts: Integers, interval_s: float) -> SpeedEffects:
 
 @compiled
 def carry_speeds(last: Array, starts: Integers, lower: float, upper: float, speeds: Array) -> None:
-    """Fill σ at each sample, (N + 2,), from those of the last plan from now on, (n,)."""
+    """Fill σ at each sample, (N + 2,), from the previous plan's from now on, (n,)."""
     speeds[0] = last[0]
     for block in range(starts.shape[0] - 1):
         begin, end = starts[block], starts[block + 1]
@@ -106,13 +98,12 @@ def slide(
     out: tuple[Array, Array, Array, Array],
     slopes: Array,
 ) -> float:
-    """Fill references at the samples' path times, moving at σ; return the last one's path time, s.
+    """Fill references at the samples' path times, moving at σ; return the last path time, s.
 
     Args:
-        references: At path times an interval apart.
+        references: At path times `interval_s` apart.
         from_s: Path time of the first sample.
         speeds: σ at each sample, (n,).
-        interval_s: Between references, and between samples.
         out: Position, velocity, acceleration, ENU, (n, 3) each, and yaw, (n,).
         slopes: P' and P'', (n, 6).
     """
@@ -141,10 +132,7 @@ def slide(
 
 @compiled
 def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
-    """Write how the deviation from the references changes with each σ, into the last column of each block.
-
-    `responses` are (N + 1, 12, 5 b).
-    """
+    """Write the effect of each σ on the tracking error, the last column of each block, (N + 1, 12, 5 b)."""
     inputs = ROTORS + 1
     for step in range(responses.shape[0]):
         for block in range(effects.shares.shape[1]):
@@ -158,7 +146,7 @@ def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
 
 @compiled
 def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> None:
-    """Add what each σ costs to the QP, and fill its bounds."""
+    """Add the cost of each σ to the QP, and fill its bounds."""
     inputs, limits = ROTORS + 1, path.limits
     for block in range(starts.shape[0] - 1):
         here = inputs * block + ROTORS
@@ -177,7 +165,7 @@ def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> Non
 
 @compiled
 def read_speeds(speeds: Array, shares: Array, z: Array) -> Array:
-    """Return σ at each sample of the plan that z stands for, (N + 2,)."""
+    """Return σ at each sample of the plan by z, (N + 2,)."""
     inputs = ROTORS + 1
     planned = speeds.copy()
     for sample in range(shares.shape[0]):

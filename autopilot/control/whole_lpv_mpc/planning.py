@@ -1,4 +1,4 @@
-"""From the last plan to the next QP, and from its solution to the next plan, as two compiled kernels.
+"""From the previous plan to the QP, and from its solution to the next plan, as compiled kernels.
 
 Commands and corrections are squared rotor speeds in parts of the largest; see `condensing`.
 """
@@ -31,66 +31,40 @@ from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
-_BINDING = 1e-9
-"""A limit counts as active where this or less is left."""
+_BINDING = 1e-9  # an active limit has this or less left
 
 
 class Now(NamedTuple):
-    """Where a plan begins.
+    """Start of a plan."""
 
-    Attributes:
-        rigid: State, see `model.RIGID`, (13,).
-        squared: Squared rotor speeds, (4,).
-        disturbance: That the model does not explain.
-        limits: Least and largest squared speed of each step, (N, 2).
-        force: Limits of the force that references may ask for.
-    """
-
-    rigid: Array
-    squared: Array
+    rigid: Array  # state, see `model.RIGID`, (13,)
+    squared: Array  # rotor speeds, (4,)
     disturbance: Disturbance
-    limits: Array
-    force: ForceLimits
+    limits: Array  # least and largest squared speed of each step, (N, 2)
+    force: ForceLimits  # demanded by references
 
 
 class Workspace(NamedTuple):
-    """Arrays that every plan fills again, but for the last two.
+    """Arrays filled by every plan, except the last two."""
 
-    Attributes:
-        commands: Of the references, within the limits, (N, 4).
-        corrections: Nominal, of what flew last and of each block, (b + 1, 4).
-        motion, speeds: Nominal, (N + 1, 13) and (N + 1, 4).
-        drive: Of the nominal motion.
-        transition: Of the deviations.
-        responses: (N + 1, 12, 4 b).
-        means, levels: Of `deviations.respond`, (b, N) and (b, N + 1).
-    """
-
-    commands: Array
-    corrections: Array
-    motion: Array
-    speeds: Array
+    commands: Array  # of the references, within the limits, (N, 4)
+    corrections: Array  # nominal: the last one flown, then of each block, (b + 1, 4)
+    motion: Array  # nominal, (N + 1, 13)
+    speeds: Array  # nominal, squared, (N + 1, 4)
     drive: Drive
     transition: Transition
-    responses: Array
-    means: Array
-    levels: Array
+    responses: Array  # (N + 1, 12, 4 b)
+    means: Array  # of `deviations.respond`, (b, N)
+    levels: Array  # of `deviations.respond`, (b, N + 1)
 
 
 class Kind(NamedTuple):
-    """QPs of one kind.
-
-    Attributes:
-        problem: What they share.
-        work: Is filled by each.
-        qp: Within the rotors' limits alone.
-        limited: With the soft limits, too.
-    """
+    """QPs of one kind."""
 
     problem: Problem
     work: Workspace
-    qp: Qp
-    limited: Qp
+    qp: Qp  # within rotor limits
+    limited: Qp  # with soft limits, too
 
 
 @compiled
@@ -105,18 +79,15 @@ def begin(
     battery: Packed,
     now: Packed,
 ) -> None:
-    """Fill `now`, the `Now`, where a plan begins, but for the other limits of the force.
+    """Fill the start of a plan, except the other limits of the force.
 
     Args:
-        rigid: Of `Observed`.
+        rigid, estimate: From `Observed`.
         speeds: Rotor speeds, parts of the largest, (4,).
-        estimate: Of `Observed`.
-        expected: Squared speeds expected from now on, (n, 4): the power that they take limits those that can be had.
-        least: Squared speed of rotors that idle.
+        expected: Squared speeds from now on, (n, 4), whose power limits the available ones.
+        least: Squared speed at idle.
         open_v: Voltage of the battery without load.
         max_n: Largest thrust.
-        battery: `BatteryNumbers`, packed.
-        now: Is filled.
     """
     it = now[0]
     put(rigid, it.rigid)
@@ -131,13 +102,12 @@ def begin(
 
 @compiled
 def along(force: Array, measured: Array) -> tuple[float, float]:
-    """Return how much of a force, ENU, (3,), is along the body's z axis, and all of it; `measured` is of `Observed`."""
+    """Return the component of a force, ENU, (3,), along body z, and its length; `measured` as in `Observed`."""
     return dot(force, measured[6:]), norm(force)
 
 
 @compiled
 def limit_first(now: Packed, most: float, steps: int) -> None:
-    """Limit the largest squared speed of the first steps."""
     for step in range(min(steps, now[0].limits.shape[0])):
         now[0].limits[step, 1] = min(now[0].limits[step, 1], most)
 
@@ -151,14 +121,10 @@ def first_angles(target: Packed) -> tuple[float, float, float]:
 
 @compiled
 def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
-    """Fill the QP within the rotors' limits.
+    """Fill the QP within the rotor limits.
 
-    Args:
-        now: The `Now`, where the plan begins.
-        target: The `Target`.
-        last: Commands of the last plan, from now on, (n, 4); (0, 4) without one.
-        vehicle: The `Model`.
-        kind: The `Kind`; its `work` and `qp` are filled, but for G and h.
+    `last` are commands of the previous plan from now on, (n, 4), or (0, 4) without one; `now`, `target`, `vehicle`,
+    `kind` the packed `Now`, `Target`, `Model` and `Kind`.
     """
     it = kind[0]
     _expect(now[0], target[0], last, vehicle, it)
@@ -169,7 +135,7 @@ def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Pa
 def condense_on_path(
     now: Packed, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
 ) -> None:
-    """Fill the QP in which the speed along the path is free, too; see `condense`."""
+    """Fill the QP with free speed along the path; see `condense`."""
     it = kind[0]
     _expect(now[0], target[0], last, vehicle, it)
     fill_slides(path, effects, it.work.responses)
@@ -185,7 +151,7 @@ def _price_errors(target: Target, kind: Kind) -> None:
 
 @inlined
 def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) -> None:
-    """Fill the nominal motion, how it responds, and the bounds."""
+    """Fill the nominal motion, its responses, and the bounds."""
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
     commands, corrections = work.commands, work.corrections
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)
@@ -202,9 +168,9 @@ def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) 
 
 @compiled
 def ease(commands: Array, starts: Integers, limits: Array) -> None:
-    """Make the commands of the references vary within half of the rotors' range in each block.
+    """Limit the variation of the references' commands in each block to half of the rotors' range.
 
-    A block has one correction: where references that cannot be followed ask for both ends of the range, it has none.
+    A block has one correction: commands at both ends of the range would leave it no room.
     """
     for block in range(starts.shape[0] - 1):
         begin, end = starts[block], starts[block + 1]
@@ -224,7 +190,8 @@ def ease(commands: Array, starts: Integers, limits: Array) -> None:
 def carry_over(last: Array, commands: Array, starts: Integers, corrections: Array) -> None:
     """Fill the correction of each block, and before them the first again, (b + 1, 4).
 
-    It is the mean of what the last plan commands from now on, (n, 4), and then goes on with, beyond `commands`, (N, 4).
+    Each is the mean over its block of the previous plan's commands, (n, 4), the last one repeated, minus `commands`,
+    (N, 4).
     """
     for block in range(starts.shape[0] - 1):
         corrections[block + 1] = 0.0
@@ -238,15 +205,15 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 @compiled
 def is_free(kind: Packed, z: Array) -> bool:
-    """Write the `free_minimum` of the QP within the rotors' limits, (n,); return whether it is the solution."""
+    """Write the `free_minimum` of the QP within rotor limits, (n,); return whether it is the solution."""
     return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, z)
 
 
 @compiled
 def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
-    """Write the minimum of the cost alone, (n,), by Cholesky's factors; whether it is that within all bounds.
+    """Write the unconstrained minimum, (n,), by Cholesky factors; return whether it is within all bounds.
 
-    Speeds along the path are taken at their upper bounds, where they are as long as the vehicle can keep the time.
+    Speeds along the path stay at their upper bounds, which are optimal while the vehicle is on time.
     """
     n, inputs = z.shape[0], z.shape[0] // blocks
     first_speed = ROTORS if inputs > ROTORS else n
@@ -293,17 +260,14 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
 
 @compiled
 def is_beyond(kind: Packed, z: Array) -> bool:
-    """Whether the plan that z, (n,), stands for goes beyond a soft limit at a step that is checked."""
+    """Whether the plan by z, (n,), exceeds a soft limit at a checked step."""
     it = kind[0]
     return exceeds(it.work.motion, it.work.responses, z, it.problem)
 
 
 @compiled
 def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> int:
-    """Write commands and states of the plan that z, (n,), stands for, see `Plan`; return how many bounds bind in it.
-
-    `psi` is that now, unwrapped.
-    """
+    """Write commands and states of the plan by z, (n,), from yaw `psi`, unwrapped; return its active bounds."""
     starts, work, qp = kind[0].problem.starts, kind[0].work, kind[0].qp
     corrections = work.corrections[1:].copy()
     inputs = z.shape[0] // corrections.shape[0]
@@ -321,7 +285,6 @@ def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> 
 
 @compiled
 def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) -> None:
-    """Write commands, (N, 4), plus the correction of each one's block, (b, 4)."""
     for block in range(corrections.shape[0]):
         for step in range(starts[block], starts[block + 1]):
             for rotor in range(ROTORS):
@@ -330,7 +293,7 @@ def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) 
 
 @compiled
 def limit(kind: Packed) -> None:
-    """Fill the QP that has the soft limits, too, from that which has not."""
+    """Copy the QP without soft limits, and add them."""
     it = kind[0]
     free, qp = it.qp, it.limited
     moved = free.f.shape[0]
@@ -342,7 +305,7 @@ def limit(kind: Packed) -> None:
 
 @compiled
 def count_active(kind: Packed, z: Array) -> tuple[int, int]:
-    """Return how many soft limits of tilt and of rates have nothing left at z, (n,)."""
+    """Return the numbers of active soft limits of tilt and of rates at z, (n,)."""
     qp, tilts, rates = kind[0].limited, 0, 0
     for row in range(qp.h.shape[0]):
         left = qp.h[row]

@@ -1,4 +1,4 @@
-"""From references, or a demanded attitude, to what a plan is to follow."""
+"""From references, or a demanded attitude, to the target of a plan."""
 
 from typing import NamedTuple
 
@@ -20,23 +20,16 @@ _STILL_M_S = 1e-3
 
 
 class Wanted(NamedTuple):
-    """What a plan is to follow.
+    """The target of a plan."""
 
-    Attributes:
-        target: At each sample.
-        record: The same, packed.
-        force: Of the thrust now, N, ENU, (3,): where it must point.
-        path: The nominal speeds along the path; None where they are not free.
-    """
-
-    target: Target
-    record: Packed
-    force: Array
-    path: PathNow | None = None
+    target: Target  # at each sample
+    record: Packed  # packed `target`
+    force: Array  # to align thrust with now, N, ENU, (3,)
+    path: PathNow | None = None  # nominal speeds along the path, if free
 
 
 class TargetBuilder:
-    """Builds what plans are to follow."""
+    """Builds the targets of plans."""
 
     def __init__(self, guidance: Guidance, path: PathSettings, mpc: WholeMpc) -> None:
         self._guidance, self._path, self._mpc = guidance, path, mpc
@@ -51,20 +44,20 @@ class TargetBuilder:
         self._near, self._flat = (it.position, it.velocity, it.acceleration), _flat_of(it)
 
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
-        """Return what follows references at their times, until that of the next is asked for; `now` is the `Now`."""
+        """Return the target of references by the clock; `now` is the packed `Now`."""
         (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
         feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
         return Wanted(self._target, self._record, force)
 
     def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
-        """Return what follows references at the path times of the last plan.
+        """Return the target of references at the path times of the previous plan.
 
-        What the rotors are asked for beforehand is that of the speed now, held; at the end, that of the speed there.
+        Feed-forward is that of the present speed, held; at the end, that of the final speed.
 
         Args:
             references: From path time on.
-            last: Speeds of the last plan from now on, (k,); None without one: then it begins at the vehicle's.
-            lag_s: By which path time is behind the clock.
+            last: Speeds of the previous plan from now on, (k,).
+            lag_s: Lag of path time behind the clock.
         """
         n, h, guidance, mpc, path = self._samples, self._guidance.interval_s, self._guidance, self._mpc, self._path
         limits = now.force
@@ -91,14 +84,14 @@ class TargetBuilder:
         return Wanted(target, self._record, force, PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
-        """Return the speed along the path, (1,), at which the vehicle moves; the references' own where they stand."""
+        """Return the vehicle's speed along the path, (1,); 1 where the references stand still."""
         along, velocity = references.velocity_enu_m_s[0].copy(), now.rigid[3:6].copy()
         squared = dot(along, along)
         speed = dot(velocity, along) / squared if squared > _STILL_M_S * _STILL_M_S else 1.0
         return np.array([min(max(speed, self._path.min_speed), upper)])
 
     def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
-        """Return what follows a demanded attitude and a thrust, which is kept within what the rotors can make."""
+        """Return the target of a demanded attitude and thrust, within the limits of the rotors."""
         n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         feed_forward.stand(angles, thrusts_n, limits, flat)
