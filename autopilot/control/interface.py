@@ -23,7 +23,7 @@ class Preview(NamedTuple):
     """The references that a control law takes at each control sample.
 
     Attributes:
-        interval_us: Time between two references, µs, counted from the start of the present interval.
+        interval_us: Time between two references, µs; the first is at the start of the present interval.
         samples: Number of references.
     """
 

@@ -55,9 +55,11 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def where(self) -> str:
+        """Name in error messages."""
         return self.file or f"profile {self.name}"
 
     def table(self, controller: str) -> dict[str, Any]:
+        """Return the settings of a control law; empty for an unknown one."""
         return self.controllers.get(controller, {})
 
     def replace(self, key: str, value: Any) -> "Profile":
