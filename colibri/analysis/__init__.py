@@ -1,4 +1,4 @@
-"""What a flight left behind, joined, judged, drawn, tabled."""
+"""Recordings of a flight: joined, judged, drawn, tabled."""
 
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,6 @@
 """Consistency of an estimator's errors with its covariance: NEES and NIS against the bounds of χ².
 
-Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, section 5.4: over
-independent flights, the sum of normalised errors squared is χ² of as many degrees of freedom as there are numbers.
+Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, section 5.4.
 """
 
 from typing import NamedTuple
@@ -15,12 +14,7 @@ NAVIGATION = 9
 
 
 class Errors(NamedTuple):
-    """True less estimated, at one instant, with the covariance that the filter gives it.
-
-    Attributes:
-        error: Position m ENU, velocity m/s ENU, attitude as a rotation vector in the estimated body frame, rad, (9,).
-        covariance: (9, 9).
-    """
+    """True minus estimated position, m, velocity, m/s, ENU, and attitude, rad, body, with covariance (9, 9)."""
 
     error: Array
     covariance: Array
@@ -32,18 +26,17 @@ class Errors(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Between which the mean over independent flights lies."""
+    """Bounds of the mean over independent flights."""
 
     lower: float
     upper: float
 
     def hold(self, mean: float) -> bool:
-        """Whether a mean lies between them."""
         return self.lower <= mean <= self.upper
 
 
 def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
-    """Return where the mean of χ² of `numbers` degrees of freedom over `flights` lies, with probability `level`."""
+    """Return bounds of the mean of χ² with `numbers` degrees of freedom over `flights`."""
     from scipy.special import chdtri  # slow to load, and scipy.stats, which has it too, slower: a report does without
 
     lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))

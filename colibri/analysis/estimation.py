@@ -1,4 +1,4 @@
-"""Estimation errors of a flight against the truth, and tracking errors by the estimate."""
+"""Errors of a flight's estimate against the truth, and its tracking errors."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -19,22 +19,19 @@ from colibri.mavlink.ulog.log import TopicReader
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
 MEASURED = KINDS
-"""Each kind of measurement that there is, and how many numbers it has; a vehicle need not have all."""
+"""Number of components of each kind of measurement; a vehicle need not have all."""
 _UPPER = np.triu_indices(NAVIGATION)
 _COVARIANCE = slice(11, 56)
 
 
 class Estimation(NamedTuple):
-    """Errors of the estimate at every control sample from some time on, and of the filter ten times a second.
+    """Errors of the estimate at n control samples, and of the filter at m checks.
 
     Attributes:
-        position_m: Estimated less true, ENU, (3, n).
-        attitude_rad: Roll, pitch and yaw, estimated less true, (3, n).
+        position_m, attitude_rad: Estimated minus true, ENU and roll, pitch, yaw, (3, n).
         control_m: Distance of the estimate from the reference, (n,).
-        nees: Normalised estimation error squared of the filter: position, velocity and attitude together, (m,).
-        nis: Sums of the normalised innovations squared up to then, a row for each of `kinds`, (k, m).
-        accepted: How many innovations these are, (k, m).
-        kinds: What of `MEASURED` the vehicle has, k names.
+        nees: Position, velocity and attitude together, (m,).
+        nis, accepted: Cumulative NIS and number of innovations, a row for each of `kinds`, (k, m).
     """
 
     position_m: Array
@@ -46,10 +43,7 @@ class Estimation(NamedTuple):
     kinds: tuple[str, ...]
 
     def figures(self) -> dict[str, Any]:
-        """Return the root mean squares that a report has, and mean NEES and NIS; None if it ended too early for them.
-
-        NIS is given in parts of the number of numbers: 1 if the errors match the covariance.
-        """
+        """Return RMS values, mean NEES, and mean NIS over its degrees of freedom."""
         if not len(self.control_m) or not len(self.nees):
             return dict.fromkeys(FIGURES)
         x, y, z = self.position_m
@@ -72,18 +66,14 @@ class Estimation(NamedTuple):
 
 
 class _Common(NamedTuple):
-    """Which rows of a log, (n,), and which of the plant's, (p,), are of the same instants."""
+    """Masks of the rows of a topic, (n,), and of the truth, (p,), at common instants."""
 
     said: NDArray[np.bool_]
     true: NDArray[np.bool_]
 
 
 def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estimation:
-    """Compare estimate and filter of a flight, from `start_s` on, with the truth.
-
-    Raises:
-        RecordingError: Nothing was estimated.
-    """
+    """Compare estimate and filter of a flight, from `start_s` on, with the truth."""
     errors = _read_errors(plan, log, start_s)
     if not errors.size and not _common(log, ESTIMATE, -np.inf).said.any():
         raise RecordingError("the flight ended before there was an estimate")
@@ -95,7 +85,7 @@ def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estim
 
 
 def _read_errors(plan: FlightPlan, log: TopicReader, start_s: float) -> Array:
-    """Return by how much each estimate is off in position and attitude, and how far off it tracks, (7, n)."""
+    """Return errors of position and attitude, and distance to the reference, (7, n)."""
     common = _common(log, ESTIMATE, start_s)
     errors, lags, first = np.empty((7, np.count_nonzero(common.said))), read_lags(log), 0
     for said, true in _beside_truth(log, ESTIMATE, common):
@@ -110,7 +100,7 @@ def _read_errors(plan: FlightPlan, log: TopicReader, start_s: float) -> Array:
 
 
 def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
-    """Return of each check of the filter the normalised estimation error squared, and columns, (1 + columns, m)."""
+    """Return the NEES of each check, and some of its columns, (1 + columns, m)."""
     parts = [np.empty((1 + len(columns), 0))]
     for checks, truth in _beside_truth(log, FILTER, _common(log, FILTER, start_s)):
         nees = [_errors(check, true).nees() for check, true in zip(checks, truth, strict=True)]
@@ -119,14 +109,12 @@ def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
 
 
 def _common(log: TopicReader, topic: Topic, start_s: float) -> _Common:
-    """Return which rows of a topic and which of the truth are of the same instants, from `start_s` on."""
     (said_s,), (true_s,) = (read_series(log, each, "t") for each in (topic, TRUTH))
     late = said_s >= start_s
     return _Common(late & at_times(said_s, true_s), at_times(true_s, said_s[late]))
 
 
 def _beside_truth(log: TopicReader, topic: Topic, common: _Common) -> Iterator[tuple[Array, Array]]:
-    """Yield the rows of a topic, and the truth, of the instants that both have; in blocks, two arrays of as many."""
     truth = Rows(log, TRUTH, common.true)
     for said in read_blocks(log, topic, common.said):
         yield said, truth.take(len(said))
@@ -140,7 +128,7 @@ def _angles_off(estimated: list[float], true: list[float]) -> Vector:
 
 
 def _errors(check: Array, real: Array) -> Errors:
-    """Return true less estimated; attitude as a rotation vector in the estimated body frame."""
+    """Return true minus estimated; attitude as a rotation vector in the estimated body frame."""
     u, v, w, _, _, _, *place = real[1:10].tolist()
     rw, rx, ry, rz = real[10:14].tolist()
     ew, ex, ey, ez = check[7:11].tolist()
@@ -154,5 +142,4 @@ def _errors(check: Array, real: Array) -> Errors:
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))

@@ -1,4 +1,4 @@
-"""The topics of a ULog for other tools: MCAP, which Foxglove plays; a table of each topic as CSV or Parquet."""
+"""Export a ULog: MCAP for Foxglove, or a table of each topic as CSV or Parquet."""
 
 import csv
 import re
@@ -29,21 +29,16 @@ _LOG_SCHEMA = {
         **{name: {"type": "string"} for name in ("message", "name", "file")},
     },
 }
-"""Of `foxglove.Log`, which Foxglove has a panel for."""
+"""Schema of `foxglove.Log`, a panel of Foxglove."""
 _LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)
 """Foxglove's level of each severity of a status text."""
 
 
 class ExportError(Error):
-    """A log cannot be exported; the message is the one line that a user needs."""
+    """A log cannot be exported."""
 
 
 def read_log(log: Path) -> "ULog":
-    """Return a ULog as pyulog reads it.
-
-    Raises:
-        ExportError: There is none, or what reads it is not installed.
-    """
     with _needed("pyulog", "export"):
         from pyulog import ULog
     try:
@@ -56,11 +51,7 @@ def read_log(log: Path) -> "ULog":
 
 
 def write_mcap(log: "ULog", path: Path) -> Path:
-    """Write all topics as messages of JSON with their schemas, status texts as `foxglove.Log`; return the path.
-
-    Raises:
-        ExportError: What writes it is not installed.
-    """
+    """Write all topics as JSON messages with their schemas, status texts as `foxglove.Log`."""
     with _needed("mcap", "export"):
         from mcap.writer import Writer
     with path.open("wb") as file:
@@ -76,12 +67,11 @@ def write_mcap(log: "ULog", path: Path) -> Path:
 
 
 def log_file(path: Path) -> Path:
-    """Return the log at a path, or in the folder of a flight."""
     return path / FILE if path.is_dir() else path
 
 
 def write_flight_tables(path: Path, folder: Path) -> bool:
-    """Write the topics that are Colibri's own as tables, `plant.csv` and so on; return whether the log has them."""
+    """Write Colibri's own topics as tables, if the log has them."""
     try:
         log = FlightFile(path)
     except (OSError, LogFormatError):
@@ -100,7 +90,7 @@ def write_flight_tables(path: Path, folder: Path) -> bool:
 
 
 def write_csv(log: "ULog", folder: Path) -> Path:
-    """Write a table of each topic but Colibri's own, `vehicle_attitude.csv` and so on; return the folder."""
+    """Write a table of each topic but Colibri's own."""
     own = {topic.name for topic in FLIGHT_TOPICS}
     for name, topic, _ in _topics(log):
         if name in own:
@@ -113,11 +103,6 @@ def write_csv(log: "ULog", folder: Path) -> Path:
 
 
 def write_parquet(log: "ULog", folder: Path) -> Path:
-    """Write a table of each topic, `vehicle_attitude.parquet` and so on; return the folder.
-
-    Raises:
-        ExportError: What writes it is not installed.
-    """
     with _needed("pyarrow", "parquet"):
         from pyarrow import table
         from pyarrow.parquet import write_table
@@ -128,7 +113,6 @@ def write_parquet(log: "ULog", folder: Path) -> Path:
 
 @contextmanager
 def _needed(module: str, extra: str) -> Iterator[None]:
-    """Say which extra brings a module that is not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -141,7 +125,6 @@ def _table(folder: Path, name: str) -> Path:
 
 
 def _topics(log: "ULog") -> Iterator[tuple[str, Any, dict[str, Any]]]:
-    """Yield name, data and JSON schema of each topic; a second one of the same name has its number behind it."""
     for topic in log.data_list:
         name = f"{topic.name}_{topic.multi_id}" if topic.multi_id else topic.name
         yield name, topic, _schema(_tree(topic.data), [column.dtype for column in topic.data.values()])
@@ -173,7 +156,7 @@ def _texts(log: "ULog", channel: int) -> Iterator[tuple[int, int, Any]]:
 
 
 def _tree(names: dict[str, Any]) -> dict[str, Any]:
-    """Return the places of columns such as `esc[0].esc_rpm` as they are nested: `{"esc": {"0": {"esc_rpm": 3}}}`."""
+    """Return the places of columns such as `esc[0].esc_rpm` as nested objects."""
     tree: dict[str, Any] = {}
     for place, name in enumerate(names):
         *above, last = re.findall(r"[^.\[\]]+", name)
@@ -185,7 +168,6 @@ def _tree(names: dict[str, Any]) -> dict[str, Any]:
 
 
 def _filled(tree: Any) -> Callable[[tuple[Any, ...]], Any]:
-    """Return what makes a message of a row: objects, and lists where names are numbers."""
     if isinstance(tree, int):
         return lambda row: row[tree]
     parts = {name: _filled(part) for name, part in tree.items()}

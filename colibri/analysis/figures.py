@@ -1,4 +1,4 @@
-"""The figures of a flight: what they show as data, and one function for each kind of plot."""
+"""The figures of a flight: their contents as data, and one function for each kind of plot."""
 
 import gc
 from collections.abc import Iterable, Iterator
@@ -26,13 +26,13 @@ _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
 _NOTHING = 1e-12
 _PLAIN = (-2, 4)
-"""Powers of ten of numbers that are written without one."""
+"""Powers of ten written without exponent."""
 _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
 
 class Style(NamedTuple):
-    """How a curve is drawn: colour, width in points, dashes of matplotlib."""
+    """Colour, width and dashes of a curve."""
 
     color: str
     width_pt: float
@@ -48,10 +48,7 @@ AXES = (Style("#0072B2", 4.0), Style("#E69F00", 2.4), Style("#000000", 1.0))
 
 
 class Curve(NamedTuple):
-    """One series in a panel, named in the legend if it has a label.
-
-    A held one keeps each value from the sample before to its own, as a recording's inputs do.
-    """
+    """One series in a panel; a `held` one keeps each value from the previous sample to its own, as inputs do."""
 
     series: str
     label: str
@@ -60,10 +57,7 @@ class Curve(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Curves over time: the quantity and its unit, what is drawn (the first lowest), and from when to when.
-
-    A quantity that cannot be negative is drawn from zero, so that a ripple does not look like more than it is.
-    """
+    """Curves over time, the first lowest."""
 
     quantity: str
     curves: tuple[Curve, ...]
@@ -72,7 +66,7 @@ class Panel(NamedTuple):
 
 
 class TimeFigure(NamedTuple):
-    """Panels over time, row by row; file name without suffix, and what the title calls it."""
+    """Panels over time, row by row."""
 
     name: str
     subject: str
@@ -80,7 +74,6 @@ class TimeFigure(NamedTuple):
 
 
 def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
-    """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
     paths = []
     for name, figure in figures_of(flown, plan):
         paths += write_figure(figure, plan.out / name)
@@ -90,7 +83,6 @@ def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
 
 
 def figures_of(flown: FigureSeries, plan: FlightPlan) -> Iterator[tuple[str, Figure]]:
-    """Yield the name of each figure of a flight, and the figure, drawn when it is asked for."""
     flight = f"{shortened(plan.spec.track)}, {plan.flown_by}"
     yield "trajectory", draw_trajectory(flown.in_space(), f"{flight}: trajectory")
     series = flown.over_time()
@@ -99,7 +91,6 @@ def figures_of(flown: FigureSeries, plan: FlightPlan) -> Iterator[tuple[str, Fig
 
 
 def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
-    """Return the figures over time that every flight gets."""
     end_s = float(series["t"][-1])
     start = (0.0, START_S) if end_s >= 2.0 * START_S else None
     settled = (SETTLED_AFTER_S, end_s) if end_s > SETTLED_AFTER_S else None
@@ -114,22 +105,20 @@ def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
 
 
 def followed(name: str, quantity: str, *, held_reference: bool = False) -> Panel:
-    """Return the panel of a series with its reference, named `<name>_ref`, underneath."""
+    """Return the panel of a series above its reference, named `<name>_ref`."""
     return Panel(quantity, (Curve(f"{name}_ref", "reference", REFERENCE, held_reference), Curve(name, "flown")))
 
 
 ANGLES = [followed(name, f"{sign} (°)", held_reference=True) for name, sign in zip(ATTITUDE, "φθψ", strict=True)]
 INPUTS = [Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT]
-"""Panels of every flight: its attitude with its reference, and thrust and moments."""
+"""Panels of every flight: attitude with its reference, and thrust and moments."""
 
 
 def beside(panels: Iterable[Panel], span_s: tuple[float, float] | None) -> tuple[tuple[Panel, ...], ...]:
-    """Return one row a panel, with its enlargement of `span_s` beside it if there is one."""
     return tuple((panel, panel._replace(span_s=span_s)) if span_s else (panel,) for panel in panels)
 
 
 def draw_times(series: Series, description: TimeFigure, title: str) -> Figure:
-    """Draw panels over time; the legend stands above them."""
     labelled = any(curve.label for row in description.rows for panel in row for curve in panel.curves)
     figure, grid = axes_grid(len(description.rows), len(description.rows[0]), TOP_IN if labelled else _TITLE_IN)
     for axes_row, panels in zip(grid, description.rows, strict=True):
@@ -142,7 +131,7 @@ def draw_times(series: Series, description: TimeFigure, title: str) -> Figure:
 
 
 def draw_trajectory(series: Series, title: str) -> Figure:
-    """Draw position and reference in space, to scale unless an axis would be too short to read."""
+    """Draw position and reference in space, to scale unless an axis would be too short."""
     figure = Figure(figsize=(_WIDTH_IN, 6.8), dpi=_DPI)
     # Depth sorting would draw the reference over the path in places.
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
@@ -156,13 +145,12 @@ def draw_trajectory(series: Series, title: str) -> Figure:
 
 
 def shortened(name: str) -> str:
-    """Return a name that fits into a title: of one that is too long, its beginning and its end."""
+    """Cut the middle of a name too long for a title."""
     half = _MAX_NAME_CHARS // 2
     return name if len(name) <= _MAX_NAME_CHARS else f"{name[:half]}…{name[-half:]}"
 
 
 def write_figure(figure: Figure, path: Path, formats: Iterable[str] = ("png",)) -> list[Path]:
-    """Write a figure to `path` with the suffix of each format; return what was written."""
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in formats]
     for written in paths:
         figure.savefig(written)
@@ -190,10 +178,7 @@ def _error_panels(series: Series) -> list[Panel]:
 def axes_grid(
     rows: int, columns: int, top_in: float, row_in: float = _ROW_IN, *, share: bool = True
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with axes that `share` the abscissa of their column.
-
-    Fixed margins draw twice as fast as a layout.
-    """
+    """Return a figure with axes; fixed margins draw twice as fast as a layout."""
     height_in = top_in + rows * row_in + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
     figure = Figure(figsize=(_WIDTH_IN, height_in), dpi=_DPI)
     column_in = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN - (columns - 1) * _COLUMN_GAP_IN) / columns
@@ -230,7 +215,7 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
 
 
 def round_ticks(intervals: int) -> MaxNLocator:
-    """Return a locator of round numbers, which take less room than those between them."""
+    """Return a locator of round numbers, which have short labels."""
     return MaxNLocator(intervals, steps=[1, 2, 5, 10])
 
 
@@ -239,17 +224,13 @@ def _width_in(axes: Axes) -> float:
 
 
 def line_style(style: Style) -> dict[str, Any]:
-    """Return the arguments of matplotlib's `plot` that draw a line so."""
     # Wide lines would otherwise reach past their first and last sample.
     ends = {"solid_capstyle": "butt"}
     return {"color": style.color, "linewidth": style.width_pt, "linestyle": style.dashes} | ends
 
 
 def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
-    """Put title and legend, in one row or in so many columns, above the axes, where they hide no data; each label once.
-
-    Legends fill column by column.
-    """
+    """Put title and legend above the axes, each label once."""
     pairs = (axes.get_legend_handles_labels() for axes in figure.axes)
     labelled = {label: handle for handles, labels in pairs for label, handle in zip(labels, handles, strict=True)}
     put_title(figure, title)
@@ -266,13 +247,11 @@ def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
 
 
 def put_title(figure: Figure, title: str) -> None:
-    """Put a title above the axes."""
     top = 1.0 - 0.1 / figure.get_figheight()
     figure.text(0.2 / _WIDTH_IN, top, title, va="top", fontsize="large", fontweight="bold", parse_math=False)
 
 
 def _scale(axes: Any) -> bool:
-    """Make the axes as long as their ranges, but none shorter than a part of the longest; return whether none was."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     ranges /= ranges.max()
     lengths = np.maximum(ranges, _FLATTEST)

@@ -1,4 +1,4 @@
-"""`--fail-above`: limits on numbers of a flight's report, for those who fly in continuous integration."""
+"""`--fail-above`: limits on numbers of a flight's report, for continuous integration."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
@@ -16,18 +16,17 @@ KEYS = (
     *("qp_iterations.mean", "qp_iterations.p99", "qp_iterations.max"),
     *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
 )
-"""Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is the sum of them."""
+"""Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is their sum."""
 
 
 class Limit(NamedTuple):
-    """The largest value that a number of the report may have."""
+    """Largest permitted value of a number in the report."""
 
     key: str
     value: float
 
 
 def limit(text: str) -> Limit:
-    """Read a limit of the command line, `[KEY=]VALUE`."""
     key, equals, value = text.rpartition("=")
     if equals and key not in KEYS:
         raise ArgumentTypeError(unknown("key", key, KEYS))
@@ -38,7 +37,7 @@ def limit(text: str) -> Limit:
 
 
 def exceeded(limits: Iterable[Limit], report: Mapping[str, Any]) -> list[str]:
-    """Return in words each limit that a report exceeds, or of which it knows nothing."""
+    """Describe each limit that a report exceeds, or does not contain."""
     found = []
     for key, value in limits:
         flown = of_report(report, key)
@@ -50,7 +49,7 @@ def exceeded(limits: Iterable[Limit], report: Mapping[str, Any]) -> list[str]:
 
 
 def of_report(report: Mapping[str, Any], key: str) -> Any:
-    """Return the number of a report that a key names, a table before its dot, of a table their sum; None for none."""
+    """Return a number of a report, or the sum of a table."""
     found: Any = report
     for part in key.split("."):
         found = None if found is None else found[part]

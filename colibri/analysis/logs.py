@@ -1,4 +1,4 @@
-"""The topics of a flight, read in blocks: the memory for that does not grow with the flight."""
+"""Read a flight's topics in blocks, in bounded memory."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,16 +18,11 @@ _NUMBERS = msgspec.json.Encoder()
 
 
 class RecordingError(InFlightError):
-    """The log holds no flight."""
+    """The log contains no flight."""
 
 
 def log_of(folder: Path) -> FlightFile:
-    """Return the log in the folder of a flight.
-
-    Raises:
-        RecordingError: There is none: the flight ended before its first frame.
-        LogFormatError: It is no log of a flight of this version.
-    """
+    """Open the log in the folder of a flight."""
     try:
         return FlightFile(folder / FILE)
     except FileNotFoundError as error:
@@ -35,13 +30,7 @@ def log_of(folder: Path) -> FlightFile:
 
 
 def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None = None) -> Iterator[Array]:
-    """Yield the rows of a topic in their order, in blocks (k, columns) of at least one.
-
-    Args:
-        log: Of the flight.
-        topic: The topic.
-        wanted: Which of the rows are wanted, (n,), none after them; None for all.
-    """
+    """Yield the rows of a topic, or the masked ones, in blocks (k, columns), k > 0."""
     first = 0
     for block in log.blocks(topic):
         if wanted is not None:
@@ -53,14 +42,14 @@ def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None
 
 
 def read_series(log: TopicReader, topic: Topic, *columns: str) -> list[Array]:
-    """Return some columns of a topic, each with the numbers of all rows, (n,)."""
+    """Return some columns of a topic, each (n,)."""
     places = [topic.names.index(column) for column in columns]
     parts = [np.empty((len(columns), 0)), *(block[:, places].T for block in log.blocks(topic))]
     return list(np.concatenate(parts, axis=1))
 
 
 def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
-    """Return which of some times (n,) are, to the microsecond, among instants that are in their order, (n,)."""
+    """Return the mask of times that are, to the microsecond, among sorted instants, (n,)."""
     instants_us = np.append(instants_s, np.nan)
     np.round(np.multiply(instants_us, 1e6, out=instants_us), out=instants_us)
     found = np.empty(len(times_s), dtype=np.bool_)
@@ -72,10 +61,7 @@ def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
 
 
 def csv_rows(table: Array) -> bytes:
-    """Return rows as lines of CSV, numbers with every bit.
-
-    JSON has the same numbers in a fraction of the time that `repr` takes, but for those that are not finite.
-    """
+    """Encode rows with every bit; JSON is much faster than `repr`, but has only finite numbers."""
     rows = table.tolist()
     if np.isfinite(table).all():
         return _NUMBERS.encode(rows)[2:-2].replace(b"],[", b"\n") + b"\n"
@@ -83,15 +69,13 @@ def csv_rows(table: Array) -> bytes:
 
 
 class Rows:
-    """The rows of a topic, as many at a time as are asked for."""
+    """The rows of a topic, in portions of any size."""
 
     def __init__(self, log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None = None) -> None:
-        """Take the rows that `read_blocks` yields."""
         self._blocks = read_blocks(log, topic, wanted)
         self._rest: Array = np.empty((0, len(topic.names)))
 
     def take(self, count: int) -> Array:
-        """Return the next `count` rows, (count, columns); fewer at the end of the log."""
         parts = [self._rest]
         missing = count - len(self._rest)
         while missing > 0 and (block := next(self._blocks, None)) is not None:

@@ -1,4 +1,4 @@
-"""Whether a vehicle was lost, why and when: by where it truly was."""
+"""Detect the loss of a vehicle, from its true motion."""
 
 from typing import NamedTuple
 
@@ -11,32 +11,26 @@ from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import Vehicle
 
 LOST_M = 5.0
-"""A vehicle further off its reference once settled is lost."""
+"""A settled vehicle further from its reference is lost."""
 _TOUCHED_S = 1.0
-"""Touching the ground for so long below its reference it is lost, though it may leave it again."""
+"""Longest contact with the ground below the reference before the vehicle counts as lost."""
 _TURNING_S = 1.0
-"""One that begins upside down may be so again for a moment while it recovers."""
+"""A vehicle that begins upside down may be so again during its recovery."""
 _INSTANT_S = 1e-6
 
 
 class Lost(NamedTuple):
-    """A vehicle that was lost.
-
-    Attributes:
-        at_s: Simulated time at which that began.
-        why: Where it was then and how, or what ended its flight.
-    """
+    """A loss: simulated time of its beginning, and its description."""
 
     at_s: float
     why: str
 
 
 def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
-    """Return why a vehicle was lost that flew until the end of its flight; None if it was not.
+    """Judge a completed flight; one under ground stations is never lost.
 
-    It is if it lies or drags along the ground below its reference, if it ends upside down, or if it is further than
-    `LOST_M` off its reference once settled; in a flight too short for that, if it ends that much further off than it
-    began. Where ground stations command, the track is not what it shall fly, and it is never lost.
+    A vehicle is lost if it lies or drags along the ground below its reference, ends upside down, or is further than
+    `LOST_M` from its reference once settled; in a shorter flight, if it ends that much further away than it began.
     """
     if plan.spec.gcs:
         return None
@@ -56,12 +50,11 @@ def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
 
 
 def ground_contact_s(vehicle: Vehicle, flight: FlightSeries) -> float | None:
-    """Return how long a vehicle touched the ground, s, after it had first left it; None where there is no ground."""
+    """Return the time on the ground after the first lift-off."""
     return None if vehicle.ground is None else _lasted_s(_touches_again(flight), flight)
 
 
 def _touches_again(flight: FlightSeries) -> NDArray[np.bool_]:
-    """Return at which samples it touches the ground that it had left, (n,)."""
     again: NDArray[np.bool_] = flight.touches & np.logical_or.accumulate(~flight.touches)
     return again
 
@@ -71,7 +64,6 @@ def _lasted_s(holds: NDArray[np.bool_], flight: FlightSeries) -> float:
 
 
 def _grounded(flight: FlightSeries) -> int | None:
-    """Return the sample at which a vehicle came down that should be higher; the first if it never took off."""
     if flight.touches.all():
         return 0 if flight.aloft[-1] else None
     down = _touches_again(flight) & flight.aloft
@@ -80,7 +72,6 @@ def _grounded(flight: FlightSeries) -> int | None:
 
 
 def _upside_down(flight: FlightSeries) -> int | None:
-    """Return the sample since which a vehicle is upside down that began upright; one that did not may take a second."""
     t, upright = flight.t, flight.upright >= 0.0
     if upright[-1] or not upright.any():
         return None
@@ -89,7 +80,6 @@ def _upside_down(flight: FlightSeries) -> int | None:
 
 
 def _far_off(flight: FlightSeries) -> int | None:
-    """Return the sample since which a vehicle is too far off its reference when that counts; None if it never is."""
     off_m = flight.position_error_m
     settled = flight.t >= SETTLED_AFTER_S - _INSTANT_S
     far = off_m > (LOST_M if settled.any() else off_m[0] + LOST_M)

@@ -1,4 +1,4 @@
-"""What is kept of a flight: `flight.csv` and `report.json`; or a report alone, of a flight in memory."""
+"""Results of a flight: `flight.csv` and `report.json`, or a report in memory."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -26,14 +26,7 @@ TABLE, REPORT = "flight.csv", "report.json"
 
 
 class Outcome(NamedTuple):
-    """What came of a flight.
-
-    Attributes:
-        report: None where it ended before its first control sample.
-        log: Its topics.
-        error: That ended it early; None if it came to its end.
-        failure_text: The content of `failure.txt`; empty if it came to its end.
-    """
+    """Result of a flight; `report` is `None` before its first control sample, `error` the cause of an early end."""
 
     report: Report | None
     log: TopicReader
@@ -42,23 +35,17 @@ class Outcome(NamedTuple):
 
     @property
     def failure(self) -> str:
-        """Why it came to an early end; empty if it did not."""
+        """Reason of an early end."""
         return self.failure_text.partition("\n")[0]
 
     @property
     def lost(self) -> str:
-        """Why the vehicle was lost; empty if it was not."""
+        """Reason of the vehicle's loss."""
         return self.failure or (self.report and self.report["lost"]) or ""
 
 
 def fly_to_its_end(plan: FlightPlan, *, for_viewers: bool = False, failure_file: str = FAILURE) -> Outcome:
-    """Fly and judge, also a flight that ends early; in memory, or for two processes in a temporary folder.
-
-    Args:
-        plan: What to fly.
-        for_viewers: As of a `TopicLog`.
-        failure_file: What `failure.txt` is called where it will lie.
-    """
+    """Fly and judge, also a flight that ends early."""
     if plan.spec.link != "udp":
         log = MemoryLog(for_viewers=for_viewers)
         try:
@@ -81,7 +68,6 @@ def fly_to_its_end(plan: FlightPlan, *, for_viewers: bool = False, failure_file:
 
 
 def _early(plan: FlightPlan, log: TopicReader, error: InFlightError, text: str) -> Outcome:
-    """Return what came of a flight that came to an early end."""
     found = None
     with suppress(RecordingError):
         found = report_of(plan, log, None, text.partition("\n")[0])
@@ -95,24 +81,17 @@ def report_of(
     failure: str | None = None,
     *others: Callable[[Samples], None],
 ) -> Report:
-    """Return the report of a flight; one that came to an early end is lost by its `failure`.
-
-    `others` are handed each part of the flight on the way: what draws it, say.
-
-    Raises:
-        RecordingError: There is no complete control sample in it.
-    """
     flight = read_flight(FlightReader(plan, log), *others)
     return report(plan, log, summary, flight, _lost(plan, flight, failure))
 
 
 def keep_flight(plan: FlightPlan, summary: Summary, *others: Callable[[Samples], None]) -> Report:
-    """Write `flight.csv` and `report.json` of a flight that came to its end; return the report; see `report_of`."""
+    """Write `flight.csv` and `report.json` of a completed flight."""
     return _write_outcome(plan, summary, None, *others)
 
 
 def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | None:
-    """Write what there is of a flight that came to no end; a report only where it is known `why`: it is lost then."""
+    """Write the table of an incomplete flight, and its report if `why` is known."""
     with suppress(RecordingError, LogFormatError, OSError):
         if why is not None:
             return _write_outcome(plan, None, why)
@@ -122,7 +101,6 @@ def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | Non
 
 
 def files_of(plan: FlightPlan, report: Report | None, log: TopicReader) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file of a flight that has its log in memory, but for its figures."""
     yield PROVENANCE, encoded_provenance(plan)
     yield FILE, b"".join(log.encoded())
     if report is not None:

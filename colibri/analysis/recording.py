@@ -1,4 +1,4 @@
-"""What a flight left behind: truth and decisions, joined into one row a control sample."""
+"""Truth and decisions of a flight, joined into one row for each control sample."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -35,19 +35,16 @@ _SAME_S = 1e-7
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Consecutive control samples of a flight, one row each.
+    """Consecutive control samples of a flight, one row each; the m decisions led to all rows but the first.
 
     Attributes:
-        table: Columns as in `COLUMNS`, (n, 27). A row holds the state at its time and the inputs that led to it, with
-            the references they were computed for; the first row of a flight the start.
-        qp_status: How each QP ended, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,). The m decisions
-            are those that led to the rows: one for each row but the first of a flight.
-        fallback: What decided in its place, as in `colibri.autopilot.control.interface.FALLBACK_CODES`, (m,).
-        solve_time_us: Time of each QP, (m,).
-        control_step_us: Time of each control step, (m,).
-        slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
-        active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
-        qp_iterations: That each QP's solver took; nan where there was none, or it does not say, (m,).
+        table: Columns as in `COLUMNS`, (n, 27). A row holds the state at its time, the inputs that led to it, and their
+            references; the first row of a flight is the start.
+        qp_status: Result of each QP, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,).
+        fallback: Source of a decision, as in `colibri.autopilot.control.interface.FALLBACK_CODES`, (m,).
+        slack: Planned excess of soft limits, in units of each limit, (m,).
+        active: Active constraints of each kind, as in `interface.Active`, (m, 4).
+        qp_iterations: nan if unknown, (m,).
     """
 
     table: Array
@@ -69,17 +66,17 @@ class Samples:
 
     @property
     def position_error_m(self) -> Array:
-        """Distance to the reference of the same instant, or of the path time then, (n,)."""
+        """Distance to the reference of the same instant or path time, (n,)."""
         error: Array = np.linalg.norm(self.columns(("x", "y", "z")) - self.columns(POSITION_REFERENCE), axis=1)
         return error
 
 
 @dataclass(frozen=True, slots=True)
 class Recording(Samples):
-    """A whole flight in memory: at 125 Hz 0.04 MB a simulated second, and while it is read twice that.
+    """A whole flight in memory: at 125 Hz 0.04 MB a simulated second, and twice that during reading.
 
     Attributes:
-        path_lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
+        path_lag_s: Last lag of path time; `None` for a control law on the clock.
         trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 
@@ -88,41 +85,24 @@ class Recording(Samples):
 
 
 class Lags(NamedTuple):
-    """By which path time is behind the clock at the m decisions of a flight.
-
-    Attributes:
-        decided_s: Time of each, s, (m,).
-        lag_s: The lag then, s, (m,); not a number for a control law that keeps to the clock.
-    """
+    """Lag of path time behind the clock at each decision, s, (m,); nan for a control law on the clock."""
 
     decided_s: Array
     lag_s: Array
 
     def first(self, count: int) -> "Lags":
-        """Return those of the first decisions."""
         return Lags(self.decided_s[:count], self.lag_s[:count])
 
 
 class FlightReader:
-    """Truth and decisions of a flight, joined part by part: a flight of any length in some MB of memory.
-
-    Attributes:
-        plan: Of the flight.
-        log: What is read.
-        samples: How many control samples there are, the start among them.
-        path_lag_s: As of a `Recording`.
-    """
+    """Joins truth and decisions of a flight part by part, in some MB of memory."""
 
     def __init__(self, plan: FlightPlan, log: TopicReader | None = None) -> None:
-        """Read what joins them: some 20 bytes a control sample.
-
-        Args:
-            plan: Of the flight.
-            log: Of the flight; None for that in the plan's folder.
+        """Read the times that join them; the default log is in the plan's folder.
 
         Raises:
-            RecordingError: There is no complete control sample in it.
-            LogFormatError: It is no log of a flight of this version.
+            RecordingError: The log lacks a complete control sample.
+            LogFormatError: The log is of another version.
         """
         self.plan = plan
         self.log = log_of(plan.out) if log is None else log
@@ -142,11 +122,10 @@ class FlightReader:
 
     @property
     def trajectory_sha256(self) -> str:
-        """As of a `Recording`, once all parts are read."""
+        """Complete after the last part."""
         return self._states.hexdigest()
 
     def __iter__(self) -> Iterator[Samples]:
-        """Yield all control samples in their order, in parts of at least one."""
         self._states = sha256()
         decided = Rows(self.log, DECISION)
         frames, yaw_rad, begins = 0, self.plan.start_yaw_rad, True
@@ -161,7 +140,7 @@ class FlightReader:
                 yield part
 
     def _part(self, samples: Array, decisions: Array, yaw_rad: float) -> Samples:
-        """Join rows of the plant with the decisions that led to them, the last yaw before them being `yaw_rad`."""
+        """Join rows of the plant with the decisions that led to them."""
         start_reference = [0.0, 0.0, self.plan.start_yaw_rad]
         begins = len(decisions) < len(samples)
         columns = [
@@ -185,7 +164,6 @@ class FlightReader:
 
 
 def read_recording(plan: FlightPlan, log: TopicReader | None = None) -> Recording:
-    """Join truth and decisions, all in memory; arguments and errors are those of `FlightReader`."""
     reader = FlightReader(plan, log)
     parts = list(reader)
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)}
@@ -193,38 +171,35 @@ def read_recording(plan: FlightPlan, log: TopicReader | None = None) -> Recordin
 
 
 def read_lags(log: TopicReader) -> Lags:
-    """Return by which path time was behind the clock at each decision of a flight."""
     return Lags(*read_series(log, DECISION, "t", "path_lag_s"))
 
 
 def path_times(times_s: Array, lags: Lags) -> Array:
-    """Return the path time at each of some times, s, (n,): it lags behind the clock as it did at the last decision."""
+    """Return the path times of some times, s, with the lag of the last decision."""
     rows = np.searchsorted(lags.decided_s, times_s + _SAME_S) - 1
     times: Array = times_s - np.nan_to_num(lags.lag_s[np.maximum(rows, 0)])
     return times
 
 
 class TableWriter:
-    """Writes the table of a flight as CSV, part by part; numbers keep every bit."""
+    """Writes the table of a flight as CSV."""
 
     def __init__(self, file: IO[bytes]) -> None:
-        """Write the names of the columns."""
         self._file = file
         file.write((",".join(COLUMNS) + "\n").encode())
 
     def add(self, part: Samples) -> None:
-        """Append the rows of a part."""
         self._file.write(csv_rows(part.table))
 
 
 def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:
-    """Return which of the plant's times are those of decisions, or that until which the last of them has been held."""
+    """Mask of the plant's rows at control samples, plus the end of the last hold."""
     held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant_s[-1])
     return at_times(plant_s, np.concatenate([decided_s, held_s]))
 
 
 def _inputs(vehicle: Vehicle, rotors: Array) -> Array:
-    """Return thrust and moments of rotor speeds (n, 4), (n, 4)."""
+    """Return thrust and moments of rotor speeds (n, 4)."""
     squared = rotors**2
     if len(squared) == 1:  # a product with one row takes another way through BLAS, and its bits would be others
         squared = np.vstack([squared, squared])
@@ -233,7 +208,7 @@ def _inputs(vehicle: Vehicle, rotors: Array) -> Array:
 
 
 def _euler(quaternions: Array, yaw_rad: float) -> Array:
-    """Return phi, theta and psi, (n, 3), psi by continuity from `yaw_rad`."""
+    """Return phi, theta and psi, (n, 3), psi continuous from `yaw_rad`."""
     angles = []
     for qw, qx, qy, qz in quaternions.tolist():
         phi, theta, psi = euler_from_quaternion((qw, qx, qy, qz))

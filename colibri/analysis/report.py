@@ -1,4 +1,4 @@
-"""How well a flight went: `report.json`, and the table that a person reads."""
+"""Quality of a flight: `report.json`, and the table for people."""
 
 import json
 from math import degrees
@@ -28,11 +28,7 @@ _SMALL_M = 0.01
 def report(
     plan: FlightPlan, log: TopicReader, summary: Summary | None, flight: FlightSeries, lost: Lost | None
 ) -> Report:
-    """Return the figures of a flight; one that came to an early end has no summary.
-
-    Errors are distances to the reference of the same instant, or of the path time then; effort is
-    the RMS of the moment U2..U4, N m.
-    """
+    """Return the figures of a flight; errors are at the same instant or path time, effort is the RMS of U2..U4, N m."""
     wall_time_s, frames, resent = summary or (None, None, None)
     error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])
@@ -83,24 +79,20 @@ def report(
 
 
 def _estimation_figures(plan: FlightPlan, log: TopicReader, settled: Array) -> Report:
-    """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
     if plan.spec.feedback is Feedback.SENSORS:
         return read_estimation(plan, log, SETTLED_AFTER_S).figures()
     return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
 
 
 def encoded_report(figures: Report) -> bytes:
-    """Return the report as JSON."""
     return f"{json.dumps(figures, indent=2)}\n".encode()
 
 
 def write_report(figures: Report, path: Path) -> None:
-    """Write the report as JSON."""
     path.write_bytes(encoded_report(figures))
 
 
 def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> None:
-    """Show the report as a table on standard output; its title has the track, and `flown_by` or the profile."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -113,8 +105,6 @@ def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> 
 
 
 def report_rows(figures: Report) -> dict[str, str]:
-    """Return what of the report a person is shown, in words."""
-
     def times(name: str) -> str:
         return f"{figures[name]['p50']:.0f} / {figures[name]['p99']:.0f} µs"
 
@@ -139,7 +129,6 @@ def report_rows(figures: Report) -> dict[str, str]:
 
 
 def _estimation_rows(figures: Report) -> dict[str, str]:
-    """Return the rows that only a flight on sensors has."""
     if figures["estimation_rmse_m"] is None:
         return {}
     off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
@@ -155,7 +144,7 @@ def _estimation_rows(figures: Report) -> dict[str, str]:
 
 
 def length(metres: float) -> str:
-    """Return a length as a person reads it: small ones in mm."""
+    """Format a length, small ones in mm."""
     return f"{metres:.4f} m" if metres >= _SMALL_M else f"{1e3 * metres:.3f} mm"
 
 
@@ -164,7 +153,6 @@ def _counts(codes: NDArray[np.int8], names: dict[str, int]) -> dict[str, int]:
 
 
 def _iterations(taken: NDArray[np.float32]) -> dict[str, float] | None:
-    """Return the mean and quantiles of how many iterations QPs took; None where none is known."""
     known = taken[~np.isnan(taken)].astype(np.float64)
     return {"mean": float(known.mean()), **_quantiles(known)} if len(known) else None
 

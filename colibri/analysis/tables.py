@@ -1,4 +1,4 @@
-"""Tables for people (Markdown) and for programs (CSV)."""
+"""Tables as Markdown for people, and as CSV for programs."""
 
 import csv
 from collections.abc import Sequence
@@ -12,10 +12,7 @@ _MAX_WIDTH = 400
 
 
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -> list[Path]:
-    """Write a table as `path` with the suffixes md and csv; return what was written.
-
-    The first `names` columns are names, the others numbers.
-    """
+    """Write `path` with suffixes md and csv; the first `names` columns are names."""
     texts = {"md": markdown(headings, rows, names=names), "csv": comma_separated(headings, rows)}
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in texts]
     for written, text in zip(paths, texts.values(), strict=True):
@@ -24,13 +21,11 @@ def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -
 
 
 def markdown(headings: Row, rows: Sequence[Row], *, names: int) -> str:
-    """Return a Markdown table, its first columns names, the others numbers."""
     lines = [headings, (*["---"] * names, *["---:"] * (len(headings) - names)), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def print_table(title: str, headings: Row, rows: Sequence[Row], *, names: int) -> None:
-    """Show a table on standard output, a line below each first name; wider than the terminal, its lines wrap."""
     from rich.console import Console
     from rich.table import Table
 
@@ -44,7 +39,6 @@ def print_table(title: str, headings: Row, rows: Sequence[Row], *, names: int) -
 
 
 def comma_separated(headings: Row, rows: Sequence[Row]) -> str:
-    """Return a table as CSV; what holds a comma is quoted."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows([headings, *rows])
     return text.getvalue()

@@ -1,3 +1,3 @@
-"""How fast it flies: each stage of a control step, flights at several rates, ground stations served."""
+"""Speed of Colibri: stages of a control step, flights at several rates, ground stations."""
 
 __all__: list[str] = []  # the command line's; nothing to import

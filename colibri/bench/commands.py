@@ -1,4 +1,4 @@
-"""Whole commands as a user types them: each figure beside its goal and, in turn, that of another checkout."""
+"""Whole commands with their goals, alternating with another checkout's."""
 
 import json
 import subprocess
@@ -24,15 +24,7 @@ _OF_REPORT: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 class Goal(NamedTuple):
-    """A figure of a command.
-
-    Attributes:
-        name: Of the command.
-        options: Of `colibri fly`.
-        duration_s: Simulated; None for that of the command line.
-        figure: `RTF`, of which more is better, or one of which less is.
-        goal: To be reached on two quiet cores.
-    """
+    """A figure of a command: `RTF`, to be exceeded, or a time, to be undercut, on two quiet cores."""
 
     name: str
     options: tuple[str, ...]
@@ -56,7 +48,6 @@ COMMANDS = len({goal.name for goal in GOALS})
 
 
 def colibri_of(checkout: Path) -> Path:
-    """Return the command of another checkout, or end the process with one line where it is not set up."""
     command = checkout / ".venv" / "bin" / "colibri"
     if not command.is_file():
         fail(f"--against {checkout}: there is no .venv/bin/colibri in it; make setup there makes it")
@@ -64,10 +55,7 @@ def colibri_of(checkout: Path) -> Path:
 
 
 def command_figures(duration_s: float, runs: int, report: Report, against: Path | None = None) -> dict[str, Any]:
-    """Run every command, and that of the checkout `against` after it; ratios are taken within a run.
-
-    A ratio is ours to theirs.
-    """
+    """Run every command, and after it that of `against`; ratios, ours to theirs, are within a run."""
     ours, theirs = [sys.executable, "-m", "colibri"], against and [str(colibri_of(against))]
     here: Samples = {}
     there: Samples = {}
@@ -82,7 +70,6 @@ def command_figures(duration_s: float, runs: int, report: Report, against: Path 
 
 
 def _take(command: list[str], goals: list[Goal], duration_s: float, samples: Samples) -> None:
-    """Run one command; append the figures of its goals."""
     _, options, own_s, *_ = goals[0]
     with TemporaryDirectory() as folder:
         flight = ["fly", *options, "--duration", str(own_s or duration_s), "--quiet", "--no-figures", "--out", folder]

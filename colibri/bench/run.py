@@ -1,4 +1,4 @@
-"""`colibri bench`: how long each stage takes, and how much faster than real time it flies."""
+"""`colibri bench`: time of each stage, and real-time factors."""
 
 import argparse
 import json
@@ -32,7 +32,6 @@ _QUANTILES = {"p50": "p50", "p99": "p99"}
 
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
-    """Measure what the command line says, flights beside `peer`; print tables, write JSON; return the exit code."""
     wanted = args.only or ["stages", "flights", "sensors", "simulators", "ground", "commands"]
     if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
         fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")
@@ -67,7 +66,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def parts(wanted: list[str], runs: int, *, beside: bool, against: bool = False) -> int:
-    """Return how often `report` will be called."""
+    """Count the calls of `report`."""
     stages = 1 + len(BLOCKS) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
     ground = len(CHANNELS) + 2 * runs
@@ -80,7 +79,6 @@ def parts(wanted: list[str], runs: int, *, beside: bool, against: bool = False) 
 
 @contextmanager
 def _progress(parts: int) -> Iterator[Report]:
-    """Show on standard error what is being measured."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
@@ -160,7 +158,6 @@ def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
 
 
 def _columns(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str]) -> Table:
-    """Return a table with some figures of each row, by their headings."""
     table = _table(title, list(columns))
     for name, figure in rows.items():
         table.add_row(name, *(_number(figure[key]) for key in columns.values()))
@@ -180,7 +177,7 @@ def _number(value: float) -> str:
 
 
 def _check_writable(path: Path) -> None:
-    """End now rather than after minutes where the figures could not be written."""
+    """Fail before minutes of measurement."""
     try:
         with path.open("a", encoding="utf-8"):
             pass

@@ -1,4 +1,4 @@
-"""What sensors cost: a step of the estimator, and a flight on them beside one on the state."""
+"""Cost of sensors: a step of the estimator, and flights on sensors and on the state."""
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -25,14 +25,13 @@ FRAME_US, CONTROL_US = 4_000, 8_000
 LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
 _MIN_S = 4.0
-"""A flight on sensors begins with a second of standing; the estimator then is still loading what it needs."""
+"""A flight on sensors begins with a second of standing, while the estimator loads."""
 _SETTLED = 500
-"""Frames that are not counted: the estimator aligns itself, and meets everything for the first time."""
+"""Frames left out: the estimator aligns, and its code is loaded."""
 FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 
 def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:
-    """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
     duration_s = max(duration_s, _MIN_S)
     report("estimator")
     fly_plan(plan_of(profile, folder, duration_s, "memory", Feedback.SENSORS))
@@ -57,7 +56,6 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 
 
 def sensor_frames(inputs: Iterable[InputRecord]) -> Iterator[SensorFrame]:
-    """Read the sensors' frames of a flight's log, in order."""
     end = AutopilotEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US, now_s=0.0, feedback=Feedback.SENSORS)
     for _, kind, datagram in inputs:
         received = end.receive(datagram, 0.0) if kind == Kind.FRAME else None
@@ -66,7 +64,6 @@ def sensor_frames(inputs: Iterable[InputRecord]) -> Iterator[SensorFrame]:
 
 
 def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], bool]) -> list[float]:
-    """Return how long the estimator takes for each frame, µs."""
     vehicle = load_vehicle(profile.simulation.vehicle)
     assert vehicle.sensors is not None, "the profile's vehicle has sensors"
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)

@@ -1,4 +1,4 @@
-"""What ground stations cost: the time to serve them after a frame, and what is left of it in the control step."""
+"""Cost of ground stations: time to serve them after a frame, and the control step beside them."""
 
 import socket
 from collections.abc import Iterable
@@ -28,17 +28,16 @@ from colibri.plant.process.start import nudged
 from colibri.plant.simulation.plant import PlantBuilder
 
 CHANNELS = (0, 1, 2, 4, 8)
-"""Every other one is a ground station's, the others are an SDK's, with the streams that each gets unasked."""
+"""Alternately a ground station's and an SDK's, with their default streams."""
 KINDS = (GCS, SDK)
 STATIONS = 2
 ALONE, WATCHED = "alone", f"{STATIONS} stations"
 
 _MIN_FRAMES = 4
-"""Before these all is loaded."""
+"""Frames until all code is loaded."""
 
 
 def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:
-    """Measure both: serving in memory, control steps of two processes at real time; `report` gets what comes next."""
     plan = plan_of(profile, folder, duration_s, "udp")
     serve: dict[str, Figures] = {}
     for channels in CHANNELS:
@@ -53,10 +52,7 @@ def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 
 
 def served(plan: FlightPlan, channels: int) -> Figures:
-    """Fly in memory with so many channels open; return the time to serve them after a frame, µs, and messages a second.
-
-    The log of the flight is served as a ground station is, also where there is none.
-    """
+    """Fly in memory with open channels; return the time to serve them, with the log, after a frame, µs."""
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
     autopilot = copter_autopilot(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
     stations = autopilot.stages.stations
@@ -82,7 +78,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
 
 
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
-    """Fly as two processes, paced to the wall clock, so many ground stations connected; return the control step, µs."""
+    """Fly as two processes at real time with connected ground stations."""
     with ExitStack() as stack:
         ports = [stack.enter_context(_listening()).getsockname()[1] for _ in range(stations)]
         links = tuple(f"udpout:127.0.0.1:{port}" for port in ports)
@@ -95,12 +91,10 @@ def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
 
 
 def _listening() -> socket.socket:
-    """Return a port that takes what is sent to it, and does nothing about it."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.bind(("127.0.0.1", 0))
     return sock
 
 
 def _median(flown: list[Figures]) -> Figures:
-    """Return, of each figure of several flights, the one in the middle."""
     return {name: sorted(figures[name] for figures in flown)[len(flown) // 2] for name in flown[0]}

@@ -1,4 +1,4 @@
-"""What the plant takes to answer PX4 and ArduPilot: its servers on links that are none, from command to frame."""
+"""Time of the plant from a command of PX4 or ArduPilot to its next frame, on a link in memory."""
 
 from math import inf, sqrt
 from struct import Struct
@@ -24,41 +24,36 @@ VEHICLES = {PX4: "iris", ARDUPILOT: "hummingbird"}
 FRAMES_HZ = {PX4: 250, ARDUPILOT: 1200}
 AIR: dict[str, dict[str, str]] = {"calm": {}, "moderate turbulence": {"turbulence": "moderate", "wind": "5@270"}}
 _HIGH_UP = {"z": 100.0}
-"""Nobody flies here: the rotors turn as in hover, and what tips over must have room to fall."""
+"""The rotors turn as in hover without control; a tilting vehicle must have room to fall."""
 _LOADED_AFTER = 100
 _TRUTH_EVERY_US = 5e3
-"""As PX4 asks for it."""
+"""Interval that PX4 requests."""
 _REQUEST, _MAGIC = Struct("<HHI16H"), 18458
 _ELSEWHERE: Address = ("127.0.0.1", 1)
 
 
 class _Never(Stop):
-    """Nobody ends it."""
+    """Is never set."""
 
-    def __init__(self) -> None:
-        """Leave signals alone."""
+    def __init__(self) -> None: ...
 
     def __bool__(self) -> bool:
-        """Go on."""
         return False
 
 
 class _Silent(Status):
-    """Says nothing."""
+    """Prints no status."""
 
     def __init__(self) -> None:
-        """Have no name."""
         super().__init__("", as_json=False)
 
-    def say(self, event: str, text: str, **facts: Any) -> None:
-        """Say nothing."""
+    def say(self, event: str, text: str, **facts: Any) -> None: ...
 
 
 class _Answers(Endpoint):
-    """A link with an autopilot at its other end that answers each frame at once with what it has prepared."""
+    """A link whose autopilot answers each frame at once."""
 
     def __init__(self, answers: list[bytes]) -> None:
-        """Give one answer after the other."""
         super().__init__("", None)
         self._answers = iter(answers)
         self._waiting = next(self._answers)
@@ -66,30 +61,24 @@ class _Answers(Endpoint):
         self.times_us: list[float] = []
 
     def send(self, _datagram: bytes, _address: Address | None = None) -> None:
-        """Time the frame from its command on."""
         self.times_us.append((perf_counter() - self._answered_s) * 1e6)
         self._waiting = next(self._answers)
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return the answer, once."""
         received, self._waiting = self._waiting, b""
         self._answered_s = perf_counter()
         return [(received, _ELSEWHERE)] if received else []
 
     def receive(self, _timeout_s: float) -> tuple[bytes, Address]:
-        """Return the answer."""
         ((datagram, sender),) = self.receive_now()
         return datagram, sender
 
-    def wait(self, timeout_s: float) -> None:
-        """Do not."""
+    def wait(self, timeout_s: float) -> None: ...
 
-    def close(self) -> None:
-        """Do nothing."""
+    def close(self) -> None: ...
 
 
 def simulator_figures(duration_s: float, report: Report) -> dict[str, Any]:
-    """Time each server in calm and in turbulent air; return µs from a command to the frame that it leads to."""
     figures = {}
     for whom in VEHICLES:
         for air, options in AIR.items():
@@ -117,7 +106,6 @@ def _times_us(whom: str, air: dict[str, str], duration_s: float) -> list[float]:
 
 
 def _hover(whom: str) -> float:
-    """Return the control of each motor that carries the weight; both vehicles' controls are speeds."""
     return sqrt(px4_parameters(load_vehicle(VEHICLES[whom]))["MPC_THR_HOVER"])
 
 

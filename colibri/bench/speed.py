@@ -1,4 +1,4 @@
-"""Real-time factors: profile `flight` at several frame rates, beside a peer if there is one."""
+"""Real-time factors at several frame rates, beside a peer if there is one."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -20,17 +20,12 @@ CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
 LINKS = ("memory", "udp")
 
 _PEER_MAX_S = 2.0
-"""A peer may take longer than the time that it simulates."""
+"""A peer may be slower than real time."""
 _WARM_UP_S = 0.5
 
 
 class Peer(NamedTuple):
-    """Another simulator to measure beside.
-
-    Attributes:
-        name: Of its figures.
-        real_time_factor: Flies at so many frames a second, for so many seconds; returns simulated over wall-clock time.
-    """
+    """Another simulator: from frame rate, Hz, and duration, s, to simulated over wall-clock time."""
 
     name: str
     real_time_factor: Callable[[int, float], float]
@@ -39,10 +34,7 @@ class Peer(NamedTuple):
 def rate_figures(
     profile: Profile, folder: Path, duration_s: float, runs: int, report: Report, peer: Peer | None = None
 ) -> dict[str, Any]:
-    """Fly at every rate over every link, and the peer if there is one, one after the other in every run.
-
-    Ratios are taken within a run, so that what else the machine does weighs on both sides.
-    """
+    """Fly at every rate over every link, and the peer; ratios are within a run, under the same load."""
     report("warm up")
     plan = plan_of(profile, folder, _WARM_UP_S, "memory")
     fly_plan(plan)
@@ -63,7 +55,6 @@ def rate_figures(
 
 
 def summarised(values: Iterable[float]) -> dict[str, float]:
-    """Return minimum, median and maximum."""
     ordered = sorted(values)
     return {"min": ordered[0], "median": median(ordered), "max": ordered[-1]}
 
@@ -79,7 +70,6 @@ def _with_ratios(flown: Samples, peer: Peer | None) -> dict[str, dict[str, float
 
 
 def real_time_factor(plan: FlightPlan) -> float:
-    """Fly a plan; return simulated over wall-clock time."""
     try:
         return plan.spec.duration / fly_plan(plan).wall_time_s
     except FlightError as error:

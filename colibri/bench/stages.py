@@ -1,4 +1,4 @@
-"""How long each stage of a control step takes, measured on the very methods that fly, in a flight."""
+"""Time of each stage of a control step, measured in flight on the methods that fly."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -34,11 +34,11 @@ BLOCKS: Mapping[int, tuple[int, ...]] = {
     28: (1, 2, 3, 5, 7, 10),
     60: (1, 2, 4, 8, 15, 30),
 }
-"""For each horizon, how many steps each correction is held for: less than profile `flight`, as it, and as `path`."""
+"""Steps that each correction is held, by horizon: shorter than in profile `flight`, as there, and as in `path`."""
 PROFILE_HORIZON = 28
 
 _QPS = 100
-"""How many QPs of a flight each solver solves."""
+"""QPs of a flight for each solver."""
 _QPS_TO_WARM_UP = 5
 _MIN_SAMPLES = 50
 _REPLY_WITHIN_S = 1.0
@@ -46,7 +46,7 @@ _ECHO_ENDS_AFTER_S = 10.0
 
 
 class Stage(NamedTuple):
-    """A stage: its name, and the method or function that it is."""
+    """A stage, and its method or function."""
 
     name: str
     owner: type | ModuleType
@@ -72,14 +72,7 @@ EXCHANGE = "exchange"
 
 
 class Flight(NamedTuple):
-    """What a flight showed.
-
-    Attributes:
-        times_us: Of each call of each stage, by the stage's name.
-        qps: Some of the QPs that it solved.
-        frames: Every datagram that reached the autopilot.
-        commands: Every datagram that reached the plant.
-    """
+    """Times of each stage, some QPs, and the datagrams."""
 
     times_us: dict[str, list[float]]
     qps: list[Qp]
@@ -88,7 +81,7 @@ class Flight(NamedTuple):
 
 
 def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight:
-    """Fly the lemniscate in memory, with every stage timed from the second frame on: before that all is loaded."""
+    """Fly in memory, timing every stage once all code is loaded."""
     flight = Flight({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
     every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
     seen, flying = 0, False
@@ -117,13 +110,11 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
 
 
 def summary(times_us: Sequence[float]) -> Figures:
-    """Return median and 99th percentile, µs, and how many there were."""
     p50, p99 = np.percentile(times_us, (50, 99))
     return {"p50": float(p50), "p99": float(p99), "samples": len(times_us)}
 
 
 def stage_figures(profile: Profile, folder: Path, duration_s: float, report: Callable[[str], None]) -> dict[str, Any]:
-    """Measure all: stages over horizons, solvers over horizons, and the link; `report` gets what comes next."""
     horizons: dict[str, Any] = {}
     solvers: dict[str, dict[str, Figures]] = {}
     link: dict[str, Figures] = {}
@@ -146,7 +137,6 @@ def stage_figures(profile: Profile, folder: Path, duration_s: float, report: Cal
 
 
 def solver_figures(profile: Profile, name: str, qps: Sequence[Qp]) -> Figures:
-    """Solve a flight's QPs by another solver; return its times, and the part of them that it solved."""
     settings = profile.table(CONTROLLER)["qp"]
     solver = QpSolver(name, settings["tolerance"], settings["max_iterations"])
     for qp in qps[:_QPS_TO_WARM_UP]:
@@ -161,7 +151,7 @@ def solver_figures(profile: Profile, name: str, qps: Sequence[Qp]) -> Figures:
 
 
 def exchange_times_us(frames: Sequence[bytes], commands: Sequence[bytes]) -> list[float]:
-    """Send each frame to another process, which answers it with its command; return the round trips, µs."""
+    """Send each frame to another process, which answers with a command; return the round trips, µs."""
     here, there = Pipe()
     answering = get_context("spawn").Process(target=_answer_datagrams, args=(there, list(commands)), daemon=True)
     answering.start()
@@ -187,7 +177,6 @@ def _round_trips_us(link: UdpLink, datagrams: Sequence[bytes]) -> list[float]:
 
 
 def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
-    """Answer whatever comes with one answer after another, until nothing comes any more."""
     link = open_link("udpin:127.0.0.1:0")
     pipe.send(link.url.replace("udpin", "udpout"))
     count = 0
@@ -200,7 +189,7 @@ def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
 def _timed(
     stage: Stage, times_us: list[float], keep: Callable[..., object], flying: Callable[[], bool]
 ) -> Iterator[None]:
-    """Time every call of a method in flight, µs, but steps without a decision; `keep` gets result and arguments."""
+    """Time every call of a method in flight, but steps without a decision."""
     untimed = getattr(stage.owner, stage.method)
 
     def timed(self: Any, *args: Any, **kwargs: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Profile `flight` with other numbers, and flights with it."""
+"""Variants of profile `flight`, and flights with them."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,13 +16,11 @@ TRACK = "lemniscate"
 
 
 def with_blocks(profile: Profile, blocks: Sequence[int]) -> Profile:
-    """Return the profile with another horizon: steps that each planned correction is held for."""
     table = profile.table(CONTROLLER)
     return _with_table(profile, {**table, "plan": {**table["plan"], "blocks": list(blocks)}})
 
 
 def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Profile:
-    """Return the profile at other rates."""
     simulation = msgspec.structs.replace(profile.simulation, frame_interval_s=frame_s)
     changed = _with_table(profile, {**profile.table(CONTROLLER), "control_interval_s": control_s})
     return msgspec.structs.replace(changed, simulation=simulation)
@@ -31,7 +29,6 @@ def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Pro
 def plan_of(
     profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback = Feedback.STATE
 ) -> FlightPlan:
-    """Return the plan of a lemniscate with `profile`."""
     options = {"profile": profile, "link": link, "feedback": feedback, "duration": duration_s, "out": folder}
     return FlightPlan.of(FlightSpec.of(TRACK, **options))
 

@@ -1,15 +1,14 @@
-"""The attitude under a law that commands moments, as an uncertain loop: kinematics, Euler's equation, the rotors' lag.
+"""The attitude under a law that commands moments, as an uncertain loop (docs/certificate.md).
 
-State, 12: errors of the attitude, angles as the law's `Kinematics` have them, each before its body rate; moments M1,
-M2, M3; and those that the law remembers as last commanded. Errors to any constant attitude obey these equations.
-Nothing is linearised and nothing discretised: over an interval h, angles and rates anywhere in their ranges,
+State, 12: errors of the attitude, angles as in the law's `Kinematics`, each before its body rate; moments M1, M2, M3;
+and the remembered commands. Over an interval h
 
-    ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + κ e3 (M(h) - M) + ξ_ω     G: mean of the gyroscopic matrix, affine in p, q, r
-    Φ(h) = Φ + T (h ω + I⁻¹ (c1 M + c2 u) + ...) + ξ_Φ                T: mean of the kinematic matrix
+    ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + κ e3 (M(h) - M) + ξ_ω
+    Φ(h) = Φ + T (h ω + I⁻¹ (c1 M + c2 u) + ...) + ξ_Φ
     u = C z + ξ_u
 
-Means lie in convex hulls, and ξ, what is of second order in h, of the rotors' momentum, or of what a gain may differ,
-is bounded entry by entry. κ: rotors that are spun up turn the body the other way.
+with G and T, the mean gyroscopic and kinematic matrices, in convex hulls, ξ bounded entry by entry, and κ for the
+reaction to spinning rotors up.
 """
 
 from collections.abc import Callable
@@ -30,37 +29,28 @@ MIRRORS = (
     (-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1),
     (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1),
 )
-"""Left and right exchanged, and fore and aft: signs of the states. The rotors' momentum changes its sign, too."""
+"""Signs of the states under exchange of left and right, and of fore and aft; the rotors' momentum changes sign, too."""
 
 
 _HALF_A_TURN = 4
-"""Or more, rad: largest error of an angle that has no limit."""
+"""Bound of the error of an unlimited angle, at least half a turn, rad."""
 _STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
 """phi, theta, psi, rad, to p, q, r, rad/s."""
 
 
 class AttitudeNumbers(NamedTuple):
-    """All that the loop is made of; the numbers that a certificate holds.
+    """The numbers of a loop, as a certificate holds them.
 
     Attributes:
-        interval_s: h.
-        lag_s: Of the moments; 0 where they follow at once.
         stays: exp(-h / lag), to 16 digits.
-        inertia_kg_m2: (3,).
-        commanded: C, (2, 3, 12): moments that the law commands, and those that it then remembers as last commanded.
-        unsure: Of both, the bound of each state's part in what the law commands beyond that, (2, 3, 12).
-        angles: What the `Kinematics` need of the angles' ranges.
-        rates_rad_s: Ranges of |p|, |q|, |r|.
+        commanded: C, (2, 3, 12): commanded and remembered moments.
+        unsure: Bounds of their further dependence on each state, (2, 3, 12).
+        angles: Ranges, as the `Kinematics` need them.
         momentum_n_m_s: Range of the rotors' |h| along body z.
-        spin_s: κ Iz, of rotors that turn at the same speed.
-        spin_spread_s: By how much each moment's may differ, for they do not, (3,).
-        max_increment_n_m: Largest changes of the commands in a sample, (3,); none where they have no limit.
-        from_moments: Squared rotor speeds of moments, parts of the largest, (4, 3).
-        to_moments: Moments of squared rotor speeds, N m, (3, 4).
-        headroom: Squared speed that the thrust leaves to moments on either side, of every rotor, same parts.
-        disturbance_n_m: Range of the length |d| of the moment that disturbs.
-        angle_weight, rate_weight, increment_weight: What a sample costs: of errors, and of what the law commands beyond
-            what it remembers, (3,) each.
+        spin_s: κ Iz of rotors at one speed; `spin_spread_s` is its variation by each moment.
+        from_moments: Squared rotor speeds of moments, in units of the largest, (4, 3).
+        headroom: Squared speed that the thrust leaves to moments, same units.
+        disturbance_n_m: Largest |d|.
     """
 
     interval_s: Any
@@ -85,13 +75,7 @@ class AttitudeNumbers(NamedTuple):
 
 
 class Kinematic(NamedTuple):
-    """What ranges of angles and rates amount to in Φ' = T ω.
-
-    Attributes:
-        vertices: Of T, (v, 3, 3).
-        max_change: Largest |dT/dt|, (3, 3).
-        max_angles: Of the angles that are limited, the first ones, rad, rounded down.
-    """
+    """Bounds of Φ' = T ω: vertices of T, largest |dT/dt|, and limits of the first angles, rad, rounded down."""
 
     vertices: AnyArray
     max_change: AnyArray
@@ -102,14 +86,7 @@ Kinematics: TypeAlias = Callable[[AttitudeNumbers], Kinematic]
 
 
 class Box(NamedTuple):
-    """What the ranges amount to.
-
-    Attributes:
-        kinematic, gyroscopic: Vertices of T, (v, 3, 3), and of G without the rotors, (8, 3, 3).
-        max_kinematic, max_gyroscopic, max_change: Largest |T|, |G| and |dT/dt|, (3, 3) each.
-        beside: Largest |T - 1|, (3, 3).
-        max_angles: Of the angles that are limited, rad, rounded down.
-    """
+    """Vertices and largest entries over the ranges; `beside` is the largest |T - 1|."""
 
     kinematic: AnyArray
     gyroscopic: AnyArray
@@ -121,7 +98,6 @@ class Box(NamedTuple):
 
 
 def attitude_loop(numbers: AttitudeNumbers, number: Number, kinematics: Kinematics) -> UncertainLoop:
-    """Return the loop in floats, or exactly in fractions."""
     n = AttitudeNumbers(*(_made(value, number) for value in numbers))
     box = box_of(n, kinematics)
     eye: AnyArray = np.array([[number(float(i == j)) for j in range(_SIZE)] for i in range(_SIZE)])
@@ -150,7 +126,6 @@ def _made(value: Any, number: Number) -> Any:
 
 
 def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> Box:
-    """Return the vertices and bounds of the ranges in `n`, arrays of floats or of fractions."""
     kinematic, max_change, max_angles = kinematics(n)
     p, q, r = n.rates_rad_s
     gyroscopic = np.array([_gyroscopic(n.inertia_kg_m2, a * p, b * q, c * r) for a, b, c in product(_SIGNS, repeat=3)])
@@ -166,20 +141,19 @@ def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> Box:
 
 
 def _gyroscopic(inertia: AnyArray, p: Any, q: Any, r: Any) -> AnyArray:
-    """Return G of ω' = G ω, as `prediction.flow` has it, but for the rotors."""
     ix, iy, iz = inertia
     px, py, pz = (iy - iz) / (2 * ix), (iz - ix) / (2 * iy), (ix - iy) / (2 * iz)
     return np.array([[0, px * r, px * q], [py * r, 0, py * p], [pz * q, pz * p, 0]])
 
 
 def _rotors(n: AttitudeNumbers) -> AnyArray:
-    """Return the largest |entries| that the rotors' momentum adds to G: so small that it counts as a remainder."""
+    """Return the rotors' part of |G|, small enough to be a remainder."""
     ix, iy, _ = n.momentum_n_m_s / n.inertia_kg_m2
     return np.array([[0, ix, 0], [iy, 0, 0], [0, 0, 0]])
 
 
 def _kernels(n: AttitudeNumbers) -> tuple[Any, Any, Any, Any]:
-    """Return the integrals over h of a moment that begins at 1, and of one commanded to 1; then those of these."""
+    """Return the integrals over h of a moment that begins at 1, and of one commanded to 1; then theirs."""
     h = n.interval_s
     begun = n.lag_s * (1 - n.stays)
     begun_twice = n.lag_s * (h - begun)
@@ -187,7 +161,7 @@ def _kernels(n: AttitudeNumbers) -> tuple[Any, Any, Any, Any]:
 
 
 def _pushes(n: AttitudeNumbers, moments: AnyArray, commands: AnyArray) -> tuple[AnyArray, AnyArray]:
-    """Return what moments and commands, rows (3, k), make of rates over h, and of the rates' integral."""
+    """Return the effect of moments and commands, rows (3, k), on rates over h, and on their integral."""
     b1, b2, c1, c2 = _kernels(n)
     once, twice = b1 * moments + b2 * commands, c1 * moments + c2 * commands
     spun, spun_once = (1 - n.stays) * (commands - moments), once - n.interval_s * moments
@@ -198,7 +172,6 @@ def _pushes(n: AttitudeNumbers, moments: AnyArray, commands: AnyArray) -> tuple[
 
 
 def _transition(T: AnyArray, G: AnyArray, n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
-    """Return A, (12, 12)."""
     moments, (applied, remembered) = eye[_MOMENTS], n.commanded
     once, twice = _pushes(n, moments, applied)
     A = 0 * eye
@@ -210,7 +183,6 @@ def _transition(T: AnyArray, G: AnyArray, n: AttitudeNumbers, eye: AnyArray) -> 
 
 
 def _of_commands(n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
-    """Return what commands alone make of the state, (12, 3), with T = 1."""
     one = eye[:INPUTS, :INPUTS]
     once, twice = _pushes(n, 0 * one, one)
     B = 0 * eye[:, :INPUTS]
@@ -219,10 +191,10 @@ def _of_commands(n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
 
 
 def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
-    """Return the bounds of ξ for each of the channels, (12, 18), and by the disturbance but for its mean, (12,).
+    """Return the bounds of ξ for each channel, (12, 18), and by the disturbance without its mean, (12,).
 
-    The rates within the interval are at most W (|ω| + I⁻¹ (b1 |M| + b2 |u| + h d) + S |u - M|), W = (1 - h |G|)⁻¹
-    (Gronwall), and |T(t) - T| is at most h / 2 times the largest change of T.
+    Rates within the interval are at most W (|ω| + I⁻¹ (b1 |M| + b2 |u| + h d) + S |u - M|), W = (1 - h |G|)⁻¹
+    (Gronwall).
     """
     h, T, G = n.interval_s, box.max_kinematic, box.max_gyroscopic
     b1, b2, c1, c2 = _kernels(n)
@@ -261,7 +233,7 @@ def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
 
 
 def _inverse(matrix: AnyArray) -> AnyArray:
-    """Return the inverse of a matrix (3, 3) by its cofactors; it must be that of a Neumann series."""
+    """Invert (3, 3) by cofactors; the result must be that of a Neumann series."""
     a, b, c = matrix
     cofactors = np.array([_cross(b, c), _cross(c, a), _cross(a, b)]).T
     inverse: AnyArray = cofactors / (a @ cofactors[:, 0])
@@ -275,11 +247,7 @@ def _cross(a: AnyArray, b: AnyArray) -> AnyArray:
 
 
 def _limits(n: AttitudeNumbers, box: Box, eye: AnyArray) -> AnyArray:
-    """Return the rows of angles, rates, increments and rotors.
-
-    Angles and rates keep what they may move within an interval away from the ends of their ranges; a level attitude is
-    held: what is left of the angles is what other ones may have.
-    """
+    """Return the rows of limits; angles and rates stay away from their ends by their motion within an interval."""
     if n.headroom <= 0:
         raise RangeError("the thrust leaves the rotors nothing for moments")
     h, rates = n.interval_s, n.rates_rad_s
@@ -303,13 +271,11 @@ def _limits(n: AttitudeNumbers, box: Box, eye: AnyArray) -> AnyArray:
 
 
 def _moments(n: AttitudeNumbers) -> AnyArray:
-    """Return the largest moments within the headroom, (3,)."""
     largest: AnyArray = abs(n.to_moments).sum(axis=1) * n.headroom
     return largest
 
 
 def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
-    """Return the largest change of the rates in an interval, (3,)."""
     moments = _moments(n)
     turns: AnyArray = (moments + n.disturbance_n_m) * n.interval_s
     turns[2] += (abs(n.spin_s) * moments[2] + n.spin_spread_s @ moments) * 2
@@ -318,7 +284,6 @@ def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
 
 
 def _unsure_speeds(n: AttitudeNumbers, box: Box) -> AnyArray:
-    """Return the largest squared speeds, (2, 4), that the law commands and remembers beyond its gain."""
     largest = np.concatenate([n.rates_rad_s, _moments(n), _moments(n)])
     angles = np.concatenate([box.max_angles, [_HALF_A_TURN] * (INPUTS - len(box.max_angles))])
     beyond = n.unsure[:, :, _RATES + _MOMENTS + _COMMANDS] @ largest + n.unsure[:, :, _ANGLES] @ angles

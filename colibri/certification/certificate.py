@@ -1,4 +1,4 @@
-"""The certificate of a law: Lyapunov functions found, each checked in exact arithmetic, written down and read again."""
+"""The certificate of a law: Lyapunov functions, each checked in exact arithmetic, and their file."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,37 +13,24 @@ from colibri.certification.lyapunov import Proof
 from colibri.common.errors import Error
 
 _WORKING_PART = 0.5
-"""Of the largest scale: the nearer to it, the slower the decay and the smaller the set."""
+"""Part of the largest scale: the nearer to it, the slower the decay and the smaller the set."""
 _DIGITS = 4
 
 
 class RefusedError(Error):
-    """A law of which what is to be proven was not proven."""
+    """A law without proof."""
 
 
 class CertifiedLaw(Protocol):
-    """A law that can be certified, by the closed loops of its model and gain over any part of its ranges."""
+    """A law with a closed loop at any scale of its ranges."""
 
-    def numbers_at(self, scale: float) -> Any:
-        """Return a named tuple of the numbers of the loop whose ranges are this part of the profile's."""
+    def numbers_at(self, scale: float) -> Any: ...
 
-    def loop(self, numbers: Any, number: Number) -> UncertainLoop:
-        """Return the loop of these numbers, in floats or in fractions.
-
-        Raises:
-            RangeError: It cannot be bounded.
-        """
+    def loop(self, numbers: Any, number: Number) -> UncertainLoop: ...
 
 
 class Entry(NamedTuple):
-    """One proof, and all that it is about.
-
-    Attributes:
-        scale: Of the profile's ranges.
-        numbers: Of the loop at that scale.
-        proof: The Lyapunov function.
-        margins: What its exact check found, by the name of what was checked.
-    """
+    """A proof at a scale of the ranges, with the loop's numbers and the exact check's margins."""
 
     scale: float
     numbers: Any
@@ -52,14 +39,12 @@ class Entry(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """What is proven.
+    """The proofs of a law: for the largest ranges, and at half of their scale.
 
     Attributes:
-        largest: At the largest scale that has a common quadratic Lyapunov function.
-        decay: At half of that: the one that falls fastest.
-        invariant: The largest set that the disturbance does not make the loop leave, within all limits.
-        attractor: The smallest that all that begins there tends to.
-        terminal: A terminal weight, with which and the set a plan stays feasible and its cost falls.
+        invariant: The largest set that the disturbed loop never leaves, within all limits.
+        attractor: The smallest set that every trajectory tends to.
+        terminal: A terminal weight that keeps plans feasible and decreases their cost.
     """
 
     largest: Entry
@@ -70,15 +55,10 @@ class Certificate(NamedTuple):
 
 
 def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:
-    """Return the certificate of a law, every part of it checked.
-
-    Args:
-        law: The law.
-        least: Scale of the ranges for which there must be a Lyapunov function, at the least.
-        say: Is told what is being done.
+    """Certify a law and check every part; `least` is the smallest acceptable scale.
 
     Raises:
-        RefusedError: Something is not proven.
+        RefusedError: A part is not proven.
     """
     say("the largest ranges")
     found = lyapunov.largest_scale(lambda scale: _loop_at(law, scale), least)
@@ -106,7 +86,7 @@ def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Cert
 
 
 def margins_of(law: CertifiedLaw, name: str, numbers: Any, proof: Proof) -> dict[str, float]:
-    """Return what the exact check of the entry `name` finds: all above zero where it is proven."""
+    """Return the margins of an entry's exact check, all positive in a proof."""
     loop = law.loop(numbers, exact.exactly)
     if name in ("largest", "decay", "terminal"):
         return {"decrease": exact.decrease_margin(loop.undisturbed(), proof, weighted=name == "terminal")}
@@ -115,7 +95,6 @@ def margins_of(law: CertifiedLaw, name: str, numbers: Any, proof: Proof) -> dict
 
 
 def write(certificate: Certificate, about: dict[str, Any], path: Path) -> None:
-    """Write a certificate as JSON, with what it is about: law, conditions, and what it does not prove."""
     entries = {"about": about} | {
         name: entry._asdict() | {"numbers": entry.numbers._asdict(), "proof": entry.proof._asdict()}
         for name, entry in certificate._asdict().items()
@@ -124,7 +103,6 @@ def write(certificate: Certificate, about: dict[str, Any], path: Path) -> None:
 
 
 def read(path: Path, numbers: Callable[..., Any]) -> Certificate:
-    """Read a certificate as `write` wrote it; `numbers` is the law's named tuple."""
     entries: dict[str, dict[str, Any]] = msgspec.json.decode(path.read_bytes())
     return Certificate(**{name: _entry(numbers, **entries[name]) for name in Certificate._fields})
 
@@ -153,7 +131,6 @@ def _loop_at(law: CertifiedLaw, scale: float) -> UncertainLoop | None:
 
 
 def _why(law: CertifiedLaw, scale: float) -> str:
-    """Return why there is no Lyapunov function: a vertex that is unstable by itself, or that none was found."""
     try:
         radius = lyapunov.spectral_radius(law.loop(law.numbers_at(scale), float))
     except RangeError as error:

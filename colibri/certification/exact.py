@@ -1,7 +1,6 @@
-"""The proofs of a certificate, checked in exact arithmetic, from its numbers alone.
+"""Exact check of a certificate from its numbers alone.
 
-Nothing of what the solver computed is trusted but P and the multipliers, as the decimal numbers that are written down:
-the loop is built again from its numbers in fractions, with every vertex, and each inequality decided in fractions.
+From the solver only P and the multipliers are used, as written decimals: the loop is rebuilt in fractions.
 """
 
 from collections.abc import Iterable
@@ -16,22 +15,16 @@ from colibri.common.types import Array
 
 _ONE = np.array([Fraction(1)], dtype=object)
 _BITS = 40
-"""Of the entries of a factor."""
+"""Precision of a factor's entries."""
 
 
 def exactly(value: float) -> Fraction:
-    """Return the number that is written as `value` is, 0.1 as a tenth."""
+    """Return the number as written, 0.1 as a tenth."""
     return Fraction(repr(float(value)))
 
 
 def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False) -> float:
-    """Return the least margin of all the decreases that a proof claims, at every vertex; 0 where one is not shown.
-
-    Args:
-        loop: Of fractions.
-        proof: Its P, multipliers and sizes.
-        weighted: V falls by the stage's cost, too.
-    """
+    """Return the least margin of the decrease over all vertices; 0 without proof."""
     P, multipliers = _fractions(proof.P), _fractions(proof.multipliers)
     forms = supply(loop, _fractions(proof.sizes)).forms
     if (multipliers <= 0).any() or (_fractions(proof.sizes) <= 0).any() or not _mirrored(loop, P, multipliers, forms):
@@ -42,7 +35,7 @@ def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False
 
 
 def limit_margin(loop: UncertainLoop, proof: Proof) -> float:
-    """Return the least margin by which the set V <= 1 keeps the loop's limits; 0 where one is not shown to be kept."""
+    """Return the least margin of the limits over the set V <= 1."""
     P = _fractions(proof.P)
 
     def bordered(row: AnyArray) -> AnyArray:
@@ -52,7 +45,7 @@ def limit_margin(loop: UncertainLoop, proof: Proof) -> float:
 
 
 def supply_margin(loop: UncertainLoop, proof: Proof) -> float:
-    """Return what the decrease at V = 1 leaves of itself after all that a disturbance adds; negative: it adds more."""
+    """Return the decrease at V = 1 minus the largest increase by a disturbance."""
     multipliers = _fractions(proof.multipliers)
     constants = np.append(supply(loop, _fractions(proof.sizes)).constants, _ONE)
     added = multipliers @ constants
@@ -60,7 +53,7 @@ def supply_margin(loop: UncertainLoop, proof: Proof) -> float:
 
 
 def positive_margin(M: AnyArray) -> float:
-    """Return a μ for which M - μ diag(M) is shown to be positive definite, about half of the largest; 0 without one."""
+    """Return a proven μ with M - μ diag(M) positive definite; 0 without proof."""
     diagonal = np.diag(M).astype(float)
     if (diagonal <= 0.0).any():
         return 0.0
@@ -70,10 +63,9 @@ def positive_margin(M: AnyArray) -> float:
 
 
 def is_positive(M: AnyArray) -> bool:
-    """Return whether M is shown to be symmetric and positive definite.
+    """Prove that M is symmetric and positive definite.
 
-    With X, what floating point has for the inverse of its Cholesky factor, X M Xᵀ is about the identity. Where it is
-    strictly diagonally dominant, which integers decide, it is positive definite (Gershgorin), X is regular; so is M.
+    With X an approximate inverse factor, X M Xᵀ must be strictly diagonally dominant, in integers (Gershgorin).
     """
     if not (M == M.T).all():
         return False
@@ -94,10 +86,7 @@ def _margins(matrices: Iterable[AnyArray]) -> Iterable[float]:
 
 
 def _mirrored(loop: UncertainLoop, P: AnyArray, multipliers: AnyArray, forms: AnyArray) -> bool:
-    """Return whether the mirrors leave all as it is, so that distinct vertices are enough.
-
-    By a Schur complement the inequality depends on E and the multipliers μ of ξ only by E diag(1 / μ) Eᵀ.
-    """
+    """Whether the mirrors map the loop to itself; the inequality contains E and μ only as E diag(1 / μ) Eᵀ."""
     entered = loop.entries / multipliers[: len(forms)] @ loop.entries.T
     return all(
         (row[:, None] * matrix * row == matrix).all()

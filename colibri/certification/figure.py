@@ -1,4 +1,4 @@
-"""The figure of a certificate: its sets, and the flights that began on the border of one of them."""
+"""Figure of a certificate: its sets, and flights from the border of one."""
 
 from pathlib import Path
 
@@ -18,7 +18,6 @@ _RATE_NAMES = {P: "p (rad/s)", R: "r (rad/s)"}
 
 
 def draw(certificate: Certificate, flown: Flown, axes_names: tuple[str, ...], path: Path) -> None:
-    """Draw both sets in three planes, with flights in them, and V over time; names are those of the three angles."""
     errors = zip((PHI, THETA, PSI), axes_names, strict=True)
     names = _RATE_NAMES | {state: f"error {name} (deg)" for state, name in errors}
     figure = Figure(figsize=(8.6, 6.9), layout="constrained")

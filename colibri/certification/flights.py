@@ -1,7 +1,6 @@
-"""The attitude's nonlinear equations under a certified law, many flights at once: does any leave its set?
+"""Fly the attitude's nonlinear equations under a certified law, many flights at once.
 
-Not the LPV model: the law's own kinematics, Euler's equation with the rotors' momentum and the lag of the moments,
-integrated with Runge-Kutta 4 four times in a control interval.
+The law's own kinematics, Euler's equation with the rotors' momentum, and the lag of the moments; not the LPV model.
 """
 
 from collections.abc import Callable
@@ -23,78 +22,60 @@ _INSIDE = 1.0 - 1e-9
 _NO_LENGTH = 1e-12
 
 Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
-"""From moments and their rates, (flights, 3), to the rotors' momentum along body z, and its rate, (flights,)."""
+"""From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""
 
 
 class Conditions(NamedTuple):
-    """What a certificate is to hold for.
-
-    Attributes:
-        disturbance_n_m: Length of the moment that disturbs.
-        charge_part: Part of the battery's charge that may be taken.
-    """
+    """Conditions of a certificate: disturbing moment, and used part of the battery's charge."""
 
     disturbance_n_m: float
     charge_part: float
 
 
 class Flyer(Protocol):
-    """A law that flies the equations."""
+    """A law in flight."""
 
     def commands(self, z: Array) -> tuple[Array, Array]:
-        """Return the moments that are commanded at `z`, (flights, 12), and those that are remembered, (flights, 3)."""
+        """Return commanded and remembered moments, (flights, 3), at `z`, (flights, 12)."""
 
     def turn(self, angles: Array, rates: Array) -> Array:
-        """Return how the errors of the angles change, rad/s, (flights, 3)."""
+        """Return the rates of the angle errors, rad/s."""
 
-    def momentum(self) -> Momentum:
-        """Return what the rotors' momentum is over the next interval."""
+    def momentum(self) -> Momentum: ...
 
 
 class AttitudeLaw(CertifiedLaw, Protocol):
-    """A law of the attitude that can be certified and flown."""
+    """A law of the attitude, to be certified and flown."""
 
     @property
-    def what(self) -> str:
-        """The law, as reports call it."""
+    def what(self) -> str: ...
 
     @property
-    def not_proven(self) -> tuple[str, ...]:
-        """What is not proven of this law, beside what is of none."""
+    def not_proven(self) -> tuple[str, ...]: ...
 
     @property
-    def axes(self) -> tuple[str, str, str]:
-        """Names of the three angles."""
+    def axes(self) -> tuple[str, str, str]: ...
 
     @property
-    def conditions(self) -> Conditions:
-        """What its certificate is to hold for."""
+    def conditions(self) -> Conditions: ...
 
     @property
     def terminal_weight(self) -> Array:
         """Of the law's plans, (12, 12)."""
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
-        """Return the range of the thrust at this part of the profile's ranges."""
+        """Return the range of the thrust at a scale of the ranges."""
 
-    def ranges(self, numbers: AttitudeNumbers) -> str:
-        """Return the ranges of the angles, deg, in words."""
+    def ranges(self, numbers: AttitudeNumbers) -> str: ...
 
     def held(self, entry: Entry) -> Array:
-        """Return the largest constant |phi| and |theta|, rad, (2,), around which the set of an entry may lie."""
+        """Return the largest |phi| and |theta|, rad, around which an entry's set may lie."""
 
-    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
-        """Return the law as it flies the equations to `held`, rad, (flights, 2)."""
+    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer: ...
 
 
 class Flown(NamedTuple):
-    """Flights of one set.
-
-    Attributes:
-        states: Errors at each sample, (steps + 1, flights, 12).
-        values: V of them, (steps + 1, flights).
-        beyond_n_m: Largest moments that were commanded beyond the certified gain, (3,).
-    """
+    """Errors, (steps + 1, flights, 12), their V, and the largest commands beyond the gain, (3,)."""
 
     states: Array
     values: Array
@@ -102,15 +83,7 @@ class Flown(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """What stays the same over a control interval.
-
-    Attributes:
-        commands, disturbance_n_m: N m, (flights, 3) each.
-        inertia: (3,).
-        lag_s: Of the moments.
-        turn: See `Flyer`.
-        momentum: Of the rotors.
-    """
+    """Constants of a control interval."""
 
     commands: Array
     disturbance_n_m: Array
@@ -121,7 +94,7 @@ class Interval(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """How many flights, s of each, and the seed of all that is random in them."""
+    """Number and duration of flights."""
 
     flights: int
     duration_s: float
@@ -129,10 +102,9 @@ class Plan(NamedTuple):
 
 
 def fly(law: AttitudeLaw, entry: Entry, plan: Plan) -> Flown:
-    """Fly from points all over the border V = 1, towards attitudes that may be held, disturbed as allowed.
+    """Fly from points all over the border V = 1 to attitudes that may be held, under the largest disturbance.
 
-    The disturbing moment is as long as it may be: constant, another one at every sample, swinging at the resonance, or
-    always the one that raises V most.
+    The moment is constant, random at every sample, at the resonance, or always the worst for V.
     """
     numbers, proof = entry.numbers, entry.proof
     flights, rng = plan.flights, np.random.default_rng(plan.seed)
@@ -158,7 +130,6 @@ def fly(law: AttitudeLaw, entry: Entry, plan: Plan) -> Flown:
 
 
 def integrate(x: Array, interval: Interval, duration_s: float) -> Array:
-    """Return the states, (flights, 9), at the end of an interval that begins at `x`, (flights, 9)."""
     dt = duration_s / _SUBSTEPS
     if interval.lag_s == 0.0:
         x = np.hstack([x[:, :M1], interval.commands])
@@ -172,7 +143,6 @@ def integrate(x: Array, interval: Interval, duration_s: float) -> Array:
 
 
 def _derivative(x: Array, interval: Interval) -> Array:
-    """Return x', (flights, 9): the angles', Euler's equation, and the lag."""
     rate, moment = x[:, _RATES], x[:, M1:]
     change = np.zeros_like(x)
     if interval.lag_s:

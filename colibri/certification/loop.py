@@ -1,11 +1,9 @@
-"""A sampled closed loop that is known only to lie in a polytope: what every certificate is about.
+"""A sampled closed loop in a polytope, the subject of every certificate.
 
     z[k+1] = A z[k] + E ξ[k] + B w[k],   A in the convex hull of the vertices,
     |ξ_i| <= Σ_j N_ij |(Y z)_j| + D_i,   |w| <= 1
 
-Whatever A, ξ and w are at each sample, within these bounds: time-varying, and as bad as can be. A control law is
-certified by handing in such loops, one for each scale of the ranges that its model is scheduled by. Matrices are of
-float64 for the solver, or of `fractions.Fraction` for the check of what it found; everything here works on both.
+A, ξ and w vary arbitrarily. Matrices are float64 for the solver, or `fractions.Fraction` for the exact check.
 """
 
 from collections.abc import Callable
@@ -20,33 +18,30 @@ from colibri.common.errors import Error
 from colibri.common.types import Array
 
 AnyArray: TypeAlias = NDArray[Any]
-"""Of floats or of fractions."""
+"""Floats or fractions."""
 Number: TypeAlias = Callable[[float], Any]
-"""`float`, or `fractions.Fraction`: what numbers are made into."""
+"""`float`, or `fractions.Fraction`."""
 
 
 _DIGITS = 9
-"""To which floats are compared."""
+"""Precision of comparisons of floats."""
 
 
 class RangeError(Error):
-    """Ranges for which no loop can be bounded."""
+    """Ranges without bounds of the loop."""
 
 
 class UncertainLoop(NamedTuple):
-    """A closed loop of n states, m rows of ξ and k channels that it depends on.
+    """A closed loop of n states, m rows of ξ and k channels.
 
     Attributes:
-        vertices: A, (v, n, n).
-        entries: E, (n, m).
-        channels: Y, (k, n).
-        gains: N, (m, k), not negative.
-        offsets: D, (m,), not negative: what the disturbance adds to them.
-        disturbance: B, (n, d), of a disturbance w whose length is at most 1.
-        limits: Rows f, (l, n): |f z| <= 1 keeps the loop where its bounds hold and its actuators follow.
-        starts: States, (s, n), that a set of starts should hold, in proportion: each along one axis.
-        stage: Weight of what the law's cost counts at each sample, (n, n).
-        mirrors: Signs of states, (g, n), under each of which the polytope is its own image.
+        vertices, entries, channels: A, (v, n, n), E, (n, m), and Y, (k, n).
+        gains, offsets: N, (m, k), and D, (m,), not negative.
+        disturbance: B, (n, d).
+        limits: Rows f, (l, n): |f z| <= 1.
+        starts: Desired starts, (s, n), each along one axis.
+        stage: Stage cost, (n, n).
+        mirrors: Signs of states, (g, n), that map the polytope to itself.
     """
 
     vertices: AnyArray
@@ -61,17 +56,13 @@ class UncertainLoop(NamedTuple):
     mirrors: Array
 
     def blocks(self) -> list[list[int]]:
-        """Return the states that a Lyapunov function has to couple: those that no mirror tells apart.
-
-        With P every one of its images is a solution, and so is their mean, which couples no others.
-        """
+        """Return groups of states to couple in P: the mean over mirror images couples no others."""
         found: dict[tuple[float, ...], list[int]] = {}
         for state, signs in enumerate(self.mirrors.T.tolist()):
             found.setdefault(tuple(signs), []).append(state)
         return list(found.values())
 
     def distinct(self) -> "UncertainLoop":
-        """Return the loop without vertices that are the image of another: what is proven of that holds for them."""
         signs = np.unique(np.vstack([np.ones_like(self.mirrors[:1]), self.mirrors, self.mirrors.prod(axis=0)]), axis=0)
         kept: dict[Any, int] = {}
         for i, A in enumerate(self.vertices):
@@ -80,11 +71,9 @@ class UncertainLoop(NamedTuple):
         return self._replace(vertices=self.vertices[list(kept.values())])
 
     def undisturbed(self) -> "UncertainLoop":
-        """Return the loop without disturbance."""
         return self._replace(offsets=0 * self.offsets, disturbance=self.disturbance[:, :0]).reduced()
 
     def reduced(self) -> "UncertainLoop":
-        """Return the loop without rows of ξ that are always zero, and without channels that none depends on."""
         rows, columns = (self.gains != 0).any(axis=1) | (self.offsets != 0), (self.gains != 0).any(axis=0)
         return self._replace(
             entries=self.entries[:, rows],
@@ -95,24 +84,18 @@ class UncertainLoop(NamedTuple):
 
 
 class Supply(NamedTuple):
-    """ξ_i² <= zᵀ F_i z + g_i, which follows from the bounds on |ξ_i| by Cauchy's inequality.
-
-    Attributes:
-        forms: F, (m, n, n).
-        constants: g, (m,).
-    """
+    """ξ_i² <= zᵀ F_i z + g_i, with F, (m, n, n), and g, (m,), by Cauchy's inequality."""
 
     forms: AnyArray
     constants: AnyArray
 
 
 def _key(A: AnyArray) -> Any:
-    """Return what tells A from other matrices: exact of fractions, rounded of floats."""
     return tuple(A.ravel()) if A.dtype == object else (np.round(A, _DIGITS) + 0.0).tobytes()
 
 
 def supply(loop: UncertainLoop, sizes: AnyArray) -> Supply:
-    """Return the quadratic bounds on ξ; tight where |Y z| is in proportion to `sizes`, positive, (k,)."""
+    """Return the quadratic bounds on ξ; tight for |Y z| in proportion to `sizes`, (k,)."""
     totals = loop.gains @ sizes + loop.offsets
     weights = loop.gains / sizes
     Y = loop.channels
@@ -121,7 +104,7 @@ def supply(loop: UncertainLoop, sizes: AnyArray) -> Supply:
 
 
 def congruent(P: AnyArray, X: AnyArray) -> AnyArray:
-    """Return XᵀPX; of fractions over a common denominator, a hundred times as fast as one by one."""
+    """Return XᵀPX; fractions over a common denominator are a hundred times faster."""
     if P.dtype != object:
         product: AnyArray = X.T @ P @ X
         return product
@@ -132,7 +115,7 @@ def congruent(P: AnyArray, X: AnyArray) -> AnyArray:
 
 
 def whole(matrix: AnyArray) -> tuple[AnyArray, int]:
-    """Return a matrix of fractions as integers, and the denominator that all of them have."""
+    """Return a matrix of fractions as integers, and the common denominator."""
     below = lcm(*(entry.denominator for entry in matrix.ravel()))
     return np.vectorize(lambda entry: int(entry * below), otypes=[object])(matrix), below
 
@@ -140,10 +123,10 @@ def whole(matrix: AnyArray) -> tuple[AnyArray, int]:
 def decrease(
     loop: UncertainLoop, A: AnyArray, P: AnyArray, multipliers: AnyArray, forms: AnyArray, ratio: Any, stage: Any = 0
 ) -> AnyArray:
-    """Return the matrix (n + m + d,) * 2 that proves a decrease of V = zᵀPz over a sample where it is not negative.
+    """Return a matrix whose positive semidefiniteness proves a decrease of V = zᵀPz (S-procedure).
 
-    That is V[k+1] <= ratio V[k] - zᵀ stage z + Σ_i multipliers_i g_i + that of w, by the S-procedure. It is
-    linear in P (n, n) and the multipliers, (m,) and one of w. What all vertices A show their hull does: V is convex.
+    V[k+1] <= ratio V[k] - zᵀ stage z + Σ_i multipliers_i g_i + that of w; linear in P and the multipliers. The vertices
+    prove it for their hull, since V is convex.
     """
     n, m = len(P), len(forms)
     moved = np.hstack([A, loop.entries, loop.disturbance])

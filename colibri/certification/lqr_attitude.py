@@ -1,4 +1,4 @@
-"""The attitude's LQR of `lpv-mpc`, to which its terminal weight and fallback belong, as a law that is certified."""
+"""The attitude's LQR of `lpv-mpc`, source of its terminal weight and fallback, for certification."""
 
 from itertools import product
 from math import exp, radians, tan
@@ -24,30 +24,17 @@ from colibri.plant.vehicle.description import Vehicle
 
 _TILT = [PHI, THETA]
 _DIGITS = 10
-"""Of numbers that are chosen here: short ones keep exact arithmetic short."""
+"""Precision of chosen numbers: short ones keep exact arithmetic short."""
 
 
 class LqrAttitude:
-    """The LQR of a profile's attitude.
-
-    Attributes:
-        mpc: The law's attitude controller.
-        body: Its model of the vehicle.
-        interval_s: The control sample.
-        conditions: What its certificate is to hold for.
-        thrust_n: Of a hover, and the ends of the profile's range, N.
-    """
+    """The LQR of a profile's attitude; `thrust_n` is hover between both ends of the profile's range."""
 
     what = "LQR of the attitude of lpv-mpc"
     axes = ("φ", "θ", "ψ")
     not_proven = ("the gain of the plan itself", "the moment of rotors that are spun up")
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
-        """Take the law's numbers from the profile's `table`.
-
-        Raises:
-            SettingsError: The table is wrong.
-        """
         settings = read_settings(table, LpvMpcSettings)
         self.interval_s = settings.control_interval_s
         self._settings, self._vehicle, self.conditions = settings.attitude, vehicle, conditions
@@ -63,36 +50,29 @@ class LqrAttitude:
         self.thrust_n = (limits.min_n, hover_n, limits.max_n)
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
-        """Return the loop of these numbers, in floats or in fractions."""
         return attitude_loop(numbers, number, of_euler_angles)
 
     @property
     def terminal_weight(self) -> Array:
-        """Of the law's plans, (12, 12)."""
         return self.mpc.problem.terminal_weight
 
     def ranges(self, numbers: AttitudeNumbers) -> str:
-        """Return the ranges of the angles, deg, in words."""
         phi, theta = np.degrees(2.0 * np.arctan(numbers.angles))
         return f"{phi:.1f}, {theta:.1f}, any"
 
     def held(self, entry: Entry) -> Array:
-        """Return the largest constant |phi| and |theta|, rad, (2,), around which its set keeps all limits."""
         limits = np.asarray(self.loop(entry.numbers, float).limits, dtype=float)
         room: Array = 1.0 / limits[[0, 1], _TILT] - entry.proof.reach(np.eye(STATES + INPUTS)[_TILT])
         return room
 
     def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
-        """Return the law as it flies the equations to `held`, rad, (flights, 2)."""
         return _LqrFlyer(entry.numbers, held, rng)
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
-        """Return the range of the thrust: from that of a hover towards both ends of the profile's, by this part."""
         low, hover, high = self.thrust_n
         return hover - scale * (hover - low), hover + scale * (high - hover)
 
     def numbers_at(self, scale: float) -> AttitudeNumbers:
-        """Return the numbers of the loop whose ranges are this part of the profile's."""
         vehicle, problem, body = self._vehicle, self.mpc.problem, self.body
         rotors = vehicle.rotors
         least, most = self.thrusts_n(scale)
@@ -127,7 +107,7 @@ class LqrAttitude:
 
 
 class _LqrFlyer:
-    """Flights under the gain; trigonometric functions of the angles."""
+    """Flights under the gain."""
 
     def __init__(self, numbers: AttitudeNumbers, held: Array, rng: np.random.Generator) -> None:
         self._numbers, self._held, self._rng = numbers, held, rng
@@ -148,11 +128,10 @@ class _LqrFlyer:
 
 
 def of_euler_angles(n: AttitudeNumbers) -> Kinematic:
-    """Return T(phi, theta) [2.7] over ranges whose half angles have the tangents `n.angles`, (2,); psi is in any range.
+    """Return T(phi, theta) [2.7] for half angles with tangents `n.angles`; psi is unlimited.
 
-    T is the product of two points, (sin φ, cos φ) and (tan θ, 1 / cos θ), each on a curve that lies in a polygon: its
-    chord, and its tangents at both ends and in the middle. With the tangents of half the angles rational, so are all
-    vertices.
+    T is the product of the points (sin φ, cos φ) and (tan θ, 1 / cos θ), each within a polygon of its chord and
+    tangents. All vertices are rational.
     """
     (t, u), (p, q, r) = n.angles, n.rates_rad_s
     sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)

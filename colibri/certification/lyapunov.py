@@ -1,7 +1,6 @@
 """Quadratic Lyapunov functions of an uncertain loop, each by one semidefinite program.
 
-Boyd, El Ghaoui, Feron and Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, chapters 5
-and 6. What is found here is found in floating point, and proves nothing until `exact` has checked it.
+Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, ch. 5 and 6.
 """
 
 from collections.abc import Callable
@@ -16,28 +15,21 @@ from colibri.certification.semidefinite import Inequality, minimise
 from colibri.common.types import Array
 
 _LEAST_MARGIN = 1e-6
-"""Of a Lyapunov function that is the identity or less, in coordinates in which it is about that."""
+"""Smallest decrease of a Lyapunov function about the identity."""
 _BISECTIONS = 6
 _SET_RATIOS = (0.98, 0.95, 0.99)
 _ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)
-"""Of V from sample to sample: the first with which there is a set. Slower gives larger ones, faster smaller."""
+"""Ratios of V between samples, in order of trial. Slower gives larger sets, faster smaller."""
 _STAGE_BESIDE = 1e-6
-"""Of the limits, that a weight sees states which the stage's cost does not."""
+"""Part of the limits, so that a weight covers states without stage cost."""
 _ROUNDING = 1e-6
-"""By which matrices are more than positive semidefinite, for what the solver leaves: up to about 1e-7."""
+"""Positive definiteness demanded beyond zero, for the solver's errors of up to about 1e-7."""
 _SPARE = 1e-4
-"""Part by which whatever has to be kept is kept more than it must be, for the solver's errors."""
+"""Relative margin of all constraints, for the solver's errors."""
 
 
 class Proof(NamedTuple):
-    """What proves a decrease of V = zᵀPz, with the names of `loop.decrease`.
-
-    Attributes:
-        P: (n, n).
-        multipliers: (m,), and one of the disturbance.
-        sizes: Those of `loop.supply`, (k,).
-        ratio: Of V from a sample to the next.
-    """
+    """P, (n, n), multipliers, sizes, and ratio of a decrease of V = zᵀPz, as in `loop.decrease`."""
 
     P: Array
     multipliers: Array
@@ -45,13 +37,13 @@ class Proof(NamedTuple):
     ratio: float
 
     def reach(self, rows: Array) -> Array:
-        """Return the largest f z of each row f, (l, n), in the set V <= 1, (l,)."""
+        """Return the largest f z of each row f, (l, n), in the set V <= 1."""
         reached: Array = np.sqrt(np.einsum("li,ij,lj->l", rows, np.linalg.inv(self.P), rows))
         return reached
 
 
 class _Problem:
-    """The semidefinite programs of a loop in coordinates ζ = C z, and what they share."""
+    """Semidefinite programs of a loop in coordinates ζ = C z."""
 
     def __init__(self, loop: UncertainLoop, C: Array) -> None:
         X = np.linalg.inv(C)
@@ -74,7 +66,7 @@ class _Problem:
         self.unknowns = len(self.basis) + len(self.forms) + len(self._ones) + 1
 
     def decrease(self, ratio: float, *, margin: bool = False, stage: bool = False) -> Inequality:
-        """Return that V decreases at every vertex: by the last unknown more, or by the stage's cost."""
+        """LMI: V decreases at every vertex, by the last unknown more, or by the stage cost."""
         n, m, b = self.size, len(self.forms), len(self.basis)
         vertices, size = len(self._moved), self._moved.shape[2]
         coefficients = np.zeros((vertices, self.unknowns, size, size))
@@ -92,13 +84,11 @@ class _Problem:
         return Inequality(constant, coefficients)
 
     def spread(self) -> Array:
-        """Return the cost by which the set V <= 1 reaches out to the starts."""
         cost = np.zeros(self.unknowns)
         cost[: len(self.basis)] = [np.sum(self.starts @ B * self.starts) for B in self.basis]
         return cost
 
     def bounded(self, constant: Array, sign: float, last: Array | None = None) -> Inequality:
-        """Return constant + sign P + (the last unknown) last >= 0."""
         coefficients = np.zeros((self.unknowns, self.size, self.size))
         coefficients[: len(self.basis)] = sign * self.basis
         if last is not None:
@@ -106,7 +96,7 @@ class _Problem:
         return Inequality(constant, coefficients)
 
     def within(self, row: Array) -> Inequality:
-        """Return that |f ζ| <= 1 in the set V <= 1."""
+        """LMI: |f ζ| <= 1 in the set V <= 1."""
         n = self.size
         constant, coefficients = np.zeros((n + 1, n + 1)), np.zeros((self.unknowns, n + 1, n + 1))
         constant[:n, n] = constant[n, :n] = row * (1.0 + _SPARE)
@@ -115,20 +105,19 @@ class _Problem:
         return Inequality(constant, coefficients)
 
     def supplied(self, ratio: float) -> Inequality:
-        """Return that what a disturbance adds to V is no more than what it loses where it is 1."""
+        """LMI: at V = 1 the decrease of V outweighs the disturbance."""
         coefficients = np.zeros((self.unknowns, 1, 1))
         coefficients[len(self.basis) : -1, 0, 0] = -np.append(self.constants, self._ones)
         return Inequality(np.array([[(1.0 - ratio) * (1.0 - _SPARE)]]), coefficients)
 
     def proof(self, x: Array, ratio: float) -> Proof:
-        """Return the solution in the loop's own coordinates."""
         b = len(self.basis)
         P = self.C.T @ np.tensordot(x[:b], self.basis, 1) @ self.C
         return Proof(0.5 * (P + P.T), x[b:-1] / np.append(self._units, self._ones) ** 2, self.sizes, ratio)
 
 
 def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
-    """Return a Lyapunov function that falls by `ratio` each sample, without disturbance; None where there is none."""
+    """Find a Lyapunov function that decreases by `ratio` each sample, without disturbance."""
     C = _coordinates_of_set(loop)
     if C is None or spectral_radius(loop) ** 2 >= ratio:
         return None
@@ -140,7 +129,6 @@ def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
 
 
 def fastest(loop: UncertainLoop) -> Proof | None:
-    """Return the Lyapunov function that falls fastest, by bisection."""
     best = contraction(loop, 1.0)
     low, high = spectral_radius(loop) ** 2, 1.0
     for _ in range(_BISECTIONS if best else 0):
@@ -151,15 +139,11 @@ def fastest(loop: UncertainLoop) -> Proof | None:
 
 
 def spectral_radius(loop: UncertainLoop) -> float:
-    """Return the largest modulus that an eigenvalue of a vertex has: from 1 on the loop is unstable."""
     return float(np.abs(np.linalg.eigvals(loop.vertices)).max())
 
 
 def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float) -> tuple[float, Proof] | None:
-    """Return the largest scale of the ranges, from `least` up to 1, that has a Lyapunov function, and that function.
-
-    By bisection, for a smaller box lies in a larger one; None where even the least scale has none.
-    """
+    """Find the largest scale of the ranges, by bisection: smaller boxes lie in larger ones."""
 
     def found_at(scale: float) -> Proof | None:
         loop = loop_at(scale)
@@ -177,17 +161,17 @@ def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float
 
 
 def invariant_set(loop: UncertainLoop) -> Proof | None:
-    """Return the largest set V <= 1, within all limits, that no disturbance makes the loop leave."""
+    """Find the largest set V <= 1 that the disturbed loop never leaves, within all limits."""
     return _first(loop, _SET_RATIOS, _set_program)
 
 
 def attractor(loop: UncertainLoop) -> Proof | None:
-    """Return the smallest set V <= 1 that every trajectory tends to, whatever the disturbance does."""
+    """Find the smallest set V <= 1 that every disturbed trajectory tends to."""
     return _first(loop, _ATTRACTOR_RATIOS, _attractor_program)
 
 
 def terminal_weight(loop: UncertainLoop) -> Proof | None:
-    """Return the least weight S with which V = zᵀSz falls by no less than the stage's cost, without disturbance."""
+    """Find the least S with a decrease of zᵀSz by the stage cost, without disturbance."""
     C = _coordinates(loop, loop.stage + _STAGE_BESIDE * np.diag(np.diag(loop.limits.T @ loop.limits)))
     if C is None:
         return None
@@ -203,7 +187,6 @@ def _set_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequalit
 
 
 def _attractor_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequality]]:
-    """Return the program of largest t with P >= t Σ fᵀf over the outputs f."""
     cost = np.zeros(problem.unknowns)
     cost[-1] = -1.0
     zero = np.zeros((problem.size, problem.size))
@@ -215,7 +198,7 @@ def _first(
     ratios: tuple[float, ...],
     program: Callable[[_Problem, float], tuple[Array, list[Inequality]]],
 ) -> Proof | None:
-    """Return the proof of the first ratio that has one, found again in coordinates in which its set is a ball."""
+    """Solve for the first feasible ratio, and again in coordinates with its set as a ball."""
 
     def solved(C: Array | None, ratio: float) -> Proof | None:
         if C is None or spectral_radius(loop) ** 2 >= ratio:
@@ -231,10 +214,7 @@ def _first(
 
 
 def _coordinates(loop: UncertainLoop, weight: Array) -> Array | None:
-    """Return C, (n, n), of ζ = C z in which V = ζᵀζ falls by zᵀ weight z in the middle of the polytope, or by more.
-
-    None where even the middle is unstable.
-    """
+    """Return C: V = |C z|² decreases by zᵀ weight z in the polytope's middle; `None` if it is unstable."""
     middle = loop.vertices.mean(axis=0)
     radius = float(np.abs(np.linalg.eigvals(middle)).max())
     if radius >= 1.0:
@@ -244,7 +224,6 @@ def _coordinates(loop: UncertainLoop, weight: Array) -> Array | None:
 
 
 def _coordinates_of_set(loop: UncertainLoop) -> Array | None:
-    """Return the same in which the nearest limit is at 1."""
     C = _coordinates(loop, loop.stage + loop.limits.T @ loop.limits)
     if C is None:
         return None
@@ -253,7 +232,7 @@ def _coordinates_of_set(loop: UncertainLoop) -> Array | None:
 
 
 def _root(P: Array, loop: UncertainLoop) -> Array | None:
-    """Return C with CᵀC = P, block by block; None where P is not positive definite."""
+    """Return C with CᵀC = P; `None` unless P is positive definite."""
     C = np.zeros_like(P)
     for block in loop.blocks():
         part = np.ix_(block, block)
@@ -265,7 +244,7 @@ def _root(P: Array, loop: UncertainLoop) -> Array | None:
 
 
 def _basis(blocks: list[list[int]], size: int) -> Array:
-    """Return the symmetric matrices that span those which couple only states of a block, (b, n, n)."""
+    """Return a basis of symmetric matrices that couple states within blocks, (b, n, n)."""
     pairs = [pair for block in blocks for pair in combinations_with_replacement(block, 2)]
     basis = np.zeros((len(pairs), size, size))
     for matrix, (i, j) in zip(basis, pairs, strict=True):

@@ -1,4 +1,4 @@
-"""`colibri certify`: a profile's law certified, flown from the border of its set, and told as a table."""
+"""`colibri certify`: certify a profile's law, fly it, and print a table."""
 
 from argparse import Namespace
 from math import log
@@ -28,7 +28,7 @@ LAWS: dict[str, type[LqrAttitude] | type[WholeAttitude]] = {
 _DURATION_S = 1.0
 _STATES = 12
 _SEEN = 1e-12
-"""Part of its largest eigenvalue above which a weight is not zero."""
+"""Smallest eigenvalue of a weight over its largest that counts."""
 _NOT_PROVEN = (
     "limits that bind",
     "references that move",
@@ -45,7 +45,6 @@ class UncertifiableError(Error):
 
 
 def certify_profile(args: Namespace) -> int:
-    """Certify as the command line says; return the exit code: 0 where all is proven."""
     try:
         profile = load_profile(args.profile).with_choices(args.controller, None)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
@@ -82,12 +81,6 @@ def certify_profile(args: Namespace) -> int:
 
 
 def law_of(profile: Profile, vehicle: Vehicle, conditions: Conditions) -> AttitudeLaw:
-    """Return the attitude law of the profile's controller.
-
-    Raises:
-        UncertifiableError: It cannot be certified, or the profile has no numbers for it.
-        SettingsError: Its table is wrong.
-    """
     name = profile.controller
     if name not in LAWS:
         raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {' and '.join(LAWS)} can")
@@ -97,7 +90,6 @@ def law_of(profile: Profile, vehicle: Vehicle, conditions: Conditions) -> Attitu
 
 
 def table(found: Certificate, law: AttitudeLaw, flown: Flown) -> list[tuple[str, ...]]:
-    """Return the rows of the certificate's table."""
     _, decay, invariant, attractor, terminal = found
     held = np.degrees(law.held(invariant))
     rate = -log(decay.proof.ratio) / (2.0 * decay.numbers.interval_s)
@@ -122,7 +114,7 @@ def table(found: Certificate, law: AttitudeLaw, flown: Flown) -> list[tuple[str,
 
 
 def _relative(weight: Array, other: Array) -> Array:
-    """Return the generalised eigenvalues of a weight to another, where the other is not zero, ascending."""
+    """Return the generalised eigenvalues of a weight to another, on the other's range."""
     values, vectors = np.linalg.eigh(other)
     seen = vectors[:, values > _SEEN * values[-1]]
     found: Array = eigh(seen.T @ weight @ seen, seen.T @ other @ seen, eigvals_only=True)

@@ -12,26 +12,22 @@ from colibri.common.types import Array
 _MAX_ROUNDS = 40
 _ADDED = 5
 _ENOUGH = 5e-8
-"""An inequality counts as kept where its least eigenvalue is above minus this: less than `lyapunov` has to spare."""
+"""Tolerance of an inequality's least eigenvalue: less than the margin of `lyapunov`."""
 _USABLE = ("Solved", "AlmostSolved", "InsufficientProgress")
-"""What may hold a solution: whether it does is decided by checking it."""
+"""Statuses that may come with a solution; a check decides."""
 
 
 class Inequality(NamedTuple):
-    """constant + Σ_i x_i coefficients_i is positive semidefinite; (k, k) and (n, k, k), symmetric."""
+    """constant + Σ_i x_i coefficients_i is positive semidefinite."""
 
     constant: Array
     coefficients: Array
 
 
 def minimise(cost: Array, always: Sequence[Inequality], many: Inequality | None = None) -> Array | None:
-    """Return the x, (n,), of least cost that keeps all inequalities; None where Clarabel finds none.
+    """Return the x of least cost under all inequalities; `None` if Clarabel finds no solution.
 
-    Args:
-        cost: (n,).
-        always: Inequalities of any size.
-        many: A stack of inequalities of one size, (v, k, k) and (v, n, k, k). They are taken up as they are violated,
-            for few of them bind.
+    `many` is a stack of inequalities of one size, added as they are violated: few of them bind.
     """
     total = 0 if many is None else len(many.constant)
     taken = list(range(0, total, max(1, total // _ADDED)))
@@ -63,7 +59,7 @@ def _solve(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
 
 
 def _vectors(matrices: Array) -> Array:
-    """Return the upper triangles (..., k, k), column by column, what is beside the diagonal times the root of two."""
+    """Return the upper triangles of (..., k, k), column by column, off-diagonals times √2."""
     columns, rows = np.tril_indices(matrices.shape[-1])
     vectors: Array = matrices[..., rows, columns] * np.where(rows == columns, 1.0, np.sqrt(2.0))
     return vectors

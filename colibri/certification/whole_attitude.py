@@ -1,10 +1,8 @@
-"""The attitude under `whole-lpv-mpc` where no limit binds: the gain of its QP, read from the law itself.
+"""The attitude under `whole-lpv-mpc` without binding limits: the gain of its QP, read from the law itself.
 
-A demanded attitude goes into the same QP as a place, with other weights. Its minimum is a function of the error of the
-attitude, the rates, the rotors' squared speeds and the corrections of the last plan, of which next to nothing counts
-but what it had for this sample. The derivative at rest, level, in hover, is the gain that is certified: nothing of the
-law is derived again, its own step is asked. In body axes it hardly depends on the attitude held, nor on the thrust:
-what it does depend is a bounded remainder.
+The minimum of the QP is a function of attitude error, rates, rotor speeds and the last plan's correction for this
+sample. Its derivative at rest, level, in hover, is the certified gain; its small dependence on attitude and thrust is a
+remainder.
 """
 
 from functools import cached_property
@@ -35,28 +33,22 @@ _GAIN_DIGITS = 8
 _ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
 _STEP = 1e-4
-"""Of states, rad, rad/s and N m, for a derivative."""
+"""Step of a derivative, rad, rad/s and N m."""
 _THRUST_PART = 0.5
-"""Of a part of the profile's ranges, that of the thrust's: what it leaves is the rotors' for moments."""
+"""Range of the thrust over that of the profile; the rest is the rotors' for moments."""
 _SPARED = 0.2
-"""Part of the squared speed that the thrust asks for which moments leave every rotor."""
+"""Part of the thrust's squared speed that moments leave to every rotor."""
 _HELD_RAD = radians(20.0)
-"""Largest |phi| and |theta| that may be held: on phi the gain depends, for the heading has a weight of its own."""
+"""Largest held |phi| and |theta|: the gain depends on phi, as the heading has its own weight."""
 _GRID = 4
 _BETWEEN = 1.5
-"""What the gain differs anywhere in their ranges, to what it does at most on a grid."""
+"""Difference of the gain anywhere over the largest on a grid."""
 _ETA_SPARE = 1e-9
 _PREDICTED = 16
 
 
 class WholeAttitude:
-    """The unconstrained attitude law of a profile.
-
-    Attributes:
-        conditions: What its certificate is to hold for.
-        commanded: C, see `AttitudeNumbers`, (2, 3, 12).
-        max_squared: Squared speed that all rotors can keep up together, in parts of the largest.
-    """
+    """The unconstrained attitude law of a profile; C as in `AttitudeNumbers`."""
 
     what = "unconstrained attitude law of whole-lpv-mpc"
     axes = ("about x", "about y", "about z")
@@ -68,11 +60,6 @@ class WholeAttitude:
     )
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
-        """Take the law's numbers from the profile's `table`.
-
-        Raises:
-            SettingsError: The table is wrong.
-        """
         self._settings, self._vehicle, self.conditions = read_settings(table, WholeLpvMpcSettings), vehicle, conditions
         self._law = WholeLpvMpc(table, vehicle, lambda: 0.0)
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
@@ -89,12 +76,10 @@ class WholeAttitude:
         self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, self._hover_n).round(_GAIN_DIGITS)])
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
-        """Return the loop of these numbers, in floats or in fractions."""
         return attitude_loop(numbers, number, of_error)
 
     @cached_property
     def terminal_weight(self) -> Array:
-        """Of the law's plans for an attitude, (12, 12)."""
         S = self._terminal
         from_moments = self._from_wrench[:, 1:]
         of_state = np.zeros((len(S), STATES + INPUTS))
@@ -104,29 +89,24 @@ class WholeAttitude:
         return weight
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
-        """Return the range of the thrust: from that of a hover towards both ends of what the rotors can make."""
         span_n, part = float(self._to_wrench[0].sum()), _THRUST_PART * scale
         least, most = self._min_squared * span_n, self.max_squared * span_n
         return self._hover_n - part * (self._hover_n - least), self._hover_n + part * (most - self._hover_n)
 
     def ranges(self, numbers: AttitudeNumbers) -> str:
-        """Return the ranges of the angles, deg, in words."""
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
 
     def held(self, entry: Entry) -> Array:
-        """Return the largest constant |phi| and |theta|, rad, (2,): errors are in body axes, wherever those point."""
         del entry
         return np.full(2, _HELD_RAD)
 
     def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
-        """Return the law as it flies the equations to `held`, rad, (flights, 2), at any heading and thrust."""
         flights = len(held)
         thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
         headings = rng.uniform(-pi, pi, flights)
         return _WholeFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
-        """Return the rotors' momentum, and its rate, at constant thrusts, N, (flights,)."""
         momentum, from_moments = (
             self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed,
             self._from_wrench[:, 1:],
@@ -140,7 +120,6 @@ class WholeAttitude:
         return of_moments
 
     def numbers_at(self, scale: float) -> AttitudeNumbers:
-        """Return the numbers of the loop whose ranges are this part of the profile's."""
         vehicle, settings = self._vehicle, self._settings
         thrusts_n, from_moments = self.thrusts_n(scale), self._from_wrench[:, 1:]
         least, most = (n / float(self._to_wrench[0].sum()) for n in thrusts_n)
@@ -180,14 +159,6 @@ class WholeAttitude:
     def decide(
         self, z: Array, held: tuple[float, float, float], thrust_n: float, plan: Plan | None
     ) -> tuple[Any, Plan]:
-        """Return moments commanded and remembered, (2, 3), and the plan, of the law's own step; nothing is observed.
-
-        Args:
-            z: Errors, (12,).
-            held: Euler angles demanded, rad.
-            thrust_n: Demanded, and that of the rotors.
-            plan: The last one; None for one of the corrections in `z`.
-        """
         law, n = self._law, self._law.preview.samples
         if plan is None:
             steady = self._squared(thrust_n, z[_COMMANDS])
@@ -215,7 +186,7 @@ class WholeAttitude:
         return squared
 
     def _gain(self, phi: float, thrust_n: float) -> Array:
-        """Return the derivative of what is commanded and remembered at rest, (2, 3, 12)."""
+        """Return the derivative at rest of commanded and remembered moments, (2, 3, 12)."""
         columns = []
         for step in _STEP * np.eye(STATES + INPUTS):
             above, _ = self.decide(step, (phi, 0.0, 0.0), thrust_n, None)
@@ -224,7 +195,6 @@ class WholeAttitude:
         return np.stack(columns, axis=2)
 
     def _unsure(self, thrusts_n: tuple[float, float]) -> Array:
-        """Return what the gain may differ from that in hover, level, at all attitudes that may be held and thrusts."""
         grid = product(np.linspace(-_HELD_RAD, _HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self._hover_n))
         differs = [np.abs(self._gain(phi, thrust_n) - self.commanded) for phi, thrust_n in grid]
         unsure: Array = (_BETWEEN * np.max(differs, axis=0)).round(_GAIN_DIGITS)
@@ -232,7 +202,7 @@ class WholeAttitude:
 
 
 class _WholeFlyer:
-    """Flights by the law's own steps; each has its plan."""
+    """Flights by the law's own steps, each with its plan."""
 
     def __init__(self, law: WholeAttitude, held: Array, thrusts_n: Array) -> None:
         self._law, self._held, self._thrusts_n = law, held.tolist(), thrusts_n
@@ -255,7 +225,7 @@ class _WholeFlyer:
 
 
 def _mirrored(rows: Array) -> Array:
-    """Return rows, (3, 12), of moments without what would not be its own mirror image."""
+    """Drop entries of rows, (3, 12), that are not their own mirror image."""
     signs = np.array(MIRRORS)
     own = (signs[:, _MOMENTS, None] * signs[:, None, :] == 1).all(axis=0)
     kept: Array = np.where(own, rows, 0.0)
@@ -263,7 +233,6 @@ def _mirrored(rows: Array) -> Array:
 
 
 def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float, float]:
-    """Return the product of two quaternions."""
     (w, x, y, z), (v, i, j, k) = a, b
     return (
         w * v - x * i - y * j - z * k,
@@ -274,10 +243,9 @@ def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, 
 
 
 def of_error(n: AttitudeNumbers) -> Kinematic:
-    """Return T of ε, twice the vector part of the quaternion from the attitude held to that now, in body axes.
+    """Return T of ε, twice the vector part of the error quaternion, in body axes: ε' = (η + ½ [ε]×) ω.
 
-    ε' = (η + ½ [ε]×) ω, with η = √(1 - ¼ ε²): affine in both, whatever attitude is held. `n.angles` are the ranges of
-    |ε|, (3,), and the least η.
+    It is affine in ε and η = √(1 - ¼ ε²). `n.angles` are the ranges of |ε|, and the least η.
     """
     *ranges, least = n.angles
     x, y, z = ranges = np.array(ranges)

@@ -1,7 +1,7 @@
-"""The base of this package's errors."""
+"""Base of this package's errors."""
 
 from colibri.common.errors import Error
 
 
 class CompanionError(Error):
-    """A companion that cannot begin, or what it was given and cannot fly."""
+    """The companion cannot begin with its input."""

@@ -1,6 +1,6 @@
-"""A companion: bytes and the time in, bytes out; no socket, no clock.
+"""The companion without socket or clock: bytes and time in, bytes out.
 
-What is done in each phase is here; which follows which, and why, is in `supervision/phases`.
+The order of phases and its reasons are in `supervision/phases`.
 """
 
 from math import dist, inf, nan
@@ -31,29 +31,23 @@ from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
 from colibri.plant.vehicle.description import Vehicle
 
 _GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
-"""Until the stack is known."""
+"""Assumed until the stack is recognised."""
 _STEADY_US = 1_000_000
-"""So long it holds after the take-over, and streams before it."""
+"""Hold after the take-over, and streaming before it."""
 _BRAKES_US = 3_000_000
-"""How long it may brake at the end of a track before the vehicle is handed over."""
+"""Longest braking at the end of a track before the hand-over."""
 _SLOW_M_S = 0.3
 _UP_M, _UP_M_S = 0.5, 0.3
 _CORRECTED_IN = 0.5
-"""Round trips in which an error of the prediction is corrected."""
+"""Time constant of the prediction's correction, in round trips."""
 
 
 class Companion:
     """Flies one vehicle along one track.
 
     Attributes:
-        phase: What it is doing.
-        ended: How it ended; None before.
-        peer: The vehicle.
-        errors: On the track, by the vehicle's own estimate.
-        said: What is to be told, a line each; whoever reads it clears it.
-        rows: The log; whoever writes it clears it.
-        commanded, measured: Of an identification: times, s, and body rates, rad/s.
-        limit: The limit that ended the flight; None for none.
+        rows: The log; its writer clears it, as the reader of `said` does.
+        commanded, measured: Time, s, and body rates, rad/s, of an identification.
     """
 
     def __init__(
@@ -65,13 +59,6 @@ class Companion:
         clock: Clock,
         law: Factory | None = None,
     ) -> None:
-        """Fly `track` by the law of `profile`, made for `vehicle`; `clock` only measures, it decides nothing.
-
-        Raises:
-            ControllerError: The profile's control law cannot be used.
-            ProfileError: Its table is wrong.
-            SolverError: Its solver cannot be used.
-        """
         self._settings, self._vehicle = settings, vehicle
         self.peer = VehiclePeer(settings.stack)
         self._response = settings.response or (settings.stack.response if settings.stack else _GUESSED)
@@ -104,22 +91,19 @@ class Companion:
 
     @property
     def interval_us(self) -> int:
-        """Between two setpoints."""
         return self._pilot.interval_us
 
     @property
     def thrust_scale(self) -> float:
-        """Thrust that is made, in parts of the one that was meant, as refined in flight."""
+        """Actual over commanded thrust, refined in flight."""
         return self._predictor.thrust_scale
 
     @property
     def failing(self) -> list[str]:
-        """What fails of the checks, and what to do about it."""
         return self._failing
 
     @property
     def waits_for(self) -> list[str]:
-        """What it waits for before it flies, a line each."""
         if self.phase is Phase.CONNECTING:
             return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
         if self.phase is not Phase.CHECKING:
@@ -135,12 +119,10 @@ class Companion:
         self._stopped = True
 
     def receive(self, datagram: bytes, now_us: int) -> None:
-        """Take in what the vehicle has sent."""
         for received in self.peer.receive(datagram, now_us):
             self._take_in(received)
 
     def poll(self, now_us: int) -> list[bytes]:
-        """Return what is to be sent now; to be called at least every `interval_us`."""
         if not self._begun:
             self._begun, self._since_us, self._next_us = True, now_us, now_us
         if self.ended is not None:
@@ -185,13 +167,12 @@ class Companion:
         return inf if self._newest is None else (now_us - self._newest.at_us) * 1e-6
 
     def _acts_us(self, now_us: int) -> int:
-        """Return when a command that is sent now takes effect."""
+        """Predict the time of effect of a command sent now."""
         return now_us + self.peer.clock.round_trip_us // 2 + round(self._response.latency_s * 1e6)
 
     # Phases.
 
     def _advance(self, now_us: int) -> None:
-        """Go on to the next phase as long as there is one."""
         self._look(now_us)
         while self.ended is None:
             after, why = next_phase(self.phase, conditions(self._situation(now_us)))
@@ -200,7 +181,6 @@ class Companion:
             self._enter(after, why, now_us)
 
     def _look(self, now_us: int) -> None:
-        """Look for what fails of the checks, or which limit is exceeded."""
         if self.phase is Phase.CHECKING:
             self._failing = failing(self._check_facts(now_us))
         elif self.phase in (Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING) and self.limit is None:
@@ -249,7 +229,6 @@ class Companion:
         return self._pilot.finished or self._asked.track_s >= self._settings.duration_s
 
     def _identified_s(self, now_us: int) -> float:
-        """Return the time since the steps of an identification began, s."""
         return (now_us - self._since_us - _STEADY_US) * 1e-6
 
     def _enter(self, phase: Phase, why: Condition, now_us: int) -> None:
@@ -276,7 +255,7 @@ class Companion:
             self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self._failing)
 
     def _may_hand_over(self, now_us: int) -> bool:
-        """Whether it is time to order the vehicle to hold: once it is slow at the end of a track, else at once."""
+        """At the end of a track wait until the vehicle is slow."""
         if not self._brakes or self._newest is None or self.limit is not None or self._stopped:
             return True
         slow = dist(self._newest.state.velocity_enu_m_s, (0.0, 0.0, 0.0)) < _SLOW_M_S
@@ -285,7 +264,6 @@ class Companion:
     # Setpoints.
 
     def _setpoint(self, now_us: int) -> list[bytes]:
-        """Return the setpoint of this instant, if this phase has one."""
         rehearses = self._settings.dry_run and self.phase is Phase.CHECKING
         blind = self.limit is not None and self.limit.blind
         flies = self._has_flown and self.phase in (Phase.FLYING, Phase.HANDING_OVER) and not blind
@@ -331,7 +309,6 @@ class Companion:
         return [self.peer.encode(name, *fields)]
 
     def _with_step(self, asked: Asked, now_us: int) -> Asked:
-        """Return what is asked with a step of the identification added, and note both."""
         p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
         self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
         return asked._replace(rate_flu_rad_s=(p, q, r))

@@ -1,4 +1,4 @@
-"""What an identification has found, as the file that later flights read."""
+"""Result of an identification, as a file for later flights."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from colibri.companion.stacks.stack import Response
 
 
 class Identified(NamedTuple):
-    """A response, the text of its file, and the fit that it comes from."""
+    """A response, the text of its file, and its fit."""
 
     response: Response
     text: str
@@ -19,11 +19,7 @@ class Identified(NamedTuple):
 
 
 def identified(companion: Companion) -> Identified:
-    """Return the response of the steps that a companion has flown.
-
-    Raises:
-        CompanionError: They do not tell it.
-    """
+    """Fit the response to a companion's steps."""
     stack = companion.peer.stack
     assert stack is not None, "it has flown"
     commanded, measured = (np.reshape(rows, (-1, 4)) for rows in (companion.commanded, companion.measured))
@@ -41,9 +37,9 @@ def identified(companion: Companion) -> Identified:
 
 
 def _of_second_order(response: Response, found: Fit) -> Response:
-    """Return a response with the lags of its accelerations, and with as much of them as its rate loop asks for at most.
+    """Add the lags of the accelerations, and raise their limits to the rate loop's largest demand.
 
-    A law that was built for less of it than there is would brake late where it is thrown off its track, and swing.
+    A law built for less would brake late after a disturbance, and swing.
     """
     p, q, r = found.acceleration_lag_s.tolist()
     most_p, most_q, most_r = (

@@ -1,4 +1,4 @@
-"""What a companion remembers of its flight: a row for each setpoint."""
+"""Records of a companion's flight, one row for each setpoint."""
 
 from collections import Counter
 from math import acos, cos, dist, nan, sqrt
@@ -9,23 +9,10 @@ from colibri.common.types import Vector
 
 
 class LogRow(NamedTuple):
-    """One setpoint, and what it was made of; times in s of the own clock, m, rad, ENU and FLU.
+    """A setpoint and its inputs, for the time of effect; times in s on the companion's clock, m, rad, ENU and FLU.
 
-    Attributes:
-        on_track: 1 where the reference is the track's own.
-        track_s: Time along the track; negative before it.
-        state_age_s: Of the newest state.
-        round_trip_s: To the vehicle and back.
-        x, y, z, vx, vy, vz, phi, theta, psi, p, q, r: The vehicle as predicted for the instant of effect.
-        ref_x, ref_y, ref_z, ref_vx, ref_vy, ref_vz, ref_psi: The reference of that instant.
-        error_m: Between the two.
-        p_cmd, q_cmd, r_cmd: Body rates commanded.
-        thrust: The number that was sent, 0..1.
-        thrust_n: What it stands for.
-        thrust_scale: Thrust made, in parts of the one meant.
-        push_x, push_y, push_z: Disturbance observed, m/s².
-        fallback: What decided in place of a solved QP, as in flight.csv; -1 is none.
-        sent: 1 where it was sent.
+    `thrust`, 0..1, stands for `thrust_n`; `push_*` is the observed disturbance, m/s²; `fallback` is as in flight.csv,
+    -1 after a solved QP.
     """
 
     t: float
@@ -68,51 +55,35 @@ class LogRow(NamedTuple):
 
 
 class TrackErrors:
-    """Errors on the track, gathered as they come: of the vehicle's own estimate, from the reference of its instant."""
+    """Distance of the vehicle's own estimate from the track."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         self._of: list[tuple[float, float]] = []
 
     def add(self, track_s: float, reference_enu_m: Vector, position_enu_m: Vector) -> None:
-        """Add one."""
         self._of.append((track_s, dist(reference_enu_m, position_enu_m)))
 
     def rmse_m(self, after_s: float = 0.0) -> float:
-        """Return the RMS of those after a time along the track; nan where there are none."""
         errors = [error for track_s, error in self._of if track_s >= after_s]
         return sqrt(sum(error * error for error in errors) / len(errors)) if errors else nan
 
     @property
     def max_m(self) -> float:
-        """The largest; nan where there are none."""
         return max((error for _, error in self._of), default=nan)
 
     @property
     def samples(self) -> int:
-        """How many there are."""
         return len(self._of)
 
     @property
     def flown_s(self) -> float:
-        """Time along the track at the last."""
         return self._of[-1][0] if self._of else 0.0
 
 
 class FlightSummary:
-    """What the rows of a flight come to.
-
-    Attributes:
-        sent: How many setpoints were sent.
-        first_s, last_s: When, of the first and last row.
-        max_tilt_rad: The largest tilt.
-        max_age_s: Of the newest state, the largest while it flew.
-        fallbacks: How many rows each fallback decided.
-        phases: How long each phase sent setpoints, s.
-    """
+    """Totals over the rows: sent setpoints, rows by fallback, seconds by phase."""
 
     def __init__(self) -> None:
-        """Begin without a row."""
         self.sent = 0
         self.first_s = self.last_s = 0.0
         self.max_tilt_rad = self.max_age_s = 0.0
@@ -122,11 +93,9 @@ class FlightSummary:
 
     @property
     def rate_hz(self) -> float:
-        """How many setpoints were made a second."""
         return (self._rows - 1) / (self.last_s - self.first_s) if self.last_s > self.first_s else nan
 
     def add(self, row: LogRow) -> None:
-        """Add a row."""
         self._rows += 1
         self.sent += row.sent
         if self._rows == 1:

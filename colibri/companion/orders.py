@@ -1,4 +1,4 @@
-"""The commands of each phase: arm, take off, take setpoints, hold; and which modes so are the companion's own doing."""
+"""Commands of each phase: arm, take off, offboard, hold; and the modes that result from them."""
 
 from math import isfinite, nan
 
@@ -11,24 +11,18 @@ from colibri.mavlink.client.modes import FlightMode
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_TEMPORARILY_REJECTED, mav
 
 _STREAMS_FIRST_US = 1_000_000
-"""So long setpoints are streamed before the mode is asked for, as PX4 wants it."""
+"""PX4 requires a stream of setpoints before it accepts offboard mode."""
 _HOLD_TRIES = 3
 _AGAIN_US = 400_000
 _ABOVE_SEA = -1.0
-"""A pitch, as QGroundControl sends it with a height above the sea; PX4 passes over it."""
+"""Pitch, as QGroundControl sends it with a height above sea level; PX4 ignores it."""
 _LEAST_HEIGHT_M = 1.0
 
 
 class Orders:
-    """Gives the commands.
-
-    Attributes:
-        refused: What the vehicle has refused, in words; empty for nothing.
-        height_enu_m: That a take-off leads to.
-    """
+    """Sends the commands, and records a refusal by the vehicle in words."""
 
     def __init__(self, peer: VehiclePeer, settings: CompanionSettings, track_height_m: float) -> None:
-        """Give commands to `peer`; by default it climbs to the height of the track's first point."""
         self._peer, self._settings = peer, settings
         self._track_height_m = track_height_m
         self.height_enu_m = self._climb_m = track_height_m
@@ -41,12 +35,12 @@ class Orders:
 
     @property
     def disarms(self) -> bool:
-        """Whether a command to disarm is on its way, which must not be left there."""
+        """Whether a command to disarm awaits its answer."""
         return self._disarming and "disarm" not in self._peer.results
 
     @property
     def climbed(self) -> bool:
-        """Whether the take-off itself is over: a stack that has a mode for it has left that for hold."""
+        """Whether a stack with a take-off mode has left it for hold."""
         stack = self._peer.stack
         return stack is not None and (
             stack.take_off is TakeOff.ARM_THEN_COMMAND or self._peer.report.mode == stack.hold.custom
@@ -54,7 +48,6 @@ class Orders:
 
     @property
     def held(self) -> bool:
-        """Whether the vehicle has taken the order to hold, or to land as it cannot hold, and reports that it does."""
         stack = self._peer.stack
         if stack is None:
             return False
@@ -64,7 +57,6 @@ class Orders:
         )
 
     def enter(self, phase: Phase, before: Phase) -> None:
-        """Begin a phase."""
         stack = self._peer.stack
         if stack is None:
             return
@@ -82,7 +74,7 @@ class Orders:
                 self._peer.ask("disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def own_modes(self, phase: Phase) -> frozenset[int]:
-        """Return the modes that are no pilot's choice: those asked for, and until one is reported the one before."""
+        """Return the modes that the companion caused; until one is reported, with the previous mode."""
         mode = self._peer.report.mode
         if mode in self._own:
             self._reached = True
@@ -91,7 +83,7 @@ class Orders:
         return self._own | {self._before}
 
     def poll(self, phase: Phase, in_phase_us: int, *, ready: bool) -> None:
-        """Have sent what a phase needs; `ready`: whether the vehicle may be told to hold."""
+        """Send the commands of a phase; `ready` permits the order to hold."""
         stack, results = self._peer.stack, self._peer.results
         self._in_phase_us = in_phase_us
         if stack is None or self._settings.dry_run:
@@ -126,14 +118,13 @@ class Orders:
             self._once("arming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def set_ground(self, ground_enu_m: float) -> None:
-        """Take in at which height the vehicle stands, ENU, before it is armed."""
         asked_m = self._settings.takeoff_height_m
         climb_m = self._track_height_m - ground_enu_m if asked_m is None else asked_m
         self._climb_m = max(climb_m, _LEAST_HEIGHT_M)
         self.height_enu_m = ground_enu_m + self._climb_m
 
     def _mode(self, mode: FlightMode, in_phase_us: int) -> None:
-        """Order a mode, and again after a while if it was refused, or taken and yet is not reported."""
+        """Request a mode until it is reported."""
         name = f"mode {mode.name}"
         taken = self._peer.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
         if not taken and in_phase_us >= self._again_us:
@@ -141,7 +132,7 @@ class Orders:
             self._peer.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:
-        """Give a command, and again while it is refused for the time being; else a refusal, or silence, is the end."""
+        """Send a command, repeatedly only after a temporary rejection."""
         result = self._peer.results.get(name)
         if result is None:
             self._peer.ask(name, number, *params)

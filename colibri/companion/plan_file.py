@@ -1,6 +1,6 @@
-"""A mission of QGroundControl's .plan as waypoints of one track; an item that no track can fly is refused.
+"""Read a mission of QGroundControl (.plan) as waypoints of one track.
 
-The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
+Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
 """
 
 import json
@@ -25,14 +25,7 @@ _ENDS = {mav.MAV_CMD_NAV_LAND: "landing", mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "ret
 
 
 class PlannedPoint(NamedTuple):
-    """A waypoint.
-
-    Attributes:
-        item: Its number in the file, from 1.
-        latitude_deg, longitude_deg: Where it is.
-        above_home_m: Its height.
-        heading_deg: Where to look, clockwise from north; None for along the path.
-    """
+    """A waypoint; `item` counts from 1, a heading of `None` looks along the path."""
 
     item: int
     latitude_deg: float
@@ -41,23 +34,13 @@ class PlannedPoint(NamedTuple):
     heading_deg: float | None
 
     def enu_m(self, home: Home) -> Vector:
-        """Return where it is in the vehicle's local frame, ENU, m."""
         level = home.origin.altitude_m
         east, north, _ = enu_of(Geodetic(self.latitude_deg, self.longitude_deg, level), home.origin)
         return (east, north, home.up_m + self.above_home_m)
 
 
 class MissionPlan(NamedTuple):
-    """A mission to fly.
-
-    Attributes:
-        path: The file.
-        points: Its waypoints in order, at least two.
-        speed_m_s: Between them.
-        takeoff_m: Height of its take-off; None where it has none.
-        planned_home: Where home was when it was planned.
-        note: What of it is not flown; empty for nothing.
-    """
+    """A mission of two points or more; `note` names items left to the pilot."""
 
     path: Path
     points: tuple[PlannedPoint, ...]
@@ -67,11 +50,7 @@ class MissionPlan(NamedTuple):
     note: str
 
     def waypoints(self, home: Home) -> Waypoints:
-        """Return them in the vehicle's local frame.
-
-        Raises:
-            CompanionError: Two are in one place.
-        """
+        """Convert the points to the vehicle's local frame."""
         places = [point.enu_m(home) for point in self.points]
         for point, before, place in zip(self.points[1:], places, places[1:], strict=False):
             if dist(before, place) < MIN_LEG_S * self.speed_m_s:
@@ -83,11 +62,7 @@ class MissionPlan(NamedTuple):
 
 
 def read_plan(path: Path) -> MissionPlan:
-    """Read a mission.
-
-    Raises:
-        CompanionError: The file cannot be read, or has an item that no track can fly.
-    """
+    """Read a mission, or raise `CompanionError` for an item that a track cannot fly."""
     try:
         plan = json.loads(path.read_text(encoding="utf-8-sig"))
         mission = plan["mission"]
@@ -118,7 +93,6 @@ def read_plan(path: Path) -> MissionPlan:
 
 
 def _items(path: Path, items: list[Any]) -> Iterator[tuple[int, dict[str, Any], int, list[Any]]]:
-    """Yield number, item, command and its seven parameters."""
     for number, item in enumerate(items, start=1):
         kind = item.get("complexItemType", item.get("type")) if isinstance(item, dict) else None
         if kind != "SimpleItem":

@@ -1,4 +1,4 @@
-"""A companion as a process: its link and its clock. Everything else is decided in `guide`."""
+"""Process of a companion: its link and its clock. All decisions are in `guide`."""
 
 import csv
 from argparse import Namespace
@@ -39,7 +39,7 @@ _SAY_FAILING_EVERY_S = 5.0
 
 
 class Plan(NamedTuple):
-    """What is to be flown."""
+    """Inputs of a flight."""
 
     settings: CompanionSettings
     profile: Profile
@@ -49,11 +49,6 @@ class Plan(NamedTuple):
     mission: MissionPlan | None = None
 
     def from_home(self, home: Home) -> "Plan":
-        """Return the same plan with its mission flown from a vehicle's home.
-
-        Raises:
-            Error: It cannot be flown from there.
-        """
         if self.mission is None:
             return self
         loaded = track_through(self.mission.waypoints(home), self.vehicle, self.profile, home.up_m)
@@ -61,11 +56,6 @@ class Plan(NamedTuple):
 
 
 def plan_of(args: Namespace) -> Plan:
-    """Read the plan of a command line.
-
-    Raises:
-        Error: There is no such thing, or it cannot be flown.
-    """
     profile = load_profile(args.profile).with_choices(args.controller, None)
     vehicle = load_vehicle(args.model or profile.simulation.vehicle)
     name = _track_name(args)
@@ -101,11 +91,6 @@ def plan_of(args: Namespace) -> Plan:
 
 
 def _track_name(args: Namespace) -> str:
-    """Return the name of the track; one that identifies hovers.
-
-    Raises:
-        CompanionError: There is none.
-    """
     if args.identify:
         if args.track or args.dry_run:
             raise CompanionError("--identify hovers and sends steps: leave TRACK and --dry-run out")
@@ -116,7 +101,6 @@ def _track_name(args: Namespace) -> str:
 
 
 def fly(args: Namespace) -> int:
-    """Fly as the command line says; return the exit code."""
     try:
         plan = plan_of(args)
         signing = _signing(args.signing_key)
@@ -154,14 +138,13 @@ def fly(args: Namespace) -> int:
 
 
 class _Wire:
-    """The link to one vehicle, which is wherever it was last heard from."""
+    """The link to one vehicle, at the address of its newest datagram."""
 
     def __init__(self, link: GroundLink) -> None:
         self.link = link
         self._address: Address | None = link.target
 
     def receive(self) -> list[bytes]:
-        """Return what has come."""
         received = []
         for datagram, sender in self.link.receive_now():
             received.append(datagram)
@@ -173,19 +156,12 @@ class _Wire:
         return received
 
     def send(self, frames: list[bytes]) -> None:
-        """Send frames, if it is known where to."""
         for frame in frames:
             if self._address is not None:
                 self.link.send(frame, None if self.link.target == self._address else self._address)
 
 
 def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> Home:
-    """Return the vehicle's home, once it has said where that is.
-
-    Raises:
-        CompanionError: It has not, for so long.
-        LinkError: The vehicle can never be reached.
-    """
     peer = VehiclePeer()
     peer.sign_with(signing)
     seeker, began_s = HomeSeeker(peer), perf_counter()
@@ -201,11 +177,6 @@ def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) 
 
 
 def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_Log") -> None:
-    """Fly until the companion has ended.
-
-    Raises:
-        LinkError: The vehicle can never be reached.
-    """
     began_s = perf_counter()
     tell_s, told = _SAY_FAILING_EVERY_S, list[str]()
     while companion.ended is None:
@@ -229,7 +200,7 @@ def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_
 
 
 class _Log:
-    """The rows of a flight on their way to a file."""
+    """Writes rows to a file, numbers with nine digits."""
 
     def __init__(self, file: TextIO, summary: FlightSummary) -> None:
         self._file, self._summary = file, summary
@@ -237,7 +208,6 @@ class _Log:
         self._writer.writerow(LogRow._fields)
 
     def write(self, companion: Companion) -> None:
-        """Write what has come; the numbers as short as they are read back."""
         for row in companion.rows:
             self._summary.add(row)
             self._writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
@@ -245,21 +215,15 @@ class _Log:
 
 
 class _Quiet(Status):
-    """Says nothing."""
+    """Prints no status."""
 
     def __init__(self) -> None:
         super().__init__("", as_json=False)
 
-    def say(self, event: str, text: str, **facts: Any) -> None:
-        """Say nothing."""
+    def say(self, event: str, text: str, **facts: Any) -> None: ...
 
 
 def _signing(path: Path | None) -> Signing | None:
-    """Return what signs with the key of a file; None without one.
-
-    Raises:
-        CompanionError: It holds no key, or cannot be read.
-    """
     if path is None:
         return None
     try:
@@ -269,7 +233,6 @@ def _signing(path: Path | None) -> Signing | None:
 
 
 def _identify(companion: Companion, status: Status, out: Path) -> None:
-    """Fit the response to what was flown, and write it."""
     from colibri.companion.identification.figure import draw
     from colibri.companion.identified import identified
 

@@ -1,4 +1,4 @@
-"""What came of a companion's flight: `report.json`, with the keys of `colibri fly` where they mean the same."""
+"""Report of a companion's flight, with the keys of `colibri fly` where they mean the same."""
 
 from math import degrees, isfinite
 from typing import Any
@@ -11,11 +11,6 @@ SETTLED_AFTER_S = 20.0
 
 
 def report(companion: Companion, summary: FlightSummary, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the figures of a flight; `given` is what it was begun with.
-
-    Errors are distances of the vehicle's own estimate from the track at the instant of that estimate, from the first
-    point of the track on.
-    """
     errors, peer, ended = companion.errors, companion.peer, companion.ended
     return {
         **given,

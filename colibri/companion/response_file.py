@@ -1,4 +1,4 @@
-"""The file of an identified response, `companion.toml`: written by --identify, read by --response."""
+"""File of an identified response, `companion.toml`: written by --identify, read by --response."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -16,7 +16,7 @@ Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
 
 
 class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How body rates follow their commands."""
+    """Response of body rates to their commands."""
 
     time_constant_s: tuple[TimeConstant, TimeConstant, TimeConstant]
     latency_s: Latency
@@ -25,15 +25,10 @@ class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     max_acceleration_rad_s2: tuple[Positive, Positive, Positive]
     acceleration_lag_s: tuple[Lag, Lag, Lag] = (0.0, 0.0, 0.0)
     thrust_scale: Scale = 1.0
-    """Thrust that was made, in parts of the one that the vehicle's parameters mean."""
+    """Actual thrust over the thrust derived from the vehicle's parameters."""
 
 
 def read_response(path: Path) -> tuple[Response, float]:
-    """Read the response of a file, and its scale of thrust.
-
-    Raises:
-        CompanionError: It cannot be read, or has a missing, unknown or impossible key.
-    """
     try:
         text = path.read_text(encoding="utf-8")
         found = msgspec.toml.decode(text, type=ResponseFile)
@@ -46,7 +41,6 @@ def read_response(path: Path) -> tuple[Response, float]:
 
 
 def response_text(response: Response, thrust_scale: float, remarks: list[str]) -> str:
-    """Return what is in the file of a response, with remarks above it."""
     lines = [f"# {remark}" for remark in remarks]
     for name, value in (response._asdict() | {"thrust_scale": thrust_scale}).items():
         values = [f"{part:.4g}" for part in value] if isinstance(value, tuple) else None

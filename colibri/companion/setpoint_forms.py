@@ -1,4 +1,4 @@
-"""A setpoint as the vehicle is sent it, and as a row of the log."""
+"""A setpoint as MAVLink message, and as row of the log."""
 
 from math import dist
 from typing import Any
@@ -15,7 +15,7 @@ from colibri.mavlink.client.conversation import Encoded
 from colibri.mavlink.client.setpoints import attitude_target, position_target
 
 _PULL_1_S = 1.0
-"""Position error per second that a velocity setpoint corrects."""
+"""Gain of the position error in a velocity setpoint."""
 
 
 def message_of(
@@ -27,17 +27,7 @@ def message_of(
     thrust: float,
     y: Array,
 ) -> Encoded:
-    """Return name and fields of a setpoint's message.
-
-    Args:
-        kind: What the vehicle takes; body rates where the law has decided nothing else.
-        now_us: The own clock.
-        target: System and component.
-        asked: Body rates and thrust.
-        decided: The law's last decision on references.
-        thrust: What is sent for the thrust, 0..1.
-        y: The vehicle when it takes effect, as `response.carry` has it.
-    """
+    """Return name and fields of a setpoint's message; `decided` is the last decision on references."""
     if kind is SetpointKind.RATES or decided is None or decided.reference is None or decided.decision is None:
         return attitude_target(target, rates=asked.rate_flu_rad_s, thrust=thrust, time_us=now_us)
     if kind is SetpointKind.ATTITUDE:
@@ -63,7 +53,7 @@ def row_of(
     *,
     sent: bool,
 ) -> LogRow:
-    """Return the row of a setpoint: `head` is time, s, phase, age of the state and round trip, s; see `message_of`."""
+    """Return the row of a setpoint; `head` is time, phase, age of the state and round trip, s."""
     time_s, phase, state_age_s, round_trip_s = head
     assert decided.reference is not None, "a law has decided"
     reference, place = decided.reference, first(y[None, model.POSITION])
@@ -81,6 +71,5 @@ def row_of(
 
 
 def first(rows: Array) -> Vector:
-    """Return the first row of (n, 3)."""
     x, y, z = rows[0].tolist()
     return (x, y, z)

@@ -1,4 +1,4 @@
-"""How a companion is to fly: what the command line of `colibri companion` says, as one value."""
+"""Settings of a companion, from the command line of `colibri companion`."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -9,7 +9,7 @@ from colibri.companion.supervision.limits import FlightLimits
 
 
 class SetpointKind(StrEnum):
-    """What a vehicle is sent."""
+    """Kind of setpoint sent to the vehicle."""
 
     RATES = "rates"
     ATTITUDE = "attitude"
@@ -19,20 +19,12 @@ class SetpointKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CompanionSettings:
-    """How a companion is to fly.
+    """Settings of a flight; `None` as stack or response recognises it.
 
     Attributes:
-        may_arm: Whether it arms and takes off by itself.
-        dry_run: Whether it only asks and computes: neither setpoints nor orders are sent.
-        duration_s: Of the track; infinite for all of it.
-        takeoff_height_m: Above where it stands; None for the height of the track's first point.
-        gives_up_s: How long to wait for the vehicle, and until all checks pass.
-        limits: Of the flight.
-        setpoints: What is sent.
-        stack: The vehicle's; None for the one that it says.
-        identifies: Whether it flies the steps of an identification in place of the track.
-        thrust_scale: Thrust that is made, in parts of the one that the vehicle's parameters mean, to begin with.
-        response: Of its rates; None for what the stack assumes.
+        takeoff_height_m: Above the ground; `None` for the height of the track's first point.
+        gives_up_s: Timeout of connection and checks.
+        thrust_scale: Initial ratio of actual to commanded thrust.
     """
 
     may_arm: bool = False

@@ -1,4 +1,4 @@
-"""The vehicle at the other end of a link: bytes and the own time in, bytes and timed states out."""
+"""The vehicle at the other end of a link: bytes and time in, bytes and timed states out."""
 
 from collections import deque
 from typing import Any, NamedTuple
@@ -28,24 +28,16 @@ _PARAMETERS = Repeat(every_us=500_000, tries=4)
 
 
 class ReceivedState(NamedTuple):
-    """A state, and when it was, by the own clock."""
+    """A state and its time on the companion's clock."""
 
     at_us: int
     state: TimedState
 
 
 class VehiclePeer:
-    """One vehicle.
-
-    Attributes:
-        report: What it says of itself.
-        clock: Its clock.
-        stack: Its flight stack; None until it is known.
-        system: Its system id; 0 until it is known.
-    """
+    """One vehicle; `system` is 0 and `stack` is `None` until they are known."""
 
     def __init__(self, stack: Stack | None = None) -> None:
-        """Wait for a vehicle; its `stack` is recognised where none is given."""
         own = mav.MAV_TYPE_ONBOARD_CONTROLLER
         self._client = Client(OWN_SYSTEM, OWN_COMPONENT, kind=own, heartbeat_every_us=_HEARTBEAT_EVERY_US)
         self.report = VehicleReport()
@@ -64,12 +56,10 @@ class VehiclePeer:
 
     @property
     def connected(self) -> bool:
-        """Whether vehicle and stack are known."""
         return self.system != 0 and self.stack is not None
 
     @property
     def parameter_values(self) -> dict[str, float] | None:
-        """The parameters that the vehicle has; None until all are read."""
         if self._parameters is None or any(reading.result is None for reading in self._parameters):
             return None
         return {reading.name: float(reading.held.value) for reading in self._parameters if reading.held is not None}
@@ -78,40 +68,34 @@ class VehiclePeer:
 
     @property
     def results(self) -> dict[str, int]:
-        """The MAV_RESULT of each command that has ended, or UNANSWERED."""
         return {name: order.result for name, order in self._orders.items() if order.result is not None}
 
     def ask(self, name: str, number: int, *params: float) -> None:
-        """Send a command until it is acknowledged, unless one of its name is under way."""
+        """Send a command until it is acknowledged, unless one of this name is pending."""
         under_way = self._orders.get(name)
         if under_way is None or under_way.result is not None:
             self._orders[name] = self._client.begin(Command(self.target, number, *params, repeat=_COMMANDS))
 
     def clear(self) -> None:
-        """Abandon the commands that are under way."""
         for name in [name for name, order in self._orders.items() if order.result is None]:
             self._client.cancel(self._orders.pop(name))
 
     def state_rate_hz(self, now_us: int) -> float:
-        """Return how many states came in the last second."""
         return float(sum(1 for at_us in self._arrivals_us if now_us - at_us <= _SECOND_US))
 
     @property
     def state_delay_s(self) -> float:
-        """How old states are when they come: the median, s."""
         delays = sorted(self._delays_us)
         return 1e-6 * delays[len(delays) // 2] if delays else 0.0
 
     def sign_with(self, signing: Signing | None) -> None:
-        """Sign what is sent, and drop what is not signed with the same key; None: neither."""
+        """Sign outgoing messages, and drop incoming ones without a valid signature."""
         self._client.sign_with(signing)
 
     def encode(self, name: str, *fields: Any) -> bytes:
-        """Return a message that needs no answer."""
         return self._client.encode(name, *fields)
 
     def receive(self, datagram: bytes, now_us: int) -> list[ReceivedState]:
-        """Take in what came; return the states in it."""
         received = []
         for message in self._client.receive(datagram, now_us):
             vehicle = self._client.vehicle
@@ -123,7 +107,6 @@ class VehiclePeer:
         return received
 
     def poll(self, now_us: int) -> list[bytes]:
-        """Return what is due: heartbeats, requests, commands."""
         if self.system == 0:
             return self._client.poll(now_us)
         self._recognise(now_us)
@@ -136,7 +119,6 @@ class VehiclePeer:
 
     @property
     def target(self) -> tuple[int, int]:
-        """System and component that commands are for."""
         return (self.system, AUTOPILOT_COMPONENT)
 
     def _take(self, message: Message, now_us: int) -> ReceivedState | None:
@@ -165,7 +147,7 @@ class VehiclePeer:
         return ReceivedState(at_us, state)
 
     def _recognise(self, now_us: int) -> None:
-        """Ask a vehicle that may be of several stacks which it is; by its HEARTBEAT alone if it does not say."""
+        """Request the version of an ambiguous vehicle; without answer decide by its HEARTBEAT."""
         if self.stack is not None:
             if self._parameters is None:
                 self._meet(self.stack)
@@ -191,7 +173,7 @@ class VehiclePeer:
         ]
 
     def _renew_streams(self, now_us: int) -> None:
-        """Ask for the streams, and again while states come at less than half of the rate that was asked for."""
+        """Request the streams, repeatedly while states arrive at less than half of their rate."""
         under_way = any(stream.result is None for stream in self._streams)
         if self.stack is None or now_us < self._renew_at_us or under_way:
             return

@@ -1,4 +1,4 @@
-"""What a control law must satisfy, tried on it: its interface, its memory, its limits, its flights."""
+"""Conformance tests of a control law: its interface, its memory, its limits, its flights."""
 
 from typing import TYPE_CHECKING
 

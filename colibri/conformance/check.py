@@ -1,4 +1,4 @@
-"""`check_controller`: every check of a control law, and the table of what came of them."""
+"""`check_controller`: every check of a control law, and their table."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -27,24 +27,18 @@ CHECKS: dict[str, Check] = {
     "flights": flight_checks,
     "restart": restart_checks,
 }
-"""What is tried, in this order, by area."""
+"""Checks by area, in order."""
 HEADINGS = ("area", "tried", "result", "found")
 DURATION_S = 30.0
 
 
 class AreaError(Error):
-    """An area that there is not."""
+    """An unknown area."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conformance:
-    """What came of a control law.
-
-    Attributes:
-        name: Of the law.
-        flown_by: Profile and vehicle.
-        rows: Every trial, in the order in which they were made.
-    """
+    """Results of the checks of a control law, with its profile, vehicle and seed."""
 
     name: str
     flown_by: str
@@ -52,32 +46,26 @@ class Conformance:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
         return not self.failed
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """The trials that failed."""
         return tuple(row for row in self.rows if row.result is Result.FAILED)
 
     @property
     def title(self) -> str:
-        """What was tried, and on what."""
         return f"{self.name}, {self.flown_by}: {len(self.failed)} of {len(self.rows)} failed"
 
     @property
     def failures(self) -> str:
-        """What failed, and how to see it: two lines each."""
         return "".join(f"FAILED  {row.area}: {row.tried}: {row.found}\n   see  {row.see}\n" for row in self.failed)
 
     def __str__(self) -> str:
-        """Return the table as Markdown, and what failed below it."""
         from colibri.analysis.tables import markdown
 
         return markdown(HEADINGS, [_cells(row) for row in self.rows], names=len(HEADINGS)) + self.failures
 
     def _repr_html_(self) -> str:
-        """Return the table as a notebook shows it."""
         return table_html(self.title, map(_cells, self.rows)) + f"<pre>{escape(self.failures)}</pre>"
 
 
@@ -91,19 +79,19 @@ def check_controller(
     only: tuple[str, ...] | list[str] = (),
     progress: Callable[[str], None] = lambda _area: None,
 ) -> Conformance:
-    """Try on a control law what every control law must satisfy.
+    """Test a control law against the requirements on every control law.
 
     Args:
-        controller: Name under which it is registered; or a class, or what else makes one, as `colibri.fly` takes it.
-        profile: Name, file or `Profile`; None: the one whose law it is, or that has numbers for it, else `flight`.
-        vehicle: Name, file or `Vehicle`; None: the profile's.
-        seed: Of the random states and references, and of the weather.
-        duration: Simulated time to fly each track, s.
+        controller: Registered name, class, or factory, as for `colibri.fly`.
+        profile: Name, file or `Profile`; by default the law's own, or one with its numbers, else `flight`.
+        vehicle: Name, file or `Vehicle`; by default the profile's.
+        seed: Seed of random states and references, and of the weather.
+        duration: Simulated time of each track, s.
         only: Areas to try; empty for all.
-        progress: Called with each area before it is tried.
+        progress: Called with each area before its trials.
 
     Raises:
-        Error: There is no such law, area, profile or vehicle, or the law cannot be built.
+        Error: An argument is invalid, or the law cannot be built.
     """
     for area in only:
         if area not in CHECKS:
@@ -122,7 +110,6 @@ def check_controller(
 
 
 def check_by_command(args: argparse.Namespace) -> int:
-    """Check as the command line says; return 1 if something failed."""
     from rich.console import Console
 
     from colibri.analysis.tables import print_table

@@ -1,4 +1,4 @@
-"""Flights: hover held, the thesis's tracks, wind; and how long a step takes."""
+"""Checks in flight: hover, the thesis's tracks, wind; and the time of a step."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -15,32 +15,26 @@ from colibri.conformance.subject import Subject
 
 AREA, TIME_AREA = "flights", "time"
 _HOVER_S, _MAX_DRIFT_M = 8.0, 0.5
-"""In calm air, begun at rest on its point, hover is held within this."""
+"""Permitted drift in calm air, from rest on the point."""
 _WIND, _WIND_S = "5@270", 12.0
 _TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5
-"""Of a flight so long, with at least so many steps, all but the first few are timed."""
+"""Duration and least number of timed steps; the first few are left out."""
 
 
 class Flown(NamedTuple):
-    """A flight as far as it is judged here.
-
-    Attributes:
-        lost: Why the vehicle was lost, or the law failed; empty if neither.
-        off_m: Distance to the reference at each control sample; empty where it ended before the first.
-    """
+    """Distance to the reference at each control sample, m, and reason of a loss."""
 
     lost: str
     off_m: Any
 
     @property
     def rms_m(self) -> float:
-        """Of the last third."""
+        """RMS over the last third."""
         late = self.off_m[2 * len(self.off_m) // 3 :]
         return float(np.sqrt(np.mean(late**2))) if len(late) else np.nan
 
 
 def flight_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what came of whole flights."""
     yield _hover(subject)
     for track in THESIS_TRACKS:
         yield _flown(subject, track, f"{track}, {subject.duration_s:g} s", duration=subject.duration_s)
@@ -59,7 +53,7 @@ def flight_checks(subject: Subject) -> Iterator[Row]:
 
 
 def time_checks(subject: Subject) -> Iterator[Row]:
-    """Yield how long steps took: figures, which differ from computer to computer and from run to run."""
+    """Yield times of steps: figures, as they vary between runs."""
     interval_us = subject.build().control_interval_us
     seconds = max(_TIMED_S, _TIMED * interval_us * 1e-6)
     steps = fly_for_steps(subject, "lemniscate:lap=20", duration=seconds).steps[_UNTIMED:]
@@ -89,7 +83,6 @@ def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
 
 
 def fly(subject: Subject, track: str, **options: Any) -> Flown:
-    """Fly to the end, whatever it is."""
     try:
         plan = subject.plan(track, **options)
         outcome = fly_to_its_end(plan)

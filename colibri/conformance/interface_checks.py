@@ -1,4 +1,4 @@
-"""What a control law has: its rhythm, its references, and the members of the optional protocols, each group whole."""
+"""Checks of a law's members: interval, references, and optional protocols, each complete."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ AREA = "interface"
 
 
 class Protocol(NamedTuple):
-    """An optional part of the interface: it is used only where all its members are there."""
+    """An optional part of the interface, used only if all its members exist."""
 
     what: str
     members: tuple[str, ...]
@@ -30,7 +30,6 @@ OPTIONAL = (ATTITUDE, CHARGE, MASS, PATH, PLAN, COMPILED)
 
 
 def interface_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what can be said of the law without a step."""
     law = subject.build()
     built = f"law = built({subject.of_law})"
     see = subject.script(f"{built}; print(law.preview)", "built")
@@ -44,7 +43,6 @@ def interface_checks(subject: Subject) -> Iterator[Row]:
 
 
 def has(law: Controller[Any], protocol: Protocol) -> bool:
-    """Whether a law has all members of an optional part of the interface."""
     return all(hasattr(law, member) for member in protocol.members)
 
 
@@ -53,7 +51,6 @@ def _rhythm(law: Controller[Any]) -> str:
 
 
 def _rhythm_wrong(law: Controller[Any]) -> str:
-    """Return what is wrong with the references that a law wants; its sample is judged where it is built."""
     preview = law.preview
     if not isinstance(preview, Preview):
         return f"preview is {type(preview).__name__}, not Preview(interval_us, samples)"
@@ -64,13 +61,11 @@ def _rhythm_wrong(law: Controller[Any]) -> str:
 
 
 def _speeds(subject: Subject) -> list[float]:
-    """Return speeds that rotors may begin with: stopped, idle, in hover, fast and as fast as can be."""
     rotors = subject.vehicle.rotors
     return [0.0, rotors.idle_speed, subject.vehicle.hover_speed, 0.9 * rotors.max_speed, rotors.max_speed]
 
 
 def _initial_wrong(subject: Subject, law: Controller[Any]) -> tuple[float, str]:
-    """Return the first rotor speed at which `initial` raises, and what; 0 and nothing if at none."""
     for speed in _speeds(subject):
         try:
             law.initial(speed)
@@ -84,7 +79,6 @@ def _has(law: Controller[Any]) -> str:
 
 
 def _halves(law: Controller[Any]) -> str:
-    """Return which groups are not whole: what is there of them is never used."""
     said = []
     for protocol in OPTIONAL:
         there = [member for member in protocol.members if hasattr(law, member)]
@@ -95,7 +89,7 @@ def _halves(law: Controller[Any]) -> str:
 
 
 def _settings(subject: Subject) -> Row:
-    """Return whether the law reads its table strictly: a figure, since a law need not have a table."""
+    """Check for strict reading of the law's table: only a figure."""
     tried = "an unknown key in its table is refused"
     name = subject.name
     spoilt = {**subject.profile.table(name), "no_such_key": 1.0}

@@ -1,4 +1,4 @@
-"""Finite and within limits: flights from random states, far from what a law is made for, and references that jump."""
+"""Finite decisions within limits: flights from extreme random states, and references that jump."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeAlias
@@ -15,20 +15,13 @@ from colibri.conformance.subject import Subject
 
 AREA = "limits"
 _S, _SAMPLES = 0.4, 6
-"""So long each flight is, and at least so many samples."""
+"""Duration of each flight, and least number of samples."""
 _STARTS = 5
 Draw: TypeAlias = Callable[[np.random.Generator], dict[str, float]]
 
 
 class Kind(NamedTuple):
-    """Flights of one kind.
-
-    Attributes:
-        tried: What they are.
-        track: That is asked for.
-        draw: Returns a start.
-        needs_ground: Whether they are of a vehicle that has ground below.
-    """
+    """Flights of one kind."""
 
     tried: str
     track: str
@@ -86,7 +79,6 @@ KINDS = (
 
 
 def limit_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what came of flights of each kind, and of steps whose references jump."""
     seconds = max(_S, _SAMPLES * subject.build().control_interval_us * 1e-6)
     calm: list[tuple[dict[str, Any], list[FlownStep]]] = []
     for number, kind in enumerate(KINDS):
@@ -110,7 +102,7 @@ def limit_checks(subject: Subject) -> Iterator[Row]:
 
 
 def out_of_limits(subject: Subject, decision: Decision) -> str:
-    """Return what no rotor, log or ground station can take of a decision; empty if nothing."""
+    """Describe an invalid part of a decision."""
     speeds = decision.rotor_speeds
     if not isinstance(speeds, np.ndarray) or speeds.shape != (4,) or not np.issubdtype(speeds.dtype, np.floating):
         return f"rotor_speeds is no array of four floats: {speeds!r}"
@@ -127,7 +119,6 @@ def out_of_limits(subject: Subject, decision: Decision) -> str:
 
 
 def _failure(subject: Subject, track: str, options: dict[str, Any]) -> tuple[str, list[FlownStep]]:
-    """Fly; return what went wrong with the law's decisions, and its steps."""
     try:
         flown = fly_for_steps(subject, track, **options)
     except Error as error:
@@ -137,7 +128,6 @@ def _failure(subject: Subject, track: str, options: dict[str, Any]) -> tuple[str
 
 
 def _jumps(subject: Subject, flights: list[tuple[dict[str, Any], list[FlownStep]]]) -> Row:
-    """Return what came of each step of flights, with references that jump in it."""
     tried, law, count = "references that jump, airborne or not", subject.build(), 0
     for options, steps in flights:
         for index, step in enumerate(steps):

@@ -1,4 +1,4 @@
-"""A control loop over the plant, to be stopped, begun anew and asked for attitudes in mid-flight."""
+"""A control loop over the plant, with restarts and attitude demands in flight."""
 
 from math import acos, degrees
 from time import perf_counter
@@ -18,19 +18,9 @@ from colibri.plant.physics.world import Physics, World, starting_world, state_fr
 
 
 class LoopFlight:
-    """One flight of a control law in calm air.
-
-    Attributes:
-        loop: The control loop that flies now.
-        world: The plant's world now.
-    """
+    """One flight of a control law in calm air."""
 
     def __init__(self, subject: Subject, plan: FlightPlan) -> None:
-        """Begin as `plan` does.
-
-        Raises:
-            Error: The law cannot be used.
-        """
         self._subject, self._plan = subject, plan
         self._physics = Physics(plan.plant_vehicle, "rk4")
         self.world: World = starting_world(plan.start, plan.plant_vehicle)
@@ -39,15 +29,10 @@ class LoopFlight:
         self.loop.begin(self._subject.vehicle.hover_speed, plan.start_yaw_rad)
 
     def new_loop(self) -> ControlLoop:
-        """Return another control loop with a law built anew, which has not begun."""
         return ControlLoop(self._subject.profile, self._subject.vehicle, perf_counter, self._subject.law)
 
     def fly(self, seconds: float) -> Array:
-        """Follow the track; return the distance to the reference at each control sample, m.
-
-        Raises:
-            InFlightError: The law fails, or the vehicle leaves what the model describes.
-        """
+        """Follow the track; return the distance to the reference at each control sample, m."""
         off_m = []
         for _ in range(self._samples(seconds)):
             state = self.loop.observe(state_frame(self.world))
@@ -58,11 +43,6 @@ class LoopFlight:
         return np.array(off_m)
 
     def hold(self, angles: tuple[float, float, float], thrust_n: float) -> VehicleState:
-        """Hold an attitude, rad, and a thrust for `HELD_S`; return the state at the end.
-
-        Raises:
-            InFlightError: As `fly`.
-        """
         n = self.loop.preview.samples
         demand = AttitudeDemand(np.tile(angles, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
         for _ in range(self._samples(HELD_S)):
@@ -73,7 +53,6 @@ class LoopFlight:
 
     @property
     def tilt_deg(self) -> float:
-        """Between the vehicle's axis and the vertical."""
         return degrees(acos(min(max(rotation_matrix(state_frame(self.world).attitude)[2][2], -1.0), 1.0)))
 
     def _samples(self, seconds: float) -> int:
@@ -85,13 +64,12 @@ class LoopFlight:
 
 
 class Restarted(NamedTuple):
-    """A flight whose control loop was begun anew in its middle.
+    """A flight with a restart in its middle.
 
     Attributes:
-        unbroken_m, off_m: Distance to the reference after that, m, (n,): had it not been, and as it was.
-        tilt_deg: At the end.
-        same: Whether both are the same flight, bit for bit.
-        is_plain: Whether the law's memory was plain data, which is kept.
+        unbroken_m, off_m: Distance to the reference afterwards, m, (n,), without and with it.
+        same: Both flights are identical, bit for bit.
+        is_plain: The law's memory was kept.
     """
 
     unbroken_m: Array
@@ -102,7 +80,7 @@ class Restarted(NamedTuple):
 
 
 _BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5
-"""So long is flown before a restart, after it, and with an attitude held."""
+"""Durations before and after a restart, and of a held attitude."""
 HOW = ("seamless", "anew", "blind")
 
 
@@ -116,27 +94,16 @@ def restarted(
     seed: int = 0,
     **options: Any,
 ) -> Restarted:
-    """Fly, replace the control loop in mid-flight, and fly on.
+    """Fly, replace the control loop in flight, and fly on.
 
-    Args:
-        track: What to fly.
-        how: `seamless`: from a checkpoint a moment ago; `anew`: from one too old to go on with, but for charge and
-            mass; `blind`: from nothing.
-        controller: Name or class, as `colibri.fly` takes it.
-        profile: Name, file or `Profile`; None: the one with numbers for the law.
-        vehicle: Name, file or `Vehicle`; None: the profile's.
-        seed: Of everything random.
-        options: Others of `colibri.fly`: start, say.
-
-    Raises:
-        InFlightError: The law fails, or the vehicle leaves what the model describes.
+    `how` is `seamless`: from a recent checkpoint; `anew`: from an old one, with only charge and mass; or `blind`:
+    without.
     """
     subject = Subject.of(controller, profile, vehicle, seed)
     return restart(subject, how, subject.plan(track, **options))
 
 
 def restart(subject: Subject, how: str, plan: FlightPlan) -> Restarted:
-    """Do what `restarted` does, for a plan."""
     flight = LoopFlight(subject, plan)
     flight.fly(_BEFORE_S)
     kept, yaw_rad, world = flight.loop.record(), flight.loop.observe(state_frame(flight.world)).euler[2], flight.world
@@ -159,24 +126,11 @@ def held(
     profile: Any = None,
     vehicle: Any = None,
 ) -> VehicleState:
-    """Have a law hold an attitude and a thrust for 1.5 s, from hover on; return the state at the end.
-
-    Args:
-        phi: Roll, rad.
-        theta: Pitch, rad.
-        thrust_n: Thrust along the body's z axis, N.
-        controller: Name or class, as `colibri.fly` takes it.
-        profile: Name, file or `Profile`; None: the one with numbers for the law.
-        vehicle: Name, file or `Vehicle`; None: the profile's.
-
-    Raises:
-        InFlightError: The law fails, or the vehicle leaves what the model describes.
-    """
+    """Have a law hold roll and pitch, rad, and a thrust, N, for 1.5 s from hover; return the final state."""
     return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n)
 
 
 def hold(subject: Subject, phi: float, theta: float, thrust_n: float) -> VehicleState:
-    """Do what `held` does, for a subject."""
     flight = LoopFlight(subject, subject.plan("hover:height=60", start=subject.start(z=60.0)))
     yaw_rad = flight.loop.observe(state_frame(flight.world)).euler[2]
     return flight.hold((phi, theta, yaw_rad), thrust_n)

@@ -1,4 +1,4 @@
-"""Memory explicit: the same inputs give the same outputs, bit for bit, whatever was asked of the law in between."""
+"""Explicit memory: equal inputs give equal outputs, bit for bit."""
 
 from collections.abc import Callable, Iterator
 from itertools import zip_longest
@@ -17,20 +17,14 @@ from colibri.conformance.subject import Subject
 AREA = "memory"
 _TRACK, _OTHER = "lemniscate:lap=10,height=5", "hover:height=3"
 _S, _SAMPLES = 0.6, 8
-"""So long is flown, and at least so many samples."""
+"""Duration, and least number of samples."""
 
 Taken: TypeAlias = Iterator[tuple[int, Array, Array]]
-"""Number of a step in its flight, the rotor speeds that were decided first, and when it was taken again."""
+"""Number of a step in its flight, its original rotor speeds, and the repeated ones."""
 
 
 class Trial(NamedTuple):
-    """A way to take steps again.
-
-    Attributes:
-        tried: What it shows.
-        take: Takes them.
-        code: Python that shows the difference at step {k}, of steps `s` and a law built anew, `law`.
-    """
+    """A way to repeat steps; `code` shows a difference at step {k}."""
 
     tried: str
     take: Callable[[Subject, list[FlownStep], list[FlownStep]], Taken]
@@ -38,7 +32,6 @@ class Trial(NamedTuple):
 
 
 def memory_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what came of steps that were flown, and then taken again in other ways."""
     seconds = max(_S, _SAMPLES * subject.build().control_interval_us * 1e-6)
     options = {"start": subject.start(x=0.5, z=5.0), "duration": seconds}
     steps = fly_for_steps(subject, _TRACK, **options).steps
@@ -63,7 +56,6 @@ def memory_checks(subject: Subject) -> Iterator[Row]:
 
 
 def _difference(taken: Taken) -> tuple[int, str]:
-    """Return the first step that was decided otherwise, and how; 0 and nothing if none was."""
     at = -1
     try:
         for at, before, after in taken:
@@ -80,7 +72,7 @@ def _words(speeds: Array) -> str:
 
 
 def _given(step: FlownStep) -> Any:
-    """Return the memory that a step was given, as it was then, as far as it can be had."""
+    """Return a step's memory as it was at that time, if possible."""
     return own_copy(step.memory) if step.pickled is None else loads(step.pickled)
 
 
@@ -92,7 +84,7 @@ def _twice(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Take
 
 
 def _anew(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Taken:
-    """Take the steps by a law built anew, each from what that law remembers; what is compiled it has not loaded."""
+    """Repeat by a new law, whose compiled parts are not loaded."""
     return _chained(subject, [steps])
 
 
@@ -110,7 +102,7 @@ def _chained(subject: Subject, flights: list[list[FlownStep]]) -> Taken:
 
 
 def _from_old(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Taken:
-    """Take each step from the very object that it was given, the last one first: the flight has gone on from it."""
+    """Repeat from the original memory objects, the last step first."""
     law = subject.build()
     for at in reversed(range(len(steps))):
         yield at, steps[at].rotor_speeds, steps[at].again(law, steps[at].memory)[1].rotor_speeds
@@ -124,7 +116,6 @@ def _from_pickled(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) 
 
 
 def _plain(steps: list[FlownStep]) -> Row:
-    """Return whether memory can be kept on a disk: a figure, since a law of somebody else's may do without."""
     tried = "plain data, kept over a restart"
     try:
         size = max(len(to_bytes(step.memory)) for step in steps)

@@ -1,4 +1,4 @@
-"""What a law may have beside its interface: that it says the same before and after, and can be flown by."""
+"""Checks of the optional protocols: consistent values, and flight with them."""
 
 from collections.abc import Callable, Iterator
 from math import acos, cos, degrees, isfinite, radians, sin
@@ -21,16 +21,15 @@ _TRACK = "hover:height=3"
 _S, _SAMPLES = 0.3, 4
 _CLOSE = 1e-9
 _MAX_TILT_DEG = 10.0
-"""Holding itself level, or a tilt asked for, a vehicle is no further off than this."""
+"""Largest error of a held attitude."""
 
 _DEMAND = "AttitudeDemand(np.tile({0!r}, (n, 1)), np.zeros((n, 3)), np.full(n, {1!r}))"
 
 Examine: TypeAlias = Callable[[Subject, Any, list[FlownStep]], tuple[str, str]]
-"""Returns what is wrong, empty if nothing is, and Python that shows it."""
+"""Returns a failure, and Python code that shows it."""
 
 
 def optional_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what came of each optional part of the interface."""
     law = subject.build()
     options = {"start": subject.start(x=0.3, z=3.0), "duration": max(_S, _SAMPLES * law.control_interval_us * 1e-6)}
     steps = fly_for_steps(subject, _TRACK, **options).steps
@@ -57,7 +56,7 @@ def _mass(subject: Subject, law: Any, steps: list[FlownStep]) -> str:
 
 
 def _kept(subject: Subject, law: Any, steps: list[FlownStep], get: str, put: str, values: list[float]) -> str:
-    """Return what is wrong with a value that memory holds: read, replaced, flown on with, the old memory untouched."""
+    """Check a value in memory: read, replace, fly on, with the old memory unchanged."""
     step = steps[-1]
     before = getattr(law, get)(step.memory)
     if not isinstance(before, int | float) or not isfinite(before) or before < 0.0:
@@ -120,7 +119,7 @@ def _plan(_: Subject, law: Any, steps: list[FlownStep]) -> str:
 
 
 def _attitude(subject: Subject, law: Any, steps: list[FlownStep]) -> tuple[str, str]:
-    """Return what is wrong with demands in turn with references, and with level and tilted flight by them alone."""
+    """Check demands alternating with references, and flight by demands alone."""
     rng, n = np.random.default_rng(subject.seed), law.preview.samples
     weight_n = subject.vehicle.body.mass_kg * subject.vehicle.gravity_m_s2
     memory = steps[0].memory
@@ -172,7 +171,7 @@ def _axis(phi: float, theta: float, psi: float) -> Any:
 
 
 def _compiled(subject: Subject, _: Any, steps: list[FlownStep]) -> str:
-    """Return what is wrong with what was flown after loading, beside a law that loads it late, and twice."""
+    """Compare with a law that loads its compiled parts late, and twice."""
     late: Any = subject.build()
     for at, step in enumerate(steps):
         decision = step.again(late, step.memory)[1]
@@ -185,8 +184,6 @@ def _compiled(subject: Subject, _: Any, steps: list[FlownStep]) -> str:
 
 
 def _with(examine: Callable[[Subject, Any, list[FlownStep]], str], code: str) -> Examine:
-    """Return what examines, with `code` to show whatever it finds, or what the law raises then."""
-
     def examined(subject: Subject, law: Any, steps: list[FlownStep]) -> tuple[str, str]:
         try:
             return examine(subject, law, steps), code

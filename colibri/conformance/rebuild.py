@@ -1,4 +1,4 @@
-"""The same law built from other numbers, as a ground station's parameters change them in flight."""
+"""Rebuild a law from other numbers, as parameter changes in flight do."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,14 +14,7 @@ _BY, _NUMBERS = 1.05, 16
 
 
 class Rebuilt(NamedTuple):
-    """A law built from one other number.
-
-    Attributes:
-        key: Of the number, in the law's table or the vehicle's.
-        value: That it has.
-        law: None where the law refuses the number, or has another rhythm with it.
-        raised: What it raised that is no refusal; empty if nothing.
-    """
+    """A law with one changed number; `None` if it refused, changed its interval, or raised."""
 
     key: str
     value: float
@@ -30,23 +23,12 @@ class Rebuilt(NamedTuple):
 
 
 def rebuilt(key: str, value: float, *, controller: Any, profile: Any = None, vehicle: Any = None) -> Controller[Any]:
-    """Return a control law built from one other number.
-
-    Args:
-        key: In the law's table, with places in lists in brackets; or `body.mass_kg`.
-        value: That it is to have.
-        controller: Name or class, as `colibri.fly` takes it.
-        profile: Name, file or `Profile`; None: the one with numbers for the law.
-        vehicle: Name, file or `Vehicle`; None: the profile's.
-
-    Raises:
-        Error: It cannot be built.
-    """
+    """Build a control law with one number changed, in its table or `body.mass_kg`."""
     return _build(Subject.of(controller, profile, vehicle, 0), key, value)
 
 
 def rebuilds(subject: Subject) -> Iterator[Rebuilt]:
-    """Yield laws with another mass, and with up to 16 numbers of the table, each 5 % higher by itself."""
+    """Yield laws with another mass, and with up to 16 numbers of the table, each 5 % higher."""
     table = subject.profile.table(subject.name)
     found = [path for path in paths(table) if isinstance(read(table, path), float)]
     every = -(-len(found) // _NUMBERS) or 1

@@ -1,4 +1,4 @@
-"""Restarts: the law begun anew in mid-flight, with its memory or without, and built anew from other numbers."""
+"""Checks of restarts in flight, with memory or without, and of laws rebuilt from other numbers."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -18,7 +18,7 @@ _TRACK = "circle:speed=1"
 _ON_IT = {"x": 2.0, "psi": 90.0, "vy": 1.0}
 _MAX_TILT_DEG = 45.0
 _STEPS = 3
-"""So many are taken with each number that is changed."""
+"""Steps with each changed number."""
 _TRIED = {
     "seamless": "from its checkpoint, the same flight bit for bit",
     "anew": "begun anew in flight, charge and mass kept",
@@ -27,7 +27,6 @@ _TRIED = {
 
 
 def restart_checks(subject: Subject) -> Iterator[Row]:
-    """Yield what came of restarts."""
     plan = subject.plan(_TRACK, start=subject.start(**_ON_IT))
     for how in HOW:
         failure, found = "", ""
@@ -50,7 +49,6 @@ def restart_checks(subject: Subject) -> Iterator[Row]:
 
 
 def _handed_over(subject: Subject) -> Row:
-    """Return what came of laws built from other numbers, each handed the memory that the first has."""
     tried = "built from other numbers, handed the old memory"
     options = {"start": subject.start(**_ON_IT), "duration": max(0.3, 6e-6 * subject.build().control_interval_us)}
     steps = fly_for_steps(subject, _TRACK, **options).steps
@@ -68,7 +66,6 @@ def _handed_over(subject: Subject) -> Row:
 
 
 def _fails(subject: Subject, law: Controller[Any], steps: list[FlownStep]) -> str:
-    """Return what is wrong with steps of a flight if a law takes them that is handed memory there."""
     memory = steps[0].memory
     try:
         for step in steps:

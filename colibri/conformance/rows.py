@@ -1,4 +1,4 @@
-"""Rows of the table: what was tried, what came of it, and how to see a failure."""
+"""Rows of the table."""
 
 from collections.abc import Callable, Iterator
 from enum import StrEnum
@@ -8,7 +8,7 @@ from colibri.conformance.subject import Subject
 
 
 class Result(StrEnum):
-    """What came of a trial."""
+    """Result of a trial."""
 
     OK = "ok"
     FAILED = "failed"
@@ -17,15 +17,7 @@ class Result(StrEnum):
 
 
 class Row(NamedTuple):
-    """One trial.
-
-    Attributes:
-        area: What it belongs to: interface, memory, limits, optional, time, flights, restart.
-        tried: What was tried.
-        result: What came of it; a figure is no verdict.
-        found: The numbers, or what went wrong.
-        see: A command, or Python, that shows the failure; empty where nothing failed.
-    """
+    """One trial; `see` is a command, or Python, that shows its failure."""
 
     area: str
     tried: str
@@ -39,12 +31,10 @@ Check: TypeAlias = Callable[[Subject], Iterator[Row]]
 
 
 def judged(area: str, tried: str, failure: str, found: str, see: str) -> Row:
-    """Return the row of a trial that failed if there is a `failure`, and else has `found` something."""
     if failure:
         return Row(area, tried, Result.FAILED, failure, see)
     return Row(area, tried, Result.OK, found)
 
 
 def not_applicable(area: str, tried: str, why: str) -> Row:
-    """Return the row of a trial that this law, or this vehicle, has nothing for."""
     return Row(area, tried, Result.NOT_APPLICABLE, why)

@@ -1,4 +1,4 @@
-"""The steps of a flight as its control law took them, to be taken again: with the memory, the state, the references."""
+"""Steps of a flight with their memory, state and references, for repetition."""
 
 from collections.abc import Mapping
 from copy import deepcopy
@@ -24,7 +24,7 @@ _MEMBERS = (
     *("charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns", "warm_up"),
     *("min_path_speed", "path_speed", "lag_us", "with_lag"),
 )
-"""What the autopilot asks a control law for."""
+"""Members that the autopilot uses."""
 _JUMP_M, _JUMP_RAD = 5.0, 4.0
 
 
@@ -32,16 +32,9 @@ class FlownStep(NamedTuple):
     """One step of a control law.
 
     Attributes:
-        method: Which was asked: `step`, or `step_on_path`.
-        memory: What it was given, the object itself.
-        pickled: The same as it was then; None where it cannot be pickled.
-        time_us: Simulated time.
-        state: The vehicle, a copy.
-        references: A copy.
-        changed: Whether the references that it was given were others afterwards.
-        decision: What it returned, the object itself.
-        rotor_speeds: Of the decision, as they were then.
-        took_s: Wall-clock time.
+        memory: The object itself; `pickled` before the step, if possible.
+        references: A copy; `changed` if the law has modified its own.
+        decision: The object itself, with a copy of its `rotor_speeds`.
     """
 
     method: str
@@ -56,11 +49,7 @@ class FlownStep(NamedTuple):
     took_s: float
 
     def again(self, law: Controller[Any], memory: Any) -> tuple[Any, Decision]:
-        """Take the step by another law, or from another memory; return the next memory and the decision.
-
-        Raises:
-            Exception: Whatever the law raises.
-        """
+        """Repeat the step by another law, or from another memory."""
         try:
             answer = getattr(law, self.method)(memory, self.time_us, self.state, copied(self.references))
         except SystemExit as error:
@@ -71,13 +60,7 @@ class FlownStep(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """A flight by its steps.
-
-    Attributes:
-        steps: All that the law took.
-        failure: What it raised, or decided that no rotor can follow; empty if it did not.
-        raised: The exception.
-    """
+    """Steps of a flight, and the law's failure."""
 
     steps: list[FlownStep]
     failure: str
@@ -85,10 +68,9 @@ class Flown(NamedTuple):
 
 
 class Recorder:
-    """A control law that notes each step; it has the members of the law that it is made of, no more and no less."""
+    """A control law that records each step; it has the same members as the original."""
 
     def __init__(self, law: Controller[Any]) -> None:
-        """Note the steps of `law`."""
         self.steps: list[FlownStep] = []
         for name in _MEMBERS:
             if hasattr(law, name):
@@ -112,11 +94,7 @@ class Recorder:
 
 
 def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
-    """Fly, with the options of `colibri.fly`, until the flight ends or the law fails; return its steps.
-
-    Raises:
-        Error: It cannot be flown.
-    """
+    """Fly until the flight ends or the law fails."""
     recorders: list[Recorder] = []
 
     def law(table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> Controller[Any]:
@@ -145,19 +123,7 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
 def flown_steps(
     track: str, *, controller: Any, profile: Any = None, vehicle: Any = None, seed: int = 0, **options: Any
 ) -> tuple[Controller[Any], list[FlownStep]]:
-    """Fly a control law; return the law, built anew, and the steps of the flight.
-
-    Args:
-        track: What to fly.
-        controller: Name or class, as `colibri.fly` takes it.
-        profile: Name, file or `Profile`; None: the one with numbers for the law.
-        vehicle: Name, file or `Vehicle`; None: the profile's.
-        seed: Of everything random.
-        options: Others of `colibri.fly`: start, duration, wind.
-
-    Raises:
-        Error: It cannot be flown, or it failed in flight.
-    """
+    """Fly a control law with options of `colibri.fly`; return the law, rebuilt, and its steps."""
     subject = Subject.of(controller, profile, vehicle, seed)
     flown = fly_for_steps(subject, track, **options)
     if flown.raised is not None:
@@ -166,12 +132,10 @@ def flown_steps(
 
 
 def copied(references: Horizon) -> Horizon:
-    """Return references of its own."""
     return Horizon(*(np.array(column) for column in references))
 
 
 def pickled_or_none(memory: Any) -> bytes | None:
-    """Return the memory of a control law, pickled; None where it cannot be."""
     try:
         return dumps(memory)
     except Exception:  # whatever the memory's own `__reduce__` raises: that it cannot be kept is what is found
@@ -179,7 +143,6 @@ def pickled_or_none(memory: Any) -> bytes | None:
 
 
 def own_copy(memory: Any) -> Any:
-    """Return a copy of the memory of a control law; where it cannot be copied, itself."""
     try:
         return deepcopy(memory)
     except Exception:  # whatever its own `__deepcopy__` raises: the check of the pickle says so
@@ -187,10 +150,7 @@ def own_copy(memory: Any) -> Any:
 
 
 def jumped(step: FlownStep, seed: int) -> FlownStep:
-    """Return the step with references that have jumped, by metres and turns, from one of them on; and another ground.
-
-    Whether the vehicle is said to be airborne is turned round, too.
-    """
+    """Make the references jump from a random one on, and invert `airborne`."""
     rng = np.random.default_rng(seed)
     references = copied(step.references)
     since = int(rng.integers(len(references.yaw_rad)))

@@ -1,4 +1,4 @@
-"""The control law under test: how it is built, how it is flown, and the command that flies it so again."""
+"""The control law under test, and commands that repeat its flights."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,21 +19,12 @@ from colibri.plant.vehicle.description import Vehicle
 _DEFAULT_PROFILE = "flight"
 _MODULE = "colibri.conformance"
 _SHELLS = set('"$`\\!')
-"""What a shell reads between double quotes."""
+"""Special characters between double quotes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A control law, with all that it is built from.
-
-    Attributes:
-        law: Makes it.
-        profile: With its numbers.
-        vehicle: That it controls.
-        seed: Of everything random.
-        duration_s: Simulated time to fly each track.
-        given: Options of `colibri.fly` that make this law: controller, profile, vehicle.
-    """
+    """A control law with its inputs; `given` are its options of `colibri.fly`."""
 
     law: Factory
     profile: Profile
@@ -44,13 +35,7 @@ class Subject:
 
     @classmethod
     def of(cls, controller: Any, profile: Any, vehicle: Any, seed: int, duration_s: float = 30.0) -> "Subject":
-        """Return the law of a name, or a class, as `colibri.fly` takes it; None: the profile or vehicle it is made for.
-
-        Raises:
-            ControllerError: There is no such control law.
-            ProfileError: The profile cannot be read.
-            VehicleError: The vehicle cannot be read.
-        """
+        """Resolve a law as `colibri.fly` does; profile and vehicle default to the law's."""
         named = isinstance(controller, str)
         law = load_controller(controller) if named else controller
         profile = profile or profile_for(LawSpec(controller=controller).law_name or "")
@@ -60,53 +45,38 @@ class Subject:
 
     @property
     def name(self) -> str:
-        """By which it is registered, or the class's."""
         return self.profile.controller
 
     @property
     def max_speed(self) -> float:
-        """Of a rotor, in the vehicle's unit."""
         return self.vehicle.rotors.max_speed
 
     def start(self, **changed: float) -> dict[str, float]:
-        """Return how a flight begins: at rest in hover 2 m above the origin, but for what is changed."""
+        """Return a start at rest in hover 2 m above the origin, with changes."""
         rpm = self.vehicle.hover_speed / self.vehicle.speed_from_rpm(1.0)
         return {"x": 0.0, "y": 0.0, "z": 2.0, "rotors": round(rpm, 3), **changed}
 
     def build(self, profile: Profile | None = None, vehicle: Vehicle | None = None) -> Controller[Any]:
-        """Return the law, built anew, from another profile or vehicle where one is named.
-
-        Raises:
-            Error: It cannot be built.
-        """
         return build_controller(profile or self.profile, vehicle or self.vehicle, perf_counter, self.law)
 
     def plan(self, track: str, out: Path = Path(), **options: Any) -> FlightPlan:
-        """Return the plan of a flight without the codec; its logs would be in `out`.
-
-        Raises:
-            Error: It cannot be flown: the vehicle cannot start like that, say.
-        """
         every = {**self.given, "link": "direct", "seed": self.seed, "out": out, **options}
         return FlightPlan.of(FlightSpec.of(track, **every))
 
     def command(self, track: str, **options: Any) -> str:
-        """Return what flies the same flight again: a command, or Python where no command knows the law."""
+        """Return a command that repeats the flight, or Python for an unregistered law."""
         every = {**self.given, "link": "direct", "seed": self.seed, **options}
         if all(isinstance(value, str) for value in self.given.values()):
             return f"colibri fly {join([track, *(_option(*each) for each in every.items())])}"
         return f"colibri.fly({track!r}, {_words(every)})"
 
     def snippet(self, code: str, track: str, **options: Any) -> str:
-        """Return Python that flies a flight for its steps and does something with them.
-
-        `code` finds the law as `law` and the steps of the flight as `s`.
-        """
+        """Return Python that flies, and runs `code` with law `law` and steps `s`."""
         names = ["flown_steps", *(name for name in ("jumped", "rebuilt") if f"{name}(" in code)]
         return self.script(f"law, s = flown_steps({self.call(track, **options)}); {code}", *names)
 
     def script(self, code: str, *names: str) -> str:
-        """Return Python that imports names of this room, as a command where that can be."""
+        """Return Python with imports of this package, as a shell command if possible."""
         code = f"from {_MODULE} import {', '.join(names)}; {code}"
         by_name = all(isinstance(value, str) for value in self.given.values())
         if not by_name:
@@ -114,26 +84,20 @@ class Subject:
         return f"python -c {quote(code)}" if _SHELLS & set(code) else f'python -c "{code}"'
 
     def call(self, track: str, **options: Any) -> str:
-        """Return the arguments of a call that flies the law, as Python writes them."""
         return f"{track!r}, {_words({**self.given, 'seed': self.seed, **options})}"
 
     @property
     def of_law(self) -> str:
-        """The arguments of a call that builds the law, as Python writes them."""
         return _words(self.given)
 
 
 def built(*, controller: Any, profile: Any = None, vehicle: Any = None) -> Controller[Any]:
-    """Return a control law as it is checked: by its name, or of a class, as `colibri.fly` takes it.
-
-    Raises:
-        Error: It cannot be built.
-    """
+    """Build a control law from its name or class."""
     return Subject.of(controller, profile, vehicle, 0).build()
 
 
 def profile_for(controller: str) -> str:
-    """Return the profile whose law it is; else the first that has numbers for it; else the default one."""
+    """Return the law's own profile, else one with its numbers, else the default."""
     profiles = {name: load_profile(name) for name in profile_names()}
     own = [name for name, profile in profiles.items() if profile.controller == controller]
     known = [name for name, profile in profiles.items() if controller in profile.controllers]
@@ -141,7 +105,6 @@ def profile_for(controller: str) -> str:
 
 
 def _words(options: Mapping[str, Any]) -> str:
-    """Return options as Python writes them; an object goes by its name, or by that of its kind."""
     return ", ".join(f"{name}={_word(value)}" for name, value in options.items())
 
 
@@ -152,6 +115,5 @@ def _word(value: Any) -> str:
 
 
 def _option(name: str, value: Any) -> str:
-    """Return an option as a command line has it."""
     said = ",".join(f"{key}={each!r}" for key, each in value.items()) if isinstance(value, Mapping) else value
     return f"--{name.replace('_', '-')}={said}"

@@ -37,13 +37,7 @@ _FORMATS = (".4g", ".4g", ".4g", ".0f", ".0f")
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Compare as the command line says; return 1 if a vehicle was lost.
-
-    RMS is that after the first 20 s, maximum that over the whole flight, its start beside the track included.
-
-    Raises:
-        Error: A flight cannot begin.
-    """
+    """Compare; RMS is that after the first 20 s, the maximum includes the start."""
     table = fly_comparison(args, "compare", _METRICS, "all")
     rows = [(*names, *_cells(table.flown[place])) for names, (place,) in table.groups().items()]
     write_table(args.out / "compare", COLUMNS, rows, names=2)

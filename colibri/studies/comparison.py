@@ -1,4 +1,4 @@
-"""Flying what `colibri compare` asks for: a campaign whose flights are known again by what they are made of."""
+"""Campaign of `colibri compare`; contents identify completed flights."""
 
 import argparse
 from collections.abc import Sequence
@@ -24,13 +24,7 @@ from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_o
 
 
 def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:
-    """Fly every contender along every track by every seed, but for what `--resume` finds; return what came of it.
-
-    `NAME-journal.jsonl` in the folder of the comparison has each flight as soon as it has ended.
-
-    Raises:
-        Error: A flight cannot begin, or what is there cannot be gone on with.
-    """
+    """Fly all contenders, tracks and seeds; `NAME-journal.jsonl` records each flight as it ends."""
     planned = _campaign(args, name, metrics, logs)
     common = common_of(planned)
     points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
@@ -52,7 +46,6 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
 
 
 def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:
-    """Return the campaign that a command line asks for."""
     names = set(keywords_of(FlightSpec)) - {"track", "profile", "controller", "seed"}
     options = {option: value for option, value in vars(args).items() if option in names}
     tables = CampaignTables(
@@ -75,7 +68,6 @@ def _folder(point: Point, *, by_seeds: bool) -> str:
 
 
 def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argparse.Namespace) -> None:
-    """Fly, with a bar, and keep what comes of it."""
     for point in points if common.logs == "all" else ():
         prepare(args.out / point.folder)
     with closing(fly_points(points, common, Pool())) as ended:
@@ -84,12 +76,10 @@ def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argpar
 
 
 def _in_folder(flown: Flown, folder: str, out: Path) -> Flown:
-    """Return a flight that says where its folder lies, with `out` before it."""
     return flown._replace(why=flown.why.replace(folder, str(out / folder)))
 
 
 def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flown]:
-    """Return those of the flights that a journal has with the same contents."""
     kept = {each.contents: each for each in read_journal(file) if len(each.metrics) == len(common.metrics)}
     found = {}
     for point in points if kept else ():
@@ -100,7 +90,6 @@ def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flow
 
 
 def _keep_settings(path: Path, planned: Campaign, *, resume: bool) -> None:
-    """Write what all flights have in common; to resume, what is there already has to be the same."""
     now = {name: shown(value) for name, value in planned.fly.items()}
     if resume and path.exists():
         try:

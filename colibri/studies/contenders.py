@@ -1,4 +1,4 @@
-"""Contenders, which are profiles with controllers told apart by name, and what they do in one folder."""
+"""Contenders: profiles with controllers, distinguished by name, and their folders."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -12,24 +12,18 @@ _MAX_NAME = 200
 
 
 def folder_of(contender: str, track: str) -> str:
-    """Return the name of the folder for a contender's flights along a track."""
     name = f"{quote(contender.replace(':', '-'), safe='')}-{folder_name(track)}"
     return name if len(name) <= _MAX_NAME else f"{name[:_MAX_NAME]}-{sha256(name.encode()).hexdigest()[:8]}"
 
 
 def folder_name(track: str) -> str:
-    """Return a track's name with its options as the name of a folder, one that no other track has."""
     return quote(track.replace(":", "-", 1), safe="=,")
 
 
 def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = None) -> dict[str, dict[str, str]]:
-    """Return contenders, each once, by `NAME[:CONTROLLER]`, those without one with each of `controllers`.
+    """Return the levels of a campaign's factor from `NAME[:CONTROLLER]`.
 
-    They are levels of a campaign's factor: by its name, which profile each has, and which controller if not its own.
-    A file of its own name is called by that; where two would be called alike, by its path.
-
-    Raises:
-        ProfileError: There is no such profile.
+    A level has the profile's name, or its path where names coincide.
     """
     given: dict[tuple[str, str | None], None] = {}
     for text in profiles:

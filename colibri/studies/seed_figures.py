@@ -1,4 +1,4 @@
-"""The figure of many flights by chance: how their errors are distributed, track by track."""
+"""Figure of the errors of many seeds, track by track."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -42,11 +42,11 @@ _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
 )
 
 _BY_TRUTH = ("RMS (m)", {_TRUE: ("#000000", "off its reference")})
-"""Where the autopilot is told the truth, there is no other."""
+"""The only panel of a flight on the state."""
 
 
 def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
-    """Draw `seeds.png`: a dot a flight, a bar at the median; the mean NEES, and that of an honest filter."""
+    """Draw `seeds.png`: a dot a flight, a bar at the median; NEES and NIS with their bounds."""
     cases = table.groups()
     estimated = not np.isnan(table.metric("estimation_rmse_m.horizontal")).all()
     panels = _PANELS if estimated else (_BY_TRUTH,)
@@ -81,12 +81,10 @@ def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
 
 
 def _shift(number: int, of: int) -> float:
-    """Return how far below its track a quantity is drawn, one of so many."""
     return min(0.26, 0.85 / of) * (number - 0.5 * (of - 1))
 
 
 def _draw_nees(axes: Axes, table: FlightTable) -> None:
-    """Draw the mean NEES of each flight, and where the mean of all belongs."""
     _strips(axes, table, "nees_mean", "#000000", "", 0.0, np.mean)
     within = bounds(NAVIGATION, len(table.campaign.seeds))
     axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
@@ -95,7 +93,6 @@ def _draw_nees(axes: Axes, table: FlightTable) -> None:
 
 
 def _draw_nis(axes: Axes, table: FlightTable) -> None:
-    """Draw the mean NIS of each flight in parts of how many numbers it has, and between which bounds 95 % belong."""
     for number, (kind, numbers) in enumerate(MEASURED.items()):
         shift = _shift(number, len(MEASURED))
         _strips(axes, table, f"nis_mean.{kind}.mean", _NIS_COLORS[number % len(_NIS_COLORS)], kind, shift)

@@ -1,4 +1,4 @@
-"""`colibri compare --seeds`: the same flights by many seeds, and how their errors are distributed."""
+"""`colibri compare --seeds`: the distribution of errors over many seeds."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ HEADINGS = (
     "NEES",
 )
 _WITHOUT_ESTIMATE = 5
-"""So many of them say something of a flight on the state, where control and true error are the same."""
+"""Columns of a flight on the state, where control and true error are the same."""
 _ERRORS = (
     *("control_rmse_m", "rmse_after_20s_m", "estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw"),
@@ -32,7 +32,6 @@ NEES = "nees_mean"
 
 
 def _of_innovations(kind: str, figure: str) -> Metric:
-    """Return a figure of one of `MEASURED` as a metric; of what the vehicle does not measure there is none."""
     return Metric(
         f"nis_mean.{kind}.{figure}", lambda flight: (flight.report["nis_mean"] or {}).get(kind, {}).get(figure)
     )
@@ -42,16 +41,12 @@ METRICS = (
     *map(Metric, (*_ERRORS, NEES)),
     *(_of_innovations(kind, figure) for kind in MEASURED for figure in ("mean", "innovations")),
 )
-"""After 20 s: root mean squares of one flight, m and degrees; the mean NEES; of each kind of measurement the mean NIS
-in parts of how many numbers it has, and of how many innovations."""
+"""After 20 s: RMS of one flight, m and degrees; mean NEES; by kind of measurement mean NIS over its degrees of freedom,
+and the number of innovations.
+"""
 
 
 def compare_seeds(args: argparse.Namespace) -> int:
-    """Fly every contender along every track by every seed; return 1 if one was lost.
-
-    Raises:
-        Error: A flight cannot begin, or what is there cannot be gone on with.
-    """
     table = fly_comparison(args, "seeds", METRICS, "none")
     (args.out / "seeds-flights.csv").write_text(comma_separated(table.headings, table.rows()), encoding="utf-8")
     rows = [(*names, *_cells(table, places)) for names, places in table.groups().items()]
@@ -71,7 +66,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
 
 
 def _cells(table: FlightTable, places: Sequence[int]) -> Row:
-    """Return root mean squares over the flights, of NEES the mean, and the largest of one flight in brackets."""
+    """Return RMS over the flights, the mean of NEES, and in brackets the largest of one flight."""
     through = table.through(places)
     errors = (_cell(table.metric(name)[through], rms) for name in _ERRORS)
     return (

@@ -1,7 +1,4 @@
-"""`colibri study`: what profile `flight` reaches; of every study a table and figures.
-
-A study is data: cases to fly, each with its place in the table, and what is measured of each.
-"""
+"""`colibri study`: performance of profile `flight`, each study with a table and figures."""
 
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,7 +26,7 @@ from colibri.studies.study_flights import Flown, fly
 FORMATS = ("png", "svg")
 LPV_MPC, WHOLE, ON_PATH, SE3, THESIS = "LPV-MPC", "whole LPV-MPC", "whole, on the path", "SE(3)", "thesis"
 Settings: TypeAlias = Mapping[str, Any]
-"""Options and keys of one flight, as a campaign has them."""
+"""Options and keys of one flight, as in a campaign."""
 _LAWS: dict[str, Settings] = {
     THESIS: {"profile": "thesis"},
     SE3: {"controller": "geometric-se3"},
@@ -43,18 +40,18 @@ SPIRAL, LEMNISCATE = "spiral", "lemniscate"
 _LEVEL_DEG = 10.0
 _THERE_M = 0.1
 _SIZE_M = 4.0
-"""Of the lemniscate where nothing else is given."""
+"""Default size of the lemniscate."""
 
 
 class Measure(NamedTuple):
-    """A column of a table: its heading, and its cell."""
+    """A column of a table."""
 
     heading: str
     cell: Callable[[Flown], str]
 
 
 class Case(NamedTuple):
-    """A flight with its place in the table: the names of its row, and the group of columns that it fills."""
+    """A flight, the names of its row, and its group of columns."""
 
     row: Row
     group: str
@@ -62,15 +59,7 @@ class Case(NamedTuple):
 
 
 class Study(NamedTuple):
-    """A study.
-
-    Attributes:
-        name: Its name on the command line.
-        headings: Of the names of a row.
-        measures: What each group of columns shows.
-        cases: What to fly.
-        draw: Results in the order of the cases -> figures with their names.
-    """
+    """Cases, the measures of each group, and a function from results to named figures."""
 
     name: str
     headings: Row
@@ -80,27 +69,23 @@ class Study(NamedTuple):
 
 
 def number(value: float) -> str:
-    """Return a number as a cell: three digits; a dash for what there is not."""
     return "-" if isnan(value) else f"{value:.3g}"
 
 
 def unless_lost(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
-    """Return the cell of what means nothing once the vehicle is lost."""
     return lambda flown: "lost" if flown.lost else number(of(flown))
 
 
 def unless_crashed(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
-    """Return the cell of what means nothing once the vehicle lies on the ground."""
     return lambda flown: "crashed" if flown.crashed else number(of(flown))
 
 
 def decided(fallback: Fallback) -> Callable[[Flown], str]:
-    """Return the cell that counts the control samples decided by `fallback`."""
     return lambda flown: str(int(flown.decided_by(fallback).sum()))
 
 
 def bound(column: int) -> Callable[[Flown], str]:
-    """Return the cell of the part of the settled control samples at which a kind of constraint binds, %."""
+    """Return the percentage of settled control samples with a kind of constraint active."""
 
     def cell(flown: Flown) -> str:
         binds = flown.recording.active[flown.settled[:-1], column] > 0
@@ -155,7 +140,7 @@ def _recovery() -> Iterable[Case]:
 
 
 def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:
-    """Return a plant that differs by factors; without ground, for a lighter body would need a softer one."""
+    """Return a plant that differs by factors; without ground, as a lighter body needs a softer one."""
     return {
         "plant-vehicle.body.mass_kg*": mass,
         "plant-vehicle.body.inertia_kg_m2*": inertia,
@@ -250,7 +235,6 @@ STUDIES = (
 
 
 def study(args: argparse.Namespace) -> int:
-    """Study as the command line says; return the exit code."""
     wanted = _wanted(args.names)
     make_folder(args.out)
     flights: list[Settings] = []
@@ -267,13 +251,11 @@ def study(args: argparse.Namespace) -> int:
 
 
 def campaign(flights: Sequence[Settings]) -> Campaign:
-    """Return flights as a campaign: each is a level of its one factor."""
     levels = {str(number): flight for number, flight in enumerate(flights)}
     return campaign_of(CampaignTables(name="study", grid={"case": levels}))
 
 
 def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:
-    """Write table and figures of a study whose cases were flown; return what was written."""
     paths = write_table(out / study.name, *table(study, flown), names=len(study.headings))
     results = [Result(case.row, case.group, result) for case, result in zip(study.cases, flown, strict=True)]
     for name, figure in study.draw(results).items():
@@ -282,7 +264,7 @@ def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:
 
 
 def table(study: Study, flown: Sequence[Flown]) -> tuple[Row, list[Row]]:
-    """Return headings and rows: one row for the cases of each name, in it the measures of each group."""
+    """Return headings and rows: one row for each name, in it the measures of each group."""
     groups = list(dict.fromkeys(case.group for case in study.cases))
     headings = [f"{group}: {measure.heading}".removeprefix(": ") for group in groups for measure in study.measures]
     cells = {

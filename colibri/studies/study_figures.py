@@ -1,4 +1,4 @@
-"""The figures of the studies: one function a study, from its results to figures by name."""
+"""Figures of the studies, one function for each."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from colibri.common.types import Array
 from colibri.studies.study_flights import Flown
 
 COLORS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")
-"""Okabe's and Ito's."""
+"""Colours of Okabe and Ito."""
 RECOVERY_SHOWN_S = 3.0
 LIMITS_SHOWN_S = 6.0
 
@@ -29,13 +29,13 @@ _CONTENDERS = {
     "whole, on the path": "#CC79A7",
 }
 _MOST_M = 50.0
-"""What is further off is drawn as if it were so far off."""
+"""Larger errors are drawn at this one."""
 _ALSO_WITHOUT = ("SE(3)", "LPV-MPC", "whole LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
 
 class Result(NamedTuple):
-    """A case that was flown: the names of its row in the table, its group of columns there, and what came of it."""
+    """A completed case."""
 
     row: tuple[str, ...]
     group: str
@@ -43,7 +43,6 @@ class Result(NamedTuple):
 
 
 def tracks(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw RMS and largest error of every contender on every track."""
     names = _names(result.row[0] for result in results)
     figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.62 * len(names))
     figure.subplots_adjust(left=0.17)
@@ -57,7 +56,6 @@ def _names(names: Iterable[str]) -> list[str]:
 
 
 def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
-    """Draw a row for each name: RMS and largest error of every group."""
     names, groups = _names(name for _, name in named), _names(result.group for result, _ in named)
     for group in groups:
         color = _CONTENDERS[group]
@@ -86,7 +84,6 @@ def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
 
 
 def speed(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw error and tilt against the top speed of the lemniscate."""
     figure, grid = axes_grid(3, 1, TOP_IN + 2 * _LEGEND_ROW_IN, row_in=2.1)
     quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
         ("RMS (m)", lambda flown: min(flown.rms_m, _MOST_M)),
@@ -114,7 +111,6 @@ def speed(results: Sequence[Result]) -> dict[str, Figure]:
 
 
 def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw the error of both schedulings against the lap time."""
     figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=3.0)
     for number, group in enumerate(dict.fromkeys(result.group for result in results)):
         shown = [result for result in results if result.group == group]
@@ -130,7 +126,6 @@ def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
 
 
 def robustness(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw RMS and largest error of every contender with every plant, on each track."""
     on = _names(result.row[0] for result in results)
     plants = _names(result.row[1] for result in results)
     figure, grid = axes_grid(len(on), 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.55 * len(plants))
@@ -146,7 +141,6 @@ def robustness(results: Sequence[Result]) -> dict[str, Figure]:
 
 
 def recovery(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw the first seconds of every start: a figure of all for each law, and one each of the last law."""
     groups = _names(result.group for result in results)
     by_group = {group: [result for result in results if result.group == group] for group in groups}
     return {
@@ -156,7 +150,6 @@ def recovery(results: Sequence[Result]) -> dict[str, Figure]:
 
 
 def limits(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw rotor speeds, active constraints and error of every flight."""
     return {"-".join(("limits", *map(_file_name, result.row))): _limits(result) for result in results}
 
 
@@ -248,7 +241,7 @@ def _rotors(axes: Axes, flown: Flown, shown: Any) -> None:
 
 
 _KINDS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
-"""Of active constraints, in their order."""
+"""Colours of active constraints, in their order."""
 _FOUR = ("#000000", "#E69F00", "#0072B2", "#009E73")
 
 
@@ -271,7 +264,7 @@ def _dress(axes: Axes, quantity: str) -> None:
 
 
 def _spans(t: Array, holds: Any) -> list[tuple[float, float]]:
-    """Return from when to when a condition holds, whose samples last until the next, s."""
+    """Return begin and end of each interval of a condition, s."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]])))
     ends = np.append(t, 2.0 * t[-1] - t[-2])
     return [(float(t[begin]), float(ends[end])) for begin, end in edges.reshape(-1, 2)]

@@ -1,4 +1,4 @@
-"""One flight of a study: how it is flown, and the figures of merit of what came of it."""
+"""One flight of a study, and its figures of merit."""
 
 from dataclasses import dataclass
 from math import isnan, nan
@@ -21,20 +21,13 @@ from colibri.mavlink.ulog.log import MemoryLog
 
 _AWAY_M = 200.0
 _GROUNDED_M = 0.1
-"""No study flies so low; a vehicle on its back lies as high as one on its feet, or a little lower."""
+"""Below all studies; a vehicle on its back lies at most as high as on its feet."""
 _SAMPLE_TIME_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A flight that was flown.
-
-    Attributes:
-        recording: What it left behind.
-        rotor_limits: Least rotor speed, and the largest that the battery allows at each sample, (n,), both in the
-            vehicle's unit.
-        failure: Why it ended early; None if it did not.
-    """
+    """A completed flight; rotor limits are the least speed, and the largest by battery voltage, (n,)."""
 
     recording: Recording
     rotor_limits: tuple[float, Array]
@@ -42,7 +35,6 @@ class Flown:
 
     @property
     def t(self) -> Array:
-        """Times, s, (n,)."""
         return self.recording["t"]
 
     @property
@@ -53,31 +45,28 @@ class Flown:
 
     @property
     def tilt_deg(self) -> Array:
-        """Angle between the body's z axis and the vertical, degrees, (n,)."""
+        """Angle between the body's z axis and the vertical, (n,)."""
         angle: Array = np.degrees(np.arccos(np.clip(self.upright, -1.0, 1.0)))
         return angle
 
     @property
     def settled(self) -> NDArray[np.bool_]:
-        """At which samples the start no longer counts, (n,)."""
         after: NDArray[np.bool_] = self.t >= SETTLED_AFTER_S - _SAMPLE_TIME_S
         return after
 
     @property
     def rms_m(self) -> float:
-        """RMS of the position error once settled, m; not a number for a flight too short."""
+        """RMS of the settled position error; nan for a flight too short."""
         error = self.recording.position_error_m[self.settled]
         return float(np.sqrt(np.mean(error**2))) if len(error) else nan
 
     @property
     def max_error_m(self) -> float:
-        """Largest position error once settled, m; not a number for a flight too short."""
         error = self.recording.position_error_m[self.settled]
         return float(error.max()) if len(error) else nan
 
     @property
     def lost(self) -> bool:
-        """Whether it ended early, or ended up far off its reference."""
         return self.failure is not None or (not isnan(self.max_error_m) and self.max_error_m > LOST_M)
 
     @property
@@ -88,23 +77,21 @@ class Flown:
 
     @property
     def height_lost_m(self) -> float:
-        """How far it sank below where it began, m."""
         return float(self.recording["z"][0] - self.recording["z"].min())
 
     def decided_by(self, fallback: Fallback) -> NDArray[np.bool_]:
-        """Return at which control samples `fallback` decided, (m,)."""
         decided: NDArray[np.bool_] = self.recording.fallback == FALLBACK_CODES[fallback]
         return decided
 
     def stays_below(self, values: Array, bound: float) -> float:
-        """Return the time, s, from which `values` (n,) stay below `bound`; not a number if they do not."""
+        """Return the first time after which `values` (n,) stay below `bound`; nan if they do not."""
         above = np.flatnonzero(values >= bound)
         first = above[-1] + 1 if len(above) else 0
         return float(self.t[first]) if first < len(values) else nan
 
 
 def fly(common: Common, point: Point) -> Flown:
-    """Fly a flight of a campaign and return what came of it, also when it ended early; leave no files."""
+    """Fly in memory, also a flight that ends early."""
     plan = plan_point(common, point)
     log, failure = MemoryLog(), None
     try:
@@ -117,7 +104,7 @@ def fly(common: Common, point: Point) -> Flown:
 
 
 def _top_speed(plan: FlightPlan, log: MemoryLog, t: Array) -> Array:
-    """Return the largest rotor speed, which is proportional to the battery's voltage, at times `t` (n,)."""
+    """Return the largest rotor speed, proportional to battery voltage."""
     vehicle = plan.plant_vehicle
     if vehicle.battery is None:
         return np.full_like(t, vehicle.rotors.max_speed)

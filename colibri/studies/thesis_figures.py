@@ -1,4 +1,4 @@
-"""`colibri figures`: fly all that the thesis shows, and draw each of its result figures under its number."""
+"""`colibri figures`: fly the thesis's flights, and draw its result figures under their numbers."""
 
 import argparse
 from collections.abc import Callable, Iterable
@@ -31,7 +31,7 @@ FIRST_SECONDS = (0.0, 5.0)
 
 
 class Flight(NamedTuple):
-    """A flight that the thesis shows: its name here, the track, the controller, and what titles call it."""
+    """A flight of the thesis."""
 
     name: str
     track: str
@@ -40,7 +40,7 @@ class Flight(NamedTuple):
 
 
 class ThesisFigure(NamedTuple):
-    """A figure of the thesis: its number, the flight it shows, and which kind of plot."""
+    """A figure of the thesis: its number, flight, and kind of plot."""
 
     number: str
     flight: str
@@ -75,7 +75,6 @@ FIGURES = (
 
 
 def figures(args: argparse.Namespace) -> int:
-    """Draw as the command line says; return the exit code."""
     wanted = _wanted(args.only)
     flights = [flight for flight in FLIGHTS if any(figure.flight == flight.name for figure in wanted)]
     make_folder(args.out)
@@ -91,7 +90,7 @@ def figures(args: argparse.Namespace) -> int:
 
 
 class Job(NamedTuple):
-    """A flight, the figures to draw of it, and where to."""
+    """A flight and its figures."""
 
     flight: Flight
     figures: tuple[ThesisFigure, ...]
@@ -99,7 +98,7 @@ class Job(NamedTuple):
 
 
 def draw(job: Job) -> list[Path]:
-    """Fly once and draw the figures of that flight; return what was written."""
+    """Fly once and draw the figures of that flight."""
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
     plan = FlightPlan.of(
@@ -117,14 +116,13 @@ def draw(job: Job) -> list[Path]:
 
 
 class Kind(NamedTuple):
-    """A kind of plot: what titles call it, and the function that draws it."""
+    """A kind of plot: its subject in titles, and its function."""
 
     subject: str
     plot: Callable[[Series, str], Figure]
 
 
 def over_time(rows: Iterable[tuple[Panel, ...]]) -> Callable[[Series, str], Figure]:
-    """Return the function that draws rows of panels over time."""
     figure = TimeFigure("", "", tuple(rows))
     return lambda series, title: draw_times(series, figure, title)
 

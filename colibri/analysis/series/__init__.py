@@ -1,1 +1,1 @@
-"""What is kept in memory of a flight of any length: what it is judged by, and what its figures show."""
+"""A flight of any length in bounded memory, for judging and for figures."""

@@ -1,4 +1,4 @@
-"""What the figures of a flight show, as named series: all samples of a usual flight, of a long one what can be seen."""
+"""Contents of a flight's figures as named series, thinned for a long flight."""
 
 from typing import TypeAlias
 
@@ -17,11 +17,11 @@ POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
 ATTITUDE = ("phi", "theta", "psi")
 START_S = 10.0
-"""So long a start is shown enlarged: none of its samples is left out."""
+"""Enlarged start, kept complete."""
 MAX_POINTS = 1 << 14
-"""Of a series over time after the start: 130 s at 125 Hz, and always several for each pixel of a figure's width."""
+"""Points over time after the start: 130 s at 125 Hz, always several for each pixel of a figure's width."""
 MAX_PATH_POINTS = 1 << 16
-"""Of a path in space: with those of an hour at 5 m/s², chords are off by less than a pixel."""
+"""Points of a path in space: for an hour at 5 m/s², chords are off by less than a pixel."""
 
 _SLOPES = tuple(f"{name}_ref" for name in VELOCITY)
 _ERRORS = tuple(f"e{axis}" for axis in POSITION)
@@ -33,10 +33,9 @@ _OF_REFERENCES = [_NAMES.index(name) for name in _SLOPES]
 
 
 class FigureSeries:
-    """Takes a flight part by part and keeps what its figures show: some MB, however long it is."""
+    """Collects a flight for its figures, part by part, in some MB."""
 
     def __init__(self, plan: FlightPlan) -> None:
-        """Take the flight of `plan`."""
         self._rotors = plan.plant_vehicle.rotors
         self._start: list[Array] = []
         self._later = Extremes(len(_NAMES), MAX_POINTS)
@@ -46,7 +45,6 @@ class FigureSeries:
         self._settled = 0
 
     def add(self, part: Samples) -> None:
-        """Append the next samples."""
         self._path.add(part.columns((*POSITION, *POSITION_REFERENCE)))
         settled = part.position_error_m[part["t"] >= SETTLED_AFTER_S]
         self._squares_m2 += float(np.sum(settled**2))
@@ -60,11 +58,9 @@ class FigureSeries:
         self._newest = rows[-2:].copy()
 
     def over_time(self) -> Series:
-        """Return the columns of the flight, angles in degrees, and what follows from them.
+        """Return the flight's columns, angles in degrees, and derived series.
 
-        `vx` to `vz` are earth velocities, ENU, m/s, and `vx_ref` to `vz_ref` those of the reference; `ex` to `ez` are
-        errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `idle` and `fastest`
-        are the limits of the rotors.
+        Velocities are ENU, m/s; `ex` to `ez` are errors, m, `distance` their norm, and `rms` its RMS once settled.
         """
         series = _columns(_NAMES, [*self._start, *self._later.points(), self._newest[-1:]])
         t = series["t"]
@@ -76,7 +72,7 @@ class FigureSeries:
         }
 
     def in_space(self) -> Series:
-        """Return position and reference, of the same instants, without these."""
+        """Return position and reference without times."""
         return _columns((*POSITION, *POSITION_REFERENCE), self._path.points())
 
     def _keep(self, rows: Array) -> None:
@@ -86,12 +82,12 @@ class FigureSeries:
 
 
 def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
-    """Return the columns of what is in parts, each for itself: all at once would be in memory twice."""
+    """Join the columns one by one: all at once would double the memory."""
     return {name: np.concatenate([part[:, column] for part in parts]) for column, name in enumerate(names)}
 
 
 def _rows(part: Samples) -> Array:
-    """Return the series of a part, columns as in `_NAMES`; the slopes of the reference are not numbers yet."""
+    """Return the series of a part, columns as in `_NAMES`, with nan as slopes of the reference."""
     position, reference = part.columns(POSITION), part.columns(POSITION_REFERENCE)
     columns = [
         part.table,

@@ -1,4 +1,4 @@
-"""What a flight is judged by, as arrays: of a control sample some 50 bytes, in place of its row in the table."""
+"""Arrays for judging a flight, some 50 bytes for each control sample."""
 
 from collections.abc import Callable
 
@@ -11,32 +11,20 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _ABOVE_GROUND_M = 0.1
-"""A reference that is higher does not mean the vehicle to touch the ground."""
+"""Below a higher reference the vehicle must not touch the ground."""
 
 
 class FlightSeries:
-    """A flight of n control samples and the m decisions between them, n = m + 1.
+    """A flight of n control samples and the m = n - 1 decisions between them, as in a `Recording`.
 
     Attributes:
-        t: Times, s, (n,).
-        position_error_m: Distance to the reference of the same instant, or of the path time then, (n,).
         moment_n_m: Norm of U2, U3 and U4, (n,).
-        upright: Upright part of the body's z axis, the cosine of the tilt, (n,).
-        touches: At which samples a foot or a rotor touches the ground, (n,).
-        aloft: At which the reference is above the ground, (n,).
-        solve_time_us: Time of each QP, (m,).
-        control_step_us: Time of each control step, (m,).
-        qp_iterations: That each QP's solver took; nan where there was none, or it does not say, (m,).
-        qp_status: How each QP ended, as in `interface.STATUS_CODES`, (m,).
-        fallback: What decided in its place, as in `interface.FALLBACK_CODES`, (m,).
-        constrained: At how many samples constraints of each kind were active.
-        max_slack: By how much soft limits were planned to be exceeded at most, in parts of each.
-        path_lag_s: As of a `Recording`.
-        trajectory_sha256: As of a `Recording`.
+        upright: Cosine of the tilt, (n,).
+        touches, aloft: Masks of samples on the ground, and with the reference above it, (n,).
+        constrained: Number of samples with active constraints, by kind.
     """
 
     def __init__(self, samples: int, vehicle: Vehicle) -> None:
-        """Take `samples` control samples of `vehicle`, part by part."""
         numbers = np.empty((6, samples))  # in one piece, which the system gets back as soon as the flight is judged
         self.t, self.position_error_m, self.moment_n_m, self.upright = numbers[:4]
         self.solve_time_us, self.control_step_us = numbers[4:, 1:]
@@ -51,7 +39,6 @@ class FlightSeries:
         self._samples = self._decisions = 0
 
     def add(self, part: Samples) -> None:
-        """Append the next samples."""
         at = slice(self._samples, self._samples + len(part.table))
         up = _up(part)
         self.t[at] = part["t"]
@@ -74,7 +61,6 @@ class FlightSeries:
 
 
 def read_flight(reader: FlightReader, *others: Callable[[Samples], None]) -> FlightSeries:
-    """Return the series of a flight; `others` are handed each part of it, too."""
     series = FlightSeries(reader.samples, reader.plan.plant_vehicle)
     for part in reader:
         for add in (series.add, *others):
@@ -84,13 +70,11 @@ def read_flight(reader: FlightReader, *others: Callable[[Samples], None]) -> Fli
 
 
 def _up(part: Samples) -> Array:
-    """Return the vertical in the body's frame, (n, 3)."""
     phi, theta = part["phi"], part["theta"]
     return np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
 
 
 def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:
-    """Return at which samples a foot or a rotor touches the ground, by its height and the vertical, (n,)."""
     if vehicle.ground is None:
         return np.zeros(len(z), dtype=np.bool_)
     heights = z[:, None] + up @ vehicle.ground.contacts_m(vehicle.rotors).T

@@ -1,4 +1,4 @@
-"""Series reduced to what a figure can show: a flight of any length as some thousand points."""
+"""Reduce long series to the points that a figure can show."""
 
 import numpy as np
 
@@ -8,21 +8,18 @@ _AT_ONCE = 1024
 
 
 class Extremes:
-    """Rows over time, of which the least and the largest in equal spans stay, once there are too many of them.
+    """Rows over time; beyond `most`, a multiple of 4, the extremes of each column in equal spans.
 
-    A span takes two points: of each column its extremes in the order in which they came. Drawn over time, as long as a
-    span is narrower than a pixel, they cover what all rows would.
+    A span keeps two points, in order. While spans are narrower than a pixel, the curve covers the same pixels.
     """
 
     def __init__(self, columns: int, most: int) -> None:
-        """Keep at most `most` points, a multiple of 4, and at least half as many once there were more rows."""
         self._points: Array = np.empty((most, columns))
         self._count = 0
         self._span = 2
         self._rest: Array = np.empty((0, columns))
 
     def add(self, rows: Array) -> None:
-        """Append rows (n, columns)."""
         self._rest = np.concatenate([self._rest, rows])
         while len(self._rest) >= self._span:
             if self._count == len(self._points):
@@ -34,12 +31,12 @@ class Extremes:
             self._count += 2 * spans
 
     def points(self) -> list[Array]:
-        """Return what is kept, parts of (k, columns): all rows, or two points a span."""
+        """Return parts of (k, columns): all rows, or two points a span."""
         rest = _extremes(self._rest, len(self._rest)) if len(self._rest) > 1 else self._rest
         return [self._points[: self._count], rest]
 
     def _halve(self) -> None:
-        """Make one span of every two, some at a time: what that takes for a moment is several times the points."""
+        """Join spans in pairs, some at a time to bound the memory."""
         for first in range(0, self._count, _AT_ONCE):
             points = self._points[first : first + _AT_ONCE]
             self._points[first // 2 : (first + len(points)) // 2] = _extremes(points, 4)
@@ -48,10 +45,9 @@ class Extremes:
 
 
 class EveryNth:
-    """Rows of which only every second, fourth, eighth stays, as there are too many of them; and the last."""
+    """Rows; beyond `most`, every second, fourth or eighth row, and the last."""
 
     def __init__(self, columns: int, most: int) -> None:
-        """Keep at most `most` rows, and the last."""
         self._most = most
         self._kept: list[Array] = []
         self._count = self._seen = 0
@@ -59,7 +55,6 @@ class EveryNth:
         self._last: Array = np.empty((0, columns))
 
     def add(self, rows: Array) -> None:
-        """Append rows (n, columns), n > 0."""
         self._last = rows[-1:].copy()
         self._kept.append(rows[-self._seen % self._step :: self._step].copy())
         self._count += len(self._kept[-1])
@@ -70,13 +65,13 @@ class EveryNth:
             self._step *= 2
 
     def points(self) -> list[Array]:
-        """Return what is kept, parts of (k, columns)."""
+        """Return parts of (k, columns)."""
         is_kept = (self._seen - 1) % self._step == 0
         return [*self._kept, self._last[: 0 if is_kept else 1]]
 
 
 def _extremes(rows: Array, span: int) -> Array:
-    """Return least and largest of each `span` of n rows, by columns, the earlier first, (2 n / span, columns)."""
+    """Return minimum and maximum of each `span` of n rows, by columns, in order, (2 n / span, columns)."""
     spans = rows.reshape(-1, span, rows.shape[1])
     places = np.sort(np.stack([spans.argmin(axis=1), spans.argmax(axis=1)], axis=1), axis=1)
     return np.take_along_axis(spans, places, axis=1).reshape(-1, rows.shape[1])

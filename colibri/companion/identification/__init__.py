@@ -1,1 +1,1 @@
-"""How body rates follow commands: small steps in flight, a lag of first or second order fitted to them, a figure."""
+"""Identification of the body-rate response: small steps in flight, a fitted lag, a figure."""

@@ -1,4 +1,4 @@
-"""The figure of an identification: each body rate as measured, and as the fitted lag has it."""
+"""Plot measured and modelled body rates of an identification."""
 
 from pathlib import Path
 
@@ -8,7 +8,6 @@ _AXES = ("p", "q", "r")
 
 
 def draw(fit: Fit, path: Path) -> None:
-    """Draw measured and modelled body rates into a PNG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")

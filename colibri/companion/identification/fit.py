@@ -1,7 +1,6 @@
-"""A lag fitted to what was commanded and measured, by its output error: it is simulated, and compared.
+"""Fit a rate lag to commanded and measured body rates by its output error.
 
-The rates of the model follow the commands alone, never the measurements: so a law that answers the vehicle's motion
-meanwhile does not spoil the fit. A lag of first order is taken unless one of second order explains clearly more.
+The simulated rates follow the commands alone, so feedback of the law does not bias the fit.
 """
 
 from typing import NamedTuple
@@ -15,27 +14,20 @@ _GRID_S = 0.002
 MAX_LATENCY_S = 0.12
 _LATENCIES = round(MAX_LATENCY_S / _GRID_S)
 _NEAR = 6
-"""So many latencies on either side of the best of the table are looked at closely."""
+"""Latencies refined on either side of the table's best."""
 _TIME_CONSTANTS_S = np.geomspace(0.008, 0.5, 36)
 _ACCELERATION_LAGS_S = np.geomspace(0.008, 0.15, 10)
 _FIRST_ORDER = np.zeros(1)
 _LEAST_LAG_S = 0.004
-"""A shorter one of the acceleration is none."""
+"""A shorter lag of the acceleration counts as zero."""
 _CLEARLY_LESS = 0.9
-"""Of what a first order leaves unexplained, a second one must leave less than this."""
+"""Largest ratio of unexplained variances at which the second order is taken."""
 _LEAST_SAMPLES = 200
 MIN_EXPLAINED = 0.5
 
 
 class RateLog(NamedTuple):
-    """What was commanded, and what was measured, by one clock.
-
-    Attributes:
-        command_s: When each command reached the vehicle, (n,).
-        commands: Body rates, rad/s, (n, 3).
-        measured_s: When each rate was, (m,).
-        rates: rad/s, (m, 3).
-    """
+    """Commands by arrival at the vehicle, and measurements, on one clock; body rates in rad/s, (k, 3)."""
 
     command_s: Array
     commands: Array
@@ -44,16 +36,7 @@ class RateLog(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """The lag that was found.
-
-    Attributes:
-        time_constant_s: Of p, q, r, (3,).
-        acceleration_lag_s: Of their acceleration, (3,); zeros for a lag of first order.
-        latency_s: Of all three, beyond the way of a command.
-        explained: Part of the rates' variance that the model has, (3,).
-        grid_s: Times of the model's rates, (k,).
-        modelled, measured: Its rates and the measured ones there, rad/s, (k, 3).
-    """
+    """A fitted lag for p, q, r, with the explained parts of variances, and body rates, rad/s, (k, 3)."""
 
     time_constant_s: Array
     acceleration_lag_s: Array
@@ -65,16 +48,11 @@ class Fit(NamedTuple):
 
     @property
     def order(self) -> int:
-        """Of the lag, 1 or 2."""
         return 2 if self.acceleration_lag_s.any() else 1
 
 
 def fit(log: RateLog) -> Fit:
-    """Return the lag that explains a log best.
-
-    Raises:
-        CompanionError: The log is too short, or no such lag explains half of what was measured.
-    """
+    """Fit the best lag to a log, or raise `CompanionError`."""
     if min(len(log.command_s), len(log.measured_s)) < _LEAST_SAMPLES:
         raise CompanionError(f"identification: only {len(log.measured_s)} states came while the steps were flown")
     grid = np.arange(max(log.command_s[0], log.measured_s[0]), log.measured_s[-1], _GRID_S)
@@ -99,7 +77,7 @@ def fit(log: RateLog) -> Fit:
 
 
 class _Found(NamedTuple):
-    """Lags of the three axes, (3, 2), samples of latency, and the part of each variance that they leave, (3,)."""
+    """Lags of the axes, (3, 2), latency in samples, unexplained part of each variance, (3,)."""
 
     lags_s: Array
     late: int
@@ -107,7 +85,7 @@ class _Found(NamedTuple):
 
 
 def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Found:
-    """Return the best lags: by a table first, then closely around its best latency."""
+    """Search a table of lags, then refine around its best latency."""
     table = [(lag_s, behind_s) for lag_s in _TIME_CONSTANTS_S for behind_s in acceleration_lags_s]
     left = np.array([[_unexplained(commands, measured, axis, lags) for lags in table] for axis in range(3)])
     best = int(left.min(axis=1).sum(axis=0).argmin())
@@ -120,7 +98,7 @@ def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Fou
 
 
 def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[float, float]) -> Array:
-    """Return the part of a rate's variance that a lag leaves, at each latency of the table, (n,)."""
+    """Return the unexplained part of a rate's variance at each latency."""
     modelled, compared = _lagged(commands[:, axis], *lags_s), measured[_LATENCIES:, axis]
     left = np.array([(compared - _late(modelled, late)).var() for late in range(_LATENCIES)])
     return left / max(float(compared.var()), 1e-12)
@@ -129,7 +107,6 @@ def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[floa
 def _refined(
     commands: Array, measured: Array, axis: int, late: int, near_s: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the lags of least error near those of the table, and the part of the variance that they leave."""
     from scipy.optimize import minimize
 
     compared = measured[_LATENCIES:, axis]
@@ -148,12 +125,11 @@ def _refined(
 
 
 def _late(rates: Array, late: int) -> Array:
-    """Return rates so many samples later, from the largest latency on."""
+    """Delay rates by `late` samples; the result begins at the largest latency."""
     return rates[_LATENCIES - late : len(rates) - late]
 
 
 def _lagged(commands: Array, lag_s: float, behind_s: float) -> Array:
-    """Return commands on the grid after a lag: that of first order, or of second where the acceleration lags, too."""
     from scipy.signal import lfilter
 
     if behind_s == 0.0:
@@ -167,7 +143,7 @@ def _lagged(commands: Array, lag_s: float, behind_s: float) -> Array:
 
 
 def _second_order(lag_s: float, behind_s: float) -> tuple[Array, Array]:
-    """Return the filter of T L w'' + T w' + w = c with c held from sample to sample."""
+    """Return the discrete filter of T L w'' + T w' + w = c, with c held between samples."""
     root = np.sqrt(complex(1.0 - 4.0 * behind_s / lag_s))
     if abs(root) < 1e-4:
         root = complex(1e-4)

@@ -1,4 +1,4 @@
-"""The steps of an identification: doublets of body rates about one axis after another, small and short."""
+"""Steps of an identification: small, short doublets of body rates, one axis after another."""
 
 from typing import NamedTuple
 
@@ -6,17 +6,11 @@ from colibri.common.types import Vector
 
 ROUNDS = 3
 PAUSE_S = 1.2
-"""For the vehicle to come to rest again."""
+"""Rest between two doublets."""
 
 
 class Doublet(NamedTuple):
-    """A rate for a while, then the opposite one for as long.
-
-    Attributes:
-        axis: 0, 1, 2 for p, q, r.
-        rate_rad_s: Added to what is commanded.
-        half_s: How long each half lasts.
-    """
+    """A rate added about one axis (0, 1, 2 for p, q, r), then the opposite rate, for `half_s` each."""
 
     axis: int
     rate_rad_s: float
@@ -28,12 +22,10 @@ _NOTHING: Vector = (0.0, 0.0, 0.0)
 
 
 def duration_s() -> float:
-    """Return how long all of them take."""
     return ROUNDS * sum(PAUSE_S + 2.0 * doublet.half_s for doublet in DOUBLETS)
 
 
 def step_at(time_s: float) -> Vector:
-    """Return what is added to the body rates commanded at a time, FLU, rad/s."""
     left_s = time_s % (duration_s() / ROUNDS)
     for doublet in DOUBLETS:
         left_s -= PAUSE_S

@@ -1,4 +1,4 @@
-"""Colibri's own autopilot: offboard mode, whose attitude setpoints its generator of demands slews."""
+"""Colibri's own autopilot: offboard mode; its demand generator slews attitude setpoints."""
 
 from colibri.companion.stacks.px4 import HOLD, LAND, OFFBOARD, STEADY
 from colibri.companion.stacks.stack import Parameters, Response, Stack, TakeOff
@@ -7,7 +7,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
 _IDENTIFIED = Response((0.032, 0.032, 0.128), 0.010, 0.0, (4.0, 4.0, 2.0), (120.0, 120.0, 15.0), (0.014, 0.014, 0.010))
-"""As --identify finds it with profile `flight`, of any airframe: its generator of demands slews, its law follows."""
+"""Result of --identify with profile `flight`, the same for any airframe."""
 
 
 def _thrust(parameters: Parameters, vehicle: Vehicle) -> MiddleHovers:

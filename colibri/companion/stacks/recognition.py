@@ -1,4 +1,4 @@
-"""Which stack flies a vehicle: by its HEARTBEAT and AUTOPILOT_VERSION, or as the user says."""
+"""Recognition of a vehicle's stack by HEARTBEAT and AUTOPILOT_VERSION."""
 
 from colibri.companion.stacks.ardupilot import ARDUPILOT
 from colibri.companion.stacks.colibri import COLIBRI
@@ -12,7 +12,7 @@ _BY_AUTOPILOT = {PX4.autopilot: PX4, ARDUPILOT.autopilot: ARDUPILOT}
 
 
 def recognised(autopilot: int, uid2: bytes) -> Stack | None:
-    """Return the stack of a HEARTBEAT's `autopilot` and AUTOPILOT_VERSION's `uid2`; None for one that is not known."""
+    """Return the stack of a HEARTBEAT's `autopilot` and an AUTOPILOT_VERSION's `uid2`, if it is known."""
     if autopilot in (PX4.autopilot, AUTOPILOT_GENERIC) and uid2.startswith(PRODUCT):
         return COLIBRI
     return _BY_AUTOPILOT.get(autopilot)

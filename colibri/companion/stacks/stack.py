@@ -1,4 +1,4 @@
-"""A flight stack as a value: what of a vehicle depends on the software that flies it."""
+"""Properties of a flight stack that a companion depends on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,24 +11,18 @@ from colibri.mavlink.client.modes import FlightMode
 from colibri.plant.vehicle.description import Vehicle
 
 Parameters: TypeAlias = Mapping[str, float]
-"""Parameters that the vehicle has, by name."""
+"""Parameters of the vehicle, by name."""
 
 
 class TakeOff(Enum):
-    """How a stack takes off."""
+    """Order of the take-off commands."""
 
     COMMAND_THEN_ARM = "take-off, then arm: the height is above the sea"
     ARM_THEN_COMMAND = "guided mode, arm, take-off: the height is above home"
 
 
 class ParameterRule(NamedTuple):
-    """What a parameter of the vehicle must be before a flight.
-
-    Attributes:
-        name: Of the parameter; one that the vehicle has not passes.
-        right: Whether a value will do.
-        action: What to do where it will not.
-    """
+    """A test of a parameter, with advice for a failure."""
 
     name: str
     right: Callable[[float], bool]
@@ -36,17 +30,15 @@ class ParameterRule(NamedTuple):
 
 
 class Response(NamedTuple):
-    """How body rates follow their commands, by a lag of first or second order, and thrust by its own.
+    """Response of body rates to commands, a lag of first or second order, and of thrust, of first order.
 
     Attributes:
-        time_constant_s: Of p, q, r, s: a rate loop asks for an acceleration of (command - rate) / time constant.
-        latency_s: Between a command's arrival and its first effect, s.
-        thrust_lag_s: Of thrust, s; 0 where it follows at once.
-        max_rate_rad_s: Commands beyond are cut by the stack.
-        max_acceleration_rad_s2: So fast, at most, the stack lets each rate change.
-        acceleration_lag_s: Of that acceleration, of p, q, r, s: the motors', say; 0 where it is there at once.
+        time_constant_s: The rate loop demands the acceleration (command - rate) / time constant.
+        latency_s: From a command's arrival to its first effect.
+        max_rate_rad_s, max_acceleration_rad_s2: Limits in the stack.
+        acceleration_lag_s: As from motors; 0 for first order.
 
-    A time constant that is too short costs bandwidth, one that is too long stability: what is assumed is short.
+    Too short a time constant costs bandwidth, too long a one stability: the assumed ones are short.
     """
 
     time_constant_s: Vector
@@ -62,19 +54,11 @@ class Stack:
     """A flight stack.
 
     Attributes:
-        autopilot: MAV_AUTOPILOT of its HEARTBEAT.
-        offboard: The mode that takes setpoints.
-        hold: The mode that the vehicle is left in.
-        last_resort: The mode for a vehicle that cannot hold.
-        steady: Modes, by `custom_mode`, out of which a companion may take over by itself: the vehicle stays by itself.
-        streams: The messages asked for, and their rates, Hz.
-        parameters: Those to be read.
-        rules: What parameters must be.
-        fence: Parameters of the fence's radius and height, m; 0 is none.
-        thrust: The thrust convention, by parameters and vehicle.
-        response: What is assumed where nothing was identified.
-        take_off: How it takes off.
-        integers_by_bits: Whether integer parameters travel bytewise, or as numbers.
+        steady: `custom_mode` of modes that permit a take-over: the vehicle keeps its place.
+        streams: Rates of requested messages, Hz.
+        fence: Parameters of the fence's radius and height, m; 0 disables it.
+        response: Assumed without identification.
+        integers_by_bits: Integer parameters travel bytewise.
     """
 
     name: str

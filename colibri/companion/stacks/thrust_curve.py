@@ -1,4 +1,4 @@
-"""From a thrust to the number of a SET_ATTITUDE_TARGET, and back: each stack has a convention of its own."""
+"""Thrust conventions of SET_ATTITUDE_TARGET, in both directions."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -9,16 +9,11 @@ _MAX = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThrustCurve:
-    """The thrust convention of a stack that linearises its motors by a curve, as PX4 and ArduPilot do.
+    """Thrust convention of PX4 and ArduPilot.
 
-    A command u is turned into x with u = (1 - expo) x + expo x², x into a motor's signal between `spin_min` and
-    `spin_max`. Thrust goes with the square of the signal where that is a rotor speed, else with the signal.
-
-    Attributes:
-        hover: The command that carries the weight.
-        expo: PX4's THR_MDL_FAC, ArduPilot's MOT_THST_EXPO.
-        spin_min, spin_max: ArduPilot's MOT_SPIN_MIN and MOT_SPIN_MAX; 0 and 1 of PX4.
-        quadratic: Whether a signal is a rotor speed.
+    A command u becomes x with u = (1 - expo) x + expo x², and x a motor signal between `spin_min` and `spin_max`.
+    Thrust is proportional to the square of a signal that is a rotor speed, else to the signal. `hover` carries the
+    weight.
     """
 
     hover: float
@@ -28,14 +23,14 @@ class ThrustCurve:
     quadratic: bool = True
 
     def command(self, load: float) -> float:
-        """Return the command, 0..1, of a thrust in parts of the weight."""
+        """Convert a thrust, in weights, to a command, 0..1."""
         hover = self._signal(self.hover)
         signal = hover * sqrt(max(load, 0.0)) if self.quadratic else hover * max(load, 0.0)
         x = min(max((signal - self.spin_min) / (self.spin_max - self.spin_min), _LEAST), _MAX)
         return (1.0 - self.expo) * x + self.expo * x * x
 
     def load(self, command: float) -> float:
-        """Return the thrust in parts of the weight, of a command of 0..1."""
+        """Convert a command, 0..1, to a thrust in weights."""
         ratio = self._signal(min(max(command, _LEAST), _MAX)) / self._signal(self.hover)
         return ratio * ratio if self.quadratic else ratio
 
@@ -47,23 +42,17 @@ class ThrustCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MiddleHovers:
-    """The thrust convention of Colibri's offboard mode: half carries the weight, all is the largest thrust.
-
-    Attributes:
-        max_load: The largest thrust, in parts of the weight.
-    """
+    """Colibri's offboard mode: 0.5 carries the weight, 1 is the largest thrust, `max_load` weights."""
 
     max_load: float
     hover: float = 0.5
 
     def command(self, load: float) -> float:
-        """Return the command, 0..1, of a thrust in parts of the weight."""
         if load <= 1.0:
             return 0.5 * max(load, 0.0)
         return min(0.5 + 0.5 * (load - 1.0) / (self.max_load - 1.0), 1.0)
 
     def load(self, command: float) -> float:
-        """Return the thrust in parts of the weight, of a command of 0..1."""
         if command <= self.hover:
             return 2.0 * max(command, 0.0)
         return 1.0 + (min(command, 1.0) - 0.5) * 2.0 * (self.max_load - 1.0)

@@ -1,11 +1,8 @@
-"""A control law that flies a vehicle whose rotors are another's: its moments become body rates, its rotors a thrust.
+"""Fly a control law on a vehicle whose rotors it cannot command (docs/companion.md).
 
-The law is given the vehicle as it will be when the command takes effect, and returns rotor speeds. Rotors that nobody
-has follow them, as those of the vehicle file would; they turn the vehicle of the file for one interval, and the body
-rates that it would have then are what the stack is made to reach, by the exact inverse of its response.
-
-So it is for roll and pitch. Yaw has its own loop, since no two stacks turn alike: the law is told that the vehicle is
-to turn as it turns, which asks for no moment, and the heading follows the references by a commanded rate.
+Virtual rotors, those of the vehicle file, follow the law's rotor speeds and turn the modelled vehicle for one interval;
+the inverse of the stack's response gives roll and pitch rates that lead there. Stacks differ too much in yaw: the law's
+references turn with the vehicle, and a separate loop commands the yaw rate.
 """
 
 from math import cos, dist, hypot, sin
@@ -40,36 +37,26 @@ from colibri.plant.vehicle.description import Vehicle
 APPROACH = Limits(
     speed_m_s=2.0, climb_m_s=1.0, sink_m_s=1.0, acceleration_m_s2=2.0, lift_m_s2=2.0, jerk_m_s3=8.0, yaw_rate_rad_s=0.8
 )
-"""How fast a vehicle is led to the track."""
+"""Limits on the way to the track."""
 _MAX_INTERVAL_US = 10_000
-"""Setpoints are sent at 100 Hz and more, however seldom the law decides."""
+"""Setpoints are sent at 100 Hz or more, even for a slower law."""
 _THERE_M, _THERE_M_S = 0.002, 0.005
 _YAW_1_S = 2.0
-"""How fast an error of the heading dies."""
+"""Gain of the heading error."""
 _MIN_UPRIGHT = 0.2
 _NO_DISTURBANCE = np.zeros(6)
 
 
 class ApproachTask(GoToTask):
-    """To the first point of the track, and there until the reference itself stands at it."""
+    """To the first point of the track, until the reference itself stands there."""
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether vehicle and reference are there."""
         there = dist(context.place, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
         return there and super().arrived(context)
 
 
 class Asked(NamedTuple):
-    """What a law asks for at one instant.
-
-    Attributes:
-        rate_flu_rad_s: Body rates to command.
-        thrust_n: Of all rotors.
-        reference: The references that it was given; None between two decisions.
-        decision: The law's; None between two.
-        track_enu_m: Where the track has the vehicle; None on the way to it, and between two decisions.
-        track_s: Time along the track; negative before it.
-    """
+    """Demand of a law; fields of a decision are `None` between two of them, `track_s` is negative before the track."""
 
     rate_flu_rad_s: Vector
     thrust_n: float
@@ -80,11 +67,7 @@ class Asked(NamedTuple):
 
 
 class LawPilot:
-    """Flies one track by one law.
-
-    Attributes:
-        interval_us: Between two setpoints.
-    """
+    """Flies one track by one law."""
 
     def __init__(
         self,
@@ -95,13 +78,6 @@ class LawPilot:
         clock: Clock,
         law: Factory | None = None,
     ) -> None:
-        """Fly `track` by the law of `profile`, or one made by `law`; `clock` only measures.
-
-        Raises:
-            ControllerError: The profile's control law cannot be used.
-            ProfileError: Its table is wrong.
-            SolverError: Its solver cannot be used.
-        """
         self._profile, self._clock, self._law = profile, clock, law
         self._airframe, self._track = vehicle, track
         self._build(response)
@@ -122,25 +98,18 @@ class LawPilot:
 
     @property
     def law(self) -> str:
-        """The law's class."""
         return type(self._loop.controller).__name__
 
     @property
     def start_enu_m(self) -> Vector:
-        """Where the track begins."""
         x, y, z = self._planner.horizon(0).position_enu_m[0].tolist()
         return (x, y, z)
 
     def adopt(self, response: Response) -> None:
-        """Fly a vehicle of another response.
-
-        Raises:
-            ControllerError: The control law cannot be built for it.
-        """
+        """Rebuild the law for another response."""
         self._build(response)
 
     def _build(self, response: Response) -> None:
-        """Build the law for the vehicle as its stack lets it turn."""
         self._response = response
         self._vehicle = turning_no_faster(self._airframe, response)
         self._loop = ControlLoop(slowed(self._profile, response), self._vehicle, self._clock, self._law)
@@ -148,7 +117,7 @@ class LawPilot:
         self._lags = max(response.acceleration_lag_s[:2]) > 0.0
 
     def begin(self, y: Array) -> None:
-        """Begin with a vehicle that moves as `y` says, (17,), and take it over as it moves: brake, and stay."""
+        """Take over a vehicle that moves as `y` (17,): brake, and stay."""
         frame = _frame(0, y)
         self._tick = 0
         self._loop.begin(self._vehicle.hover_speed, self._loop.observe(frame).euler[2])
@@ -157,7 +126,7 @@ class LawPilot:
         self._task = HoldTask()
 
     def fly_track(self) -> None:
-        """Go to the track from wherever the reference is, and along it."""
+        """Go to the track from the present reference, and along it."""
         first = self._planner.horizon(0)
         x, y, z = first.position_enu_m[0].tolist()
         yaw_rad = float(first.yaw_rad[0])
@@ -168,12 +137,10 @@ class LawPilot:
         )
 
     def hold(self) -> None:
-        """Brake, and stay."""
         self._task = HoldTask()
 
     @property
     def finished(self) -> bool:
-        """Whether the track is flown to its end."""
         task = self._flown
         return isinstance(task, TrackTask) and self._time_us - task.began_us > self._track.duration_s * 1e6
 
@@ -186,11 +153,7 @@ class LawPilot:
         return self._tick * self.interval_us
 
     def step(self, y: Array) -> Asked:
-        """Return what is asked of a vehicle that moves as `y` says when it takes effect; once an interval.
-
-        Raises:
-            DecisionError: The law raised, or gave what no rotor can follow.
-        """
+        """Return the demand for a vehicle in state `y` at the time of effect; call it once an interval."""
         decision, horizon, place = None, None, None
         time_us = self._time_us
         if self._tick % self._parts == 0:
@@ -215,16 +178,14 @@ class LawPilot:
         return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
 
     def _without_lag(self, x: Array, speeds: Array) -> Array:
-        """Return the vehicle after an interval in which its rotors turn as commanded from the beginning."""
         return self._carried(np.concatenate((x[: motion.ROTORS.start], speeds)), speeds)
 
     def _carried(self, x: Array, speeds: Array) -> Array:
-        """Return the vehicle of the file after an interval."""
         interval_s = np.array([self.interval_us * 1e-6])
         return motion.carry(x, interval_s, speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
 
     def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
-        """Return references whose heading is the vehicle's own, turning as it does."""
+        """Replace the references' heading by the vehicle's own, turning at its rate."""
         turns = _yaw_rate_of(state.euler, state.rate_flu_rad_s)
         yaw = np.asarray(state.euler[2] + turns * self._ahead_s, dtype=np.float64)
         return horizon._replace(
@@ -232,7 +193,7 @@ class LawPilot:
         )
 
     def _yaw_rate(self, y: Array, q: float) -> float:
-        """Return the body rate r by which the heading follows its reference, rad/s, within what the stack turns."""
+        """Return the body rate r for the heading reference, rad/s."""
         phi, theta, psi = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
         wanted, rate, acceleration = self._heading
         off = nearest_turn(wanted, psi) - psi
@@ -272,9 +233,9 @@ class LawPilot:
 
 
 def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
-    """Return a vehicle whose rotors can turn it no faster than its stack lets them: heavier to turn where need be.
+    """Limit a vehicle's acceleration to that of its stack by larger moments of inertia.
 
-    A law that knows so brakes in time; one that does not would ask for what never comes, and overshoot.
+    Without this model a law would demand an unreachable acceleration, and overshoot.
     """
     _, *moments_n_m = vehicle.max_wrench().tolist()
     most = response.max_acceleration_rad_s2
@@ -291,7 +252,7 @@ def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
 
 
 def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
-    """Return how fast the heading turns, rad/s: THESIS [2.7]."""
+    """Return the rate of the heading, rad/s: THESIS [2.7]."""
     phi, theta, _ = euler
     return (sin(phi) * rate[1] + cos(phi) * rate[2]) / max(cos(theta), _MIN_UPRIGHT)
 

@@ -1,8 +1,7 @@
-"""The vehicle at the instant at which a command takes effect: its last state carried there by the commands sent since.
+"""Predict the state at a command's time of effect from the last state and the commands sent since.
 
-What each new state differs by from the one predicted for it is a disturbance: wind, a thrust that is not as it was
-thought. Of the thrust, what lasts is taken for a scale: the hover thrust, refined in flight. What positions differ by
-is a drift of the estimate.
+The error of a prediction is a disturbance. Its lasting part along the thrust refines the thrust scale; a lasting error
+of position is a drift of the estimate.
 """
 
 from collections import deque
@@ -21,31 +20,31 @@ from colibri.mavlink.client.states import TimedState
 from colibri.plant.vehicle.description import Vehicle
 
 _FOLLOWS_US = 150_000
-"""After a longer gap nothing is known of disturbances."""
+"""A longer gap resets the disturbances."""
 _KEPT_US = 1_000_000
 _DRIFT_1_S = 8.0
-"""How fast the drift of an estimate is learned: PX4 spreads each correction by GPS over a quarter of a second."""
+"""Adaptation of the drift: PX4 spreads each GPS correction over a quarter of a second."""
 _MAX_DRIFT_M_S = 1.0
 _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
 _TURN_PART = 0.5
-"""Of the disturbance of rates: their model is the less certain one."""
+"""Part of the rate error that counts as disturbance: the rate model is less certain."""
 _TURN_POWER = 8.0
-"""The later the rates follow, the less of what they miss is a disturbance: it is the model's."""
+"""The later the rates follow, the more of their error is the model's, not a disturbance."""
 _CORRECTED_IN_LATENESSES = 8.0
-"""So many times what the rates follow too late, an error of the predicted rates is corrected in. Of what is not rates
-the vehicle knows more than the model."""
+"""Correction time of predicted rates, in latenesses. Of the rest the vehicle's estimate is better than the model."""
 _CORRECTED_IN_LAGS = 2.0
-"""So many lags of its acceleration an error of a predicted rate of second order is corrected in: measured rates tremble
-more than such a model errs."""
+"""Correction time of predicted rates of second order, in acceleration lags: measured rates are noisier than the
+model is wrong.
+"""
 _TURN_PART_OF_LAGGING = 0.05
-"""Of a rate of second order next to nothing that it misses is a disturbance."""
+"""`_TURN_PART` of a response of second order."""
 _SCALE_1_S = 0.25
 MIN_SCALE, MAX_SCALE = 0.5, 1.8
 
 
 class SentCommand(NamedTuple):
-    """A command: when it takes effect, by the own clock, body rates, rad/s, and lift, m/s²."""
+    """A command: time of effect, body rates, rad/s, and lift, m/s²."""
 
     acts_us: int
     values: tuple[float, float, float, float]
@@ -55,18 +54,13 @@ class Predictor:
     """Predicts one vehicle.
 
     Attributes:
-        corrected_in_s: In which an error of the prediction is corrected, as a time constant. The longer a state and a
-            command are on their way, the longer it must be: corrections at once, of what jitter and loss make of a
-            prediction, would be taken for motion, and answered too late. What the rates follow later than laws are
-            tuned for is added to it.
-        thrust_scale: Thrust that is made, in parts of the one that was meant.
+        corrected_in_s: Time constant of corrections. It must grow with the delay: an immediate correction of errors by
+            jitter and loss would look like motion.
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
-        drift_m_s: How much faster the estimated position moves than the estimated velocity says, ENU, (3,): a filter
-            that corrects its position by its GPS receiver moves it so, for seconds.
+        drift_m_s: Velocity of the estimated position minus estimated velocity, ENU, as by GPS corrections.
     """
 
     def __init__(self, vehicle: Vehicle, response: Response) -> None:
-        """Predict `vehicle`; what is compiled is loaded here."""
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self.thrust_scale = 1.0
         self.corrected_in_s = 0.0
@@ -75,7 +69,6 @@ class Predictor:
         model.carry(np.ones(model.STATES), np.ones(1), np.zeros((1, model.COMMANDS)), self.disturbance, self._model)
 
     def adopt(self, vehicle: Vehicle, response: Response) -> None:
-        """Predict with another response."""
         self._model = packed(model.response_model(vehicle, response))
         late_s = _CORRECTED_IN_LATENESSES * lateness_s(response)
         behind_s = np.array(response.acceleration_lag_s)
@@ -84,14 +77,13 @@ class Predictor:
         self._turn_part = np.where(behind_s > 0.0, _TURN_PART_OF_LAGGING, parts)
 
     def begin(self) -> None:
-        """Begin with level hover commanded, and no disturbance."""
+        """Reset to level hover without disturbance."""
         self._sent = deque([SentCommand(-(2**62), (0.0, 0.0, 0.0, self._gravity_m_s2))])
         self._known: tuple[int, Array] | None = None
         self.disturbance, self.drift_m_s = np.zeros(6), np.zeros(3)
         self.learns = False
 
     def sent(self, acts_us: int, rate: Vector, lift_m_s2: float) -> None:
-        """Take in a command that is sent now, and takes effect at `acts_us`."""
         while self._sent and self._sent[-1].acts_us >= acts_us:
             self._sent.pop()
         self._sent.append(SentCommand(acts_us, (*rate, lift_m_s2)))
@@ -99,7 +91,7 @@ class Predictor:
             self._sent.popleft()
 
     def observe(self, at_us: int, state: TimedState) -> None:
-        """Take in the state of a time of the own clock; an older one than the last is dropped."""
+        """Use the state of a time; states out of order are dropped."""
         if self._known is not None and at_us <= self._known[0]:
             return
         lift = self._acting(at_us)[0].values[3]
@@ -115,13 +107,7 @@ class Predictor:
         self._known = (at_us, y)
 
     def at(self, time_us: int) -> Array:
-        """Return position, velocity, attitude, rates, lift, the rates' acceleration, (17,), at a time of the own clock.
-
-        The velocity is that of the position, drift and all.
-
-        Raises:
-            ValueError: No state is known.
-        """
+        """Return position, velocity (with drift), attitude, rates, lift and rate acceleration, (17,)."""
         if self._known is None:
             raise ValueError("no state is known")
         at_us, y = self._known
@@ -130,7 +116,6 @@ class Predictor:
         return there
 
     def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
-        """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
         part = np.full(model.STATES, self._part(passed_s, 0.0))
         part[model.RATE] = [self._part(passed_s, late_s) for late_s in self._late_s.tolist()]
         if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
@@ -171,7 +156,7 @@ class Predictor:
         return there
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[SentCommand]:
-        """Return the command that acts at a time, and those that take effect until another."""
+        """Return the command in effect at a time, and its successors until another time."""
         acting = [self._sent[0]]
         for it in self._sent:
             if it.acts_us <= from_us:

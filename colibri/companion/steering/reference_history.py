@@ -1,4 +1,4 @@
-"""The references of the last moments, to tell an estimate that comes late how far it was from where it had to be."""
+"""Recent references, for the error of an estimate that arrives late."""
 
 from bisect import bisect_right
 from typing import NamedTuple
@@ -9,14 +9,7 @@ _KEPT = 256
 
 
 class PastReference(NamedTuple):
-    """A reference.
-
-    Attributes:
-        at_us: When it is to be reached, by the own clock.
-        position_enu_m: Where.
-        track_enu_m: Where the track is then; None on the way to it.
-        track_s: Time along the track.
-    """
+    """A reference with its time; `track_enu_m` is `None` on the way to the track."""
 
     at_us: int
     position_enu_m: Vector
@@ -25,14 +18,12 @@ class PastReference(NamedTuple):
 
 
 class ReferenceHistory:
-    """References by the time at which they are to be reached."""
+    """References by time."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         self._past: list[PastReference] = []
 
     def add(self, reference: PastReference) -> None:
-        """Add the newest; one of an earlier time than the last is dropped."""
         if self._past and reference.at_us <= self._past[-1].at_us:
             return
         self._past.append(reference)
@@ -40,7 +31,7 @@ class ReferenceHistory:
             del self._past[:_KEPT]
 
     def at(self, time_us: int) -> PastReference | None:
-        """Return the reference of a time, between two linearly; None of one that is not between two."""
+        """Interpolate the reference at a time; `None` outside the history."""
         after = bisect_right(self._past, time_us, key=lambda past: past.at_us)
         if after == 0 or after == len(self._past):
             return None

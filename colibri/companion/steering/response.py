@@ -1,9 +1,7 @@
-"""A vehicle under a stack's rate loop, as a companion models it: rates and thrust that follow as lags.
+"""Model of a vehicle under a stack's rate loop: body rates and thrust follow as lags.
 
-With c the commanded body rates and T a time constant of each axis, a rate loop asks for the acceleration (c - w) / T.
-Where the acceleration is there at once, w' = (c - w) / T is a first-order lag; where it lags by L, as motors do,
-w' = a, a' = ((c - w) / T - a) / L is one of second order. Thrust follows as a first-order lag. The rest is the
-vehicle's: it drags, and is pushed by what is observed of a disturbance.
+With commanded rates c and time constant T, w' = (c - w) / T is a lag of first order. If the acceleration lags by L, w'
+= a, a' = ((c - w) / T - a) / L is one of second.
 """
 
 from math import ceil, sqrt
@@ -22,21 +20,13 @@ STATES, COMMANDS = 17, 4
 POSITION, VELOCITY, ATTITUDE, RATE, LIFT = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), 13
 """Lift is thrust over mass, m/s²."""
 ACCELERATION = slice(14, 17)
-"""Of the body rates, rad/s²."""
+"""Acceleration of the body rates, rad/s²."""
 _STEP_S = 0.004
 _ROUNDING = 1e-6
 
 
 class ResponseModel(NamedTuple):
-    """The numbers of the model.
-
-    Attributes:
-        time_constant_s: Of p, q, r, (3,).
-        max_acceleration_rad_s2: Of rates, (3,).
-        acceleration_lag_s: Of their acceleration, (3,); 0 where it is there at once.
-        lift_lag_s: Of thrust; 0 where it follows at once.
-        drag_1_s: Along the FLU axes, over the mass, (3,).
-    """
+    """Numbers of the model along p, q, r or FLU; a lag of 0 is immediate, drag is over mass."""
 
     time_constant_s: Array
     max_acceleration_rad_s2: Array
@@ -47,7 +37,6 @@ class ResponseModel(NamedTuple):
 
 
 def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
-    """Return the numbers of a vehicle under a stack."""
     drag = np.zeros(3)
     if vehicle.drag is not None:
         in_plane = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m) * vehicle.hover_speed
@@ -58,11 +47,7 @@ def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
 
 
 def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
-    """Return the body rates to command so that those of now are `next_rate` an interval later, rad/s.
-
-    The exact inverse of the model, within what the stack lets through; where the acceleration lags, `next_rate` is that
-    of a vehicle whose acceleration does not.
-    """
+    """Return the rate commands that lead to `next_rate` in an interval: the exact inverse, without acceleration lag."""
     p, q, r = (
         _rate_command(now, then, interval_s, *of)
         for now, then, *of in zip(
@@ -94,12 +79,11 @@ def _rate_command(
 
 @compiled
 def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, packed: Packed) -> Array:
-    """Return y, (17,), after commands that follow each other.
+    """Propagate y, (17,), through successive commands of `durations_s`, (n,).
 
     Args:
-        y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s²;
-            acceleration of the body rates, rad/s².
-        durations_s: How long each command acts, (n,).
+        y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s²; rate acceleration,
+            rad/s².
         commands: Body rates, rad/s, and lift, m/s², (n, 4).
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
         packed: The `ResponseModel`.
@@ -128,7 +112,7 @@ def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, pac
 
 @compiled
 def _change(y: Array, axis: int, command: float, h: float, model: ResponseModel) -> float:
-    """Return by how much a body rate follows its command within a while; move its acceleration on, in place."""
+    """Return the change of a body rate over h; advance its acceleration in place."""
     limit, lag_s = model.max_acceleration_rad_s2[axis], model.time_constant_s[axis]
     rate, acceleration, behind_s = y[10 + axis], y[14 + axis], model.acceleration_lag_s[axis]
     if behind_s == 0.0:
@@ -146,7 +130,7 @@ def _change(y: Array, axis: int, command: float, h: float, model: ResponseModel)
 
 @compiled
 def _turn(y: Array, rate: Array, h: float) -> None:
-    """Turn the attitude at a rate for a while, in place."""
+    """Turn the attitude at a rate over h, in place."""
     w, x, a, b = y[6], y[7], y[8], y[9]
     p, q, r = 0.5 * h * rate[0], 0.5 * h * rate[1], 0.5 * h * rate[2]
     y[6] = w - x * p - a * q - b * r
@@ -160,7 +144,7 @@ def _turn(y: Array, rate: Array, h: float) -> None:
 
 @compiled
 def _push(y: Array, lift: float, disturbance: Array, drag: Array, gravity_m_s2: float, h: float) -> None:
-    """Move velocity and position on for a while, in place."""
+    """Advance velocity and position over h, in place."""
     R = rotation_matrix((y[6], y[7], y[8], y[9]))
     along = np.empty(3)
     for i in range(3):

@@ -1,8 +1,4 @@
-"""How much slower a law must be for a vehicle whose body rates follow late, and the law made so.
-
-What a model misses of a vehicle is answered by a loop no quicker than the vehicle's delay allows. A law tuned for
-rotors of its own is quicker than some stacks: it would take what the model misses of those for motion, and swing.
-"""
+"""Slow a law down for a vehicle whose body rates follow late: it would take model errors for motion, and swing."""
 
 from typing import Any
 
@@ -10,34 +6,33 @@ from colibri.autopilot.control.profile import Profile
 from colibri.companion.stacks.stack import Response
 
 _AS_TUNED_S = 0.06
-"""Up to this delay, dead time and lag together, a law flies as it is tuned."""
+"""Delay, dead time and lag together, up to which a law needs no change."""
 _MOST = 1.6
 _WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
-"""With which power of the slowness each weight goes: less is asked of the place, and each change costs more."""
+"""Power of the slowness in each weight: less demand on position, more cost of each change."""
 
 
 def delay_s(response: Response) -> float:
-    """Return how late roll and pitch rates follow, dead time and lag together, s.
+    """Return the delay of roll and pitch rates, dead time and lag together, s.
 
-    Of a response of second order only the dead time and the lag of the acceleration count: a law knows that lag, and
-    what the rate loop does is undone.
+    For second order this is the acceleration's lag: the inverse of the response undoes the rate loop.
     """
     pairs = zip(response.time_constant_s[:2], response.acceleration_lag_s[:2], strict=True)
     return response.latency_s + max(behind_s or lag_s for lag_s, behind_s in pairs)
 
 
 def slowness(response: Response) -> float:
-    """Return how many times slower than tuned a law is to be; 1 for a vehicle that is quick enough."""
+    """Return the factor of slowing; 1 for a vehicle that is quick enough."""
     return min(max(delay_s(response) / _AS_TUNED_S, 1.0), _MOST)
 
 
 def lateness_s(response: Response) -> float:
-    """Return the delay beyond that for which laws are tuned, s."""
+    """Return the delay beyond the tuned one, s."""
     return max(delay_s(response) - _AS_TUNED_S, 0.0)
 
 
 def slowed(profile: Profile, response: Response) -> Profile:
-    """Return the profile with its law slowed as the response demands; a law of other weights is left as it is."""
+    """Slow the law down for a response; laws with other weights are unchanged."""
     times = slowness(response)
     weights: Any = profile.table(profile.controller).get("weights")
     if times == 1.0 or not isinstance(weights, dict) or not _WEIGHTS.keys() <= weights.keys():

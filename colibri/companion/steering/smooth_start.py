@@ -1,8 +1,6 @@
-"""A track whose time begins to pass smoothly: from rest at its first point, with no jump of any derivative that counts.
+"""Start a track's time smoothly, as a standing vehicle cannot follow a track that begins at speed.
 
-A vehicle that stands cannot be on a track that begins at speed. Over the first seconds the track's own time passes from
-not at all to as on the clock, by a polynomial whose first four derivatives vanish at both ends: the vehicle is on the
-track's path from the first moment on, and half of those seconds behind its time from then on.
+The rate of the track's time rises from 0 to 1 by a polynomial whose first four derivatives vanish at both ends.
 """
 
 from dataclasses import replace
@@ -14,12 +12,11 @@ from colibri.autopilot.guidance.trajectories.tracks import Place, Track
 
 OVER_S = 4.0
 _SLOPE = (126.0, -420.0, 540.0, -315.0, 70.0)
-"""Of u^5 to u^9: rises from 0 to 1 over u of 0 to 1."""
+"""Coefficients of u^5 to u^9: rises from 0 to 1 over u = 0..1."""
 _FIRST_POWER = 5
 
 
 def smoothly_started(track: Track, over_s: float = OVER_S) -> Track:
-    """Return a track whose time begins to pass over `over_s`."""
     look = track.yaw
 
     def position(t: TaylorSeries) -> Place:
@@ -38,7 +35,6 @@ def smoothly_started(track: Track, over_s: float = OVER_S) -> Track:
 
 
 def _warped(t: TaylorSeries, over_s: float) -> TaylorSeries:
-    """Return the track's own time at times `t`."""
     u = t / over_s
     power = u
     for _ in range(_FIRST_POWER):

@@ -1,1 +1,1 @@
-"""Whether a companion may fly, and when it must not any more: checks, limits, and the table of its phases."""
+"""Supervision: checks before a flight, limits in flight, and the table of phases."""

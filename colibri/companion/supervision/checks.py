@@ -1,4 +1,4 @@
-"""What is checked before a companion arms or takes over: one table, each row with what to do where it fails."""
+"""Checks before a companion arms or takes over, each with advice for a failure."""
 
 from collections.abc import Callable, Mapping
 from math import hypot, isfinite
@@ -16,23 +16,7 @@ _MIN_HOVER, _MAX_HOVER = 0.05, 0.8
 
 
 class CheckFacts(NamedTuple):
-    """What is known before a flight.
-
-    Attributes:
-        parameters: Of the vehicle; None until they are read.
-        clock_known: Whether TIMESYNC is answered.
-        round_trip_s: To the vehicle and back.
-        state_age_s: Of the newest state.
-        state_rate_hz: How many states came in the last second.
-        state_delay_s: How old they are when they come: the median.
-        mode_rate_hz: How often the mode is reported.
-        estimator_ok, prearm_ok: By the vehicle; None where it does not say.
-        battery: nan where it is not known.
-        fence_breached: By the vehicle.
-        armed: Whether its rotors turn.
-        may_arm: Whether it is to be armed.
-        box: Where it will fly.
-    """
+    """Facts before a flight; reports of the vehicle are `None`, the battery is nan, while unknown."""
 
     stack: Stack
     thrust: Thrust | None
@@ -54,14 +38,7 @@ class CheckFacts(NamedTuple):
 
 
 class Check(NamedTuple):
-    """A row of the table.
-
-    Attributes:
-        name: What is checked.
-        passes: Whether it is right.
-        action: What to do where it is not.
-        required: Whether nothing flies without; else it is said, and that is all.
-    """
+    """A row of the table, with advice for a failure; one that is not `required` is only reported."""
 
     name: str
     passes: Callable[[CheckFacts], bool]
@@ -75,7 +52,7 @@ def _wrong_parameters(now: CheckFacts) -> list[str]:
 
 
 def _inside_fence(now: CheckFacts) -> bool:
-    """Whether the box lies inside the fence of the parameters, which counts from home: here the origin."""
+    """Whether the box lies inside the vehicle's fence, measured from home: here the origin."""
     values = now.parameters or {}
     if values.get("FENCE_ENABLE", 1.0) == 0.0:
         return True
@@ -142,6 +119,6 @@ CHECKS: tuple[Check, ...] = (
 
 
 def failing(now: CheckFacts, *, required: bool = True) -> list[str]:
-    """Return what fails, and what to do about it, a line each."""
+    """Return name and advice of each failing check."""
     rows = (check for check in CHECKS if check.required == required)
     return [f"{check.name}: {check.action(now)}" for check in rows if not check.passes(now)]

@@ -1,4 +1,4 @@
-"""The conditions by which the phases follow each other, gathered from what is known at one instant."""
+"""Gather the conditions of the phase table from one situation."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,21 +12,11 @@ WITHIN_S: dict[Phase, float] = {
     Phase.TAKING_OVER: 5.0,
     Phase.HANDING_OVER: 10.0,
 }
-"""How long a phase may take."""
+"""Timeout of each phase."""
 
 
 class Situation(NamedTuple):
-    """What the conditions depend on.
-
-    Attributes:
-        in_phase_s: How long this phase has lasted.
-        gives_up_s: How long to wait for the vehicle and its checks.
-        mode: `custom_mode` that the vehicle reports; -1 before it does.
-        modes: Those that are this companion's own doing, in this phase.
-        failing: How many checks fail.
-        airborne: None where the vehicle does not say.
-        held: Whether the vehicle has taken the order to hold, and reports that it does.
-    """
+    """Inputs of the conditions; `modes` are of the companion's making, `mode` is -1 before the first report."""
 
     phase: Phase
     stack: Stack | None
@@ -47,7 +37,6 @@ class Situation(NamedTuple):
 
 
 def conditions(now: Situation) -> frozenset[Condition]:
-    """Return the conditions that hold."""
     return frozenset(_holding(now))
 
 
@@ -79,7 +68,6 @@ def _holding(now: Situation) -> Iterator[Condition]:
 
 
 def _of_the_mode(now: Situation, stack: Stack) -> Iterator[Condition]:
-    """Yield what the reported mode says: a pilot's choice is any that is not this companion's doing."""
     if now.mode == stack.offboard.custom:
         yield Condition.OFFBOARD
     if now.held:

@@ -1,4 +1,4 @@
-"""How a flight by a companion ended, and whether that was in order."""
+"""How a flight by a companion ended."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,19 +8,13 @@ from colibri.companion.supervision.phases import Condition, Phase
 
 
 class Ended(NamedTuple):
-    """How it ended.
-
-    Attributes:
-        in_order: Whether all was flown that was asked for, or whoever may end it did.
-        why: In words.
-    """
+    """How it ended; `in_order` if the flight was completed, or ended by someone entitled to."""
 
     in_order: bool
     why: str
 
 
 def how_it_ended(before: Phase, why: Condition, limit: Limit | None, refused: str, failing: Sequence[str]) -> Ended:
-    """Return how it ended: from which phase, why, by which limit, with which order refused and which checks failing."""
     if why is Condition.PILOT:
         return Ended(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
     if limit is not None:

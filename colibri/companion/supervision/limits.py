@@ -1,4 +1,4 @@
-"""What ends a flight by a companion: one table of limits, each over what is known of the flight now."""
+"""Limits that end a flight, as one table over the facts of a flight."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,30 +16,29 @@ MIN_PACE = 0.8
 MAX_GAP_S = 0.2
 _TRACK_POINTS = 400
 _ENDLESS_S = 100.0
-"""Of a track without an end so much is looked at."""
+"""Part of an endless track used for its box."""
 _CRITICAL = frozenset({5, 6, 7, 8})
 """MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
 
 
 class Box(NamedTuple):
-    """Where a vehicle may be, ENU, m."""
+    """Region of a flight, ENU, m."""
 
     lower: Vector
     upper: Vector
 
     def has(self, place: Vector) -> bool:
-        """Whether a place lies in it."""
         return all(low <= x <= high for low, x, high in zip(self.lower, place, self.upper, strict=True))
 
     def around(self, place: Vector, margin_m: float) -> "Box":
-        """Return the box that holds a place with its margin, too."""
+        """Extend the box to a place and its margin."""
         lower = tuple(min(low, x - margin_m) for low, x in zip(self.lower, place, strict=True))
         upper = tuple(max(high, x + margin_m) for high, x in zip(self.upper, place, strict=True))
         return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
 
 
 def box_of(track: Track, duration_s: float, margin_m: float) -> Box:
-    """Return the box around the part of a track that is flown, with a margin."""
+    """Return the box around the flown part of a track."""
     points = position(track, np.linspace(0.0, min(track.duration_s, duration_s, _ENDLESS_S), _TRACK_POINTS))
     lower, upper = (points.min(axis=0) - margin_m).tolist(), (points.max(axis=0) + margin_m).tolist()
     return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
@@ -47,17 +46,7 @@ def box_of(track: Track, duration_s: float, margin_m: float) -> Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLimits:
-    """Limits of a flight; each is an option of the command line.
-
-    Attributes:
-        margin_m: Of the box around track and way.
-        max_tilt_deg: Of the thrust axis.
-        max_error_m: Between vehicle and reference.
-        max_state_age_s: Of the newest state.
-        min_battery: Part of the charge.
-        min_pace: Part of the setpoints that are due, over a second.
-        max_gap_s: Between two setpoints.
-    """
+    """Limits of a flight, each an option of the command line."""
 
     margin_m: float = 3.0
     max_tilt_deg: float = 50.0
@@ -69,21 +58,12 @@ class FlightLimits:
 
 
 class FlightFacts(NamedTuple):
-    """What is known of a flight now.
+    """Facts of a flight; reports of the vehicle are `None`, the battery is nan, while unknown.
 
     Attributes:
-        state_age_s: Of the newest state.
-        position_enu_m: By it.
-        tilt_deg: By it.
-        reference_enu_m: Where the vehicle is to be; None while nothing is flown.
-        estimator_ok: By its report; None where there is none.
-        jumped_m: How far the estimate has jumped since the last state.
-        battery: nan where it is not known.
-        system_status: MAV_STATE.
-        fence_breached: By its report.
-        law_error: What the control law ended with; empty for nothing.
-        pace: Part of the setpoints of the last second that there was.
-        gap_s: Since the last setpoint.
+        jumped_m: Jump of the estimate at the newest state.
+        pace: Computed part of the last second's setpoints.
+        gap_s: Time since the last setpoint.
     """
 
     state_age_s: float = 0.0
@@ -101,14 +81,7 @@ class FlightFacts(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A row of the table.
-
-    Attributes:
-        name: Of what is exceeded.
-        exceeded: Whether it is.
-        words: How much of what, for whoever reads why the flight has ended.
-        blind: Whether nothing more may be commanded but the mode.
-    """
+    """A row of the table; after a `blind` one only the mode may be commanded."""
 
     name: str
     exceeded: Callable[[FlightFacts, FlightLimits, Box], bool]
@@ -199,5 +172,4 @@ LIMITS: tuple[Limit, ...] = (
 
 
 def exceeded(now: FlightFacts, limits: FlightLimits, box: Box) -> Limit | None:
-    """Return the first limit that is exceeded; None if none is."""
     return next((limit for limit in LIMITS if limit.exceeded(now, limits, box)), None)

@@ -1,15 +1,11 @@
-"""The phases of a companion, and how one follows another: one table, and a pure function over it.
-
-Conditions are gathered in `conditions`; what is done in a phase is in `guide`. A row applies where its condition holds,
-the first of them wins.
-"""
+"""Phases of a companion: one table, and a pure function over it. The first row whose condition holds applies."""
 
 from enum import StrEnum
 from typing import NamedTuple
 
 
 class Phase(StrEnum):
-    """What a companion is doing."""
+    """Activity of a companion."""
 
     CONNECTING = "connecting"
     CHECKING = "checking"
@@ -22,7 +18,7 @@ class Phase(StrEnum):
 
 
 class Condition(StrEnum):
-    """What leads from one phase to another; the value is what is said of it."""
+    """Condition of a transition; its value is the message to the user."""
 
     CONNECTED = "the vehicle is known"
     STOPPED = "it was told to end"
@@ -40,13 +36,7 @@ class Condition(StrEnum):
 
 
 class Row(NamedTuple):
-    """A row of the table.
-
-    Attributes:
-        sources: Phases that it leaves.
-        condition: When.
-        target: The phase that it leads to.
-    """
+    """A transition."""
 
     sources: tuple[Phase, ...]
     condition: Condition
@@ -78,7 +68,6 @@ TABLE: tuple[Row, ...] = (
 
 
 def next_phase(phase: Phase, conditions: frozenset[Condition]) -> tuple[Phase, Condition | None]:
-    """Return the phase that follows, and by which condition; the same phase and None where none does."""
     for row in TABLE:
         if phase in row.sources and row.condition in conditions:
             return row.target, row.condition
