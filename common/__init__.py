@@ -1,4 +1,4 @@
-"""What every package may use; nothing of a vehicle or of MAVLink."""
+"""Types, arithmetic, geometry and process support that every package may use; independent of vehicles and MAVLink."""
 
 from typing import TYPE_CHECKING
 

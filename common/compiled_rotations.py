@@ -1,4 +1,4 @@
-"""The rotations of `rotations`, compiled: for kernels, and for whoever turns attitudes many times a second."""
+"""The functions of `rotations`, compiled, for kernels and frequent calls."""
 
 from colibri.common import kernels, rotations
 from colibri.common.jit import compiled, compiled_for

@@ -1,4 +1,4 @@
-"""Strict tables: what vehicle files, profiles and control laws are read into."""
+"""Strict tables for vehicle files, profiles and control laws."""
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
@@ -15,15 +15,14 @@ T = TypeVar("T")
 
 
 def toml_names(folder: Path) -> list[str]:
-    """Return the names of the TOML files in a folder, without suffix."""
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
 def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Error]) -> T:
-    """Read the TOML file of that name in `folder`, or any file if the argument ends in `.toml`.
+    """Read the TOML file of that name in `folder`, or the file at a path that ends in `.toml`.
 
     Raises:
-        error: There is no such name, or the file has a missing, unknown or impossible key.
+        error: The name is unknown, or a key is missing, unknown or invalid.
     """
     if name_or_path.endswith(".toml"):
         return read_toml(Path(name_or_path), kind, error)
@@ -31,11 +30,6 @@ def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error:
 
 
 def named_text(what: str, folder: Path, name: str, error: type[Error]) -> str:
-    """Return the TOML file of that name in `folder`.
-
-    Raises:
-        error: There is no such name.
-    """
     return _named(what, folder, name, error).read_text(encoding="utf-8")
 
 
@@ -50,7 +44,7 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     """Read a TOML file into a strict structure.
 
     Raises:
-        error: The file cannot be read, or has a missing, unknown or impossible key; names file and key.
+        error: The file is unreadable, or a key is missing, unknown or invalid; names file and key.
     """
     try:
         return msgspec.toml.decode(path.read_bytes(), type=kind)
@@ -66,7 +60,7 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
 
 
 def _choices(kind: Any, key: str) -> str:
-    """Return which words are right at a key, as the end of a refusal; empty where no choice is."""
+    """Return the valid words of a key as the end of an error message; empty if any value is accepted."""
     found: Any = msgspec.inspect.type_info(kind)
     for name in key.replace("[", ".[").split("."):
         parts = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
@@ -83,14 +77,13 @@ Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class SettingsError(Error):
-    """A table with a missing, unknown or impossible key; the message names it."""
+    """A missing, unknown or invalid key of a table; the message names it."""
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of numbers, every one of them finite."""
+    """A table of finite numbers."""
 
     def __post_init__(self) -> None:
-        """Check that every number is finite."""
         for key in self.__struct_fields__:
             if not all(map(isfinite, _numbers(getattr(self, key)))):
                 raise ValueError(f"{key}: must be finite")
@@ -108,7 +101,7 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
     """Read a control law's table of a profile into a strict structure.
 
     Raises:
-        SettingsError: A key is missing, unknown or impossible.
+        SettingsError: A key is missing, unknown or invalid.
     """
     try:
         return msgspec.convert(dict(table), type=kind)
@@ -117,12 +110,10 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
 
 
 def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
-    """Return a structure with another value at a dotted key, `body.mass_kg` say, checked as strictly as a file.
-
-    A number in a key is a place in a list: `rotors.strength.0`.
+    """Return a copy with another value at a dotted key (`body.mass_kg`, `rotors.strength.0`), validated like a file.
 
     Raises:
-        error: There is no such key, or it cannot have this value; names the key.
+        error: The key is unknown or the value invalid; names the key.
     """
     tree = _tree(table)
     parent, last = _place(tree, key, error)
@@ -134,26 +125,15 @@ def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
 
 
 def value_at(table: object, key: str, error: type[Error]) -> Any:
-    """Return what a structure has at a dotted key, as a file would have it.
-
-    Raises:
-        error: There is no such key.
-    """
     parent, last = _place(_tree(table), key, error)
     return parent[last]
 
 
 def _tree(table: object) -> Any:
-    """Return a structure as tables and lists that can be changed."""
     return msgspec.msgpack.decode(msgspec.msgpack.encode(table))
 
 
 def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
-    """Return the table or list of `tree` that has what a dotted key names, and its key or place there.
-
-    Raises:
-        error: There is no such key.
-    """
     parent: Any = tree
     last: Any = ""
     found = tree
@@ -167,7 +147,6 @@ def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
 
 
 def _in_words(reason: msgspec.ValidationError, kind: Any) -> str:
-    """Return which key is wrong, how, and what it may be."""
     what, _, where = str(reason).partition(" - at `$.")
     key = where.rstrip("`")
     return f"{key}: {what}{_choices(kind, key)}" if key else what

@@ -1,17 +1,16 @@
-"""Sine, exponential and their kin with the same bits on every computer.
+"""Elementary functions with the same bits on every computer.
 
-The C library's differ: glibc picks code with or without fused multiply-add by the CPU, other systems have other code.
-Here each is a reduction of its argument and a Taylor series, in IEEE 754's operations in the order written; square
-roots are exact to the last bit everywhere and stay `math.sqrt`, as `math.hypot` and `math.dist` are Python's own code.
+The C library's differ: glibc chooses code with or without fused multiply-add by the CPU. Here each function is an
+argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt` is exact everywhere;
+`math.hypot` and `math.dist` are Python's own code.
 
-Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (the tests
-measure both against 60 digits). Outside a function's domain the result is nan or infinite, never an exception.
+Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (measured by the
+tests against 60 digits). Outside its domain a function returns nan or infinity, never raises.
 
-Nothing here is compiled: `kernels` has the same functions for whoever calls them often, `elementwise` for arrays.
+`kernels` has the same functions compiled, `elementwise` for arrays.
 
-Reductions with a head and a tail follow the well-known ones: W. J. Cody and W. Waite, Software Manual for the
-Elementary Functions, 1980; K. C. Ng, Argument Reduction for Huge Arguments, 1992. Each tail is what rounding took from
-its head.
+Reductions with head and tail (the head's rounding error) follow W. J. Cody and W. Waite, Software Manual for the
+Elementary Functions, 1980, and K. C. Ng, Argument Reduction for Huge Arguments, 1992.
 """
 
 from math import copysign, factorial, floor, frexp, inf, isnan, ldexp, nan, pi, sqrt
@@ -25,9 +24,9 @@ Real = TypeVar("Real", float, NDArray[np.float64])
 QUARTERS_PER_RAD = 2.0 / pi
 _QUARTER_1, _QUARTER_2 = float.fromhex("0x1.921fb54400000p+0"), float.fromhex("0x1.0b4611a600000p-34")
 _QUARTER_3 = 2.022266248795951e-21
-"""π/2 = _QUARTER_1 + _QUARTER_2 + _QUARTER_3; the first two have 33 bits, so that their multiples are exact."""
+"""π/2 = _QUARTER_1 + _QUARTER_2 + _QUARTER_3; the first two have 33 bits, so their multiples are exact."""
 MAX_RAD = 1e6
-"""Beyond it whole turns of the double nearest to 2π are taken off first: no more exact than the argument itself."""
+"""Larger angles are first reduced modulo the double nearest 2π: as exact as the argument itself."""
 HALF_PI = 0.5 * pi
 HALF_PI_TAIL = 6.123233995736766e-17
 
@@ -50,7 +49,7 @@ _ARCTANGENT = tuple((-1.0) ** k / (2 * k + 1) for k in range(1, 6))
 """Of x^3, x^5 … x^11."""
 
 ATAN_STEPS = 16
-"""atan is known at each sixteenth from 0 to 1."""
+"""atan is tabulated at each sixteenth from 0 to 1."""
 ATAN = (
     (0.0, 0.0),
     (0.06241880999595735, -1.5490756308295046e-18),
@@ -70,11 +69,11 @@ ATAN = (
     (0.7531512809621944, -2.4256934659182068e-17),
     (0.7853981633974483, 3.061616997868383e-17),
 )
-"""Its heads and tails, (17, 2)."""
+"""Heads and tails, (17, 2)."""
 
 
 def series(coefficients: tuple[float, ...], x: Real) -> Real:
-    """Return c₀ + c₁ x + c₂ x² …, the highest power first."""
+    """Return c₀ + c₁ x + c₂ x² …, evaluated from the highest power."""
     total = coefficients[-2] + x * coefficients[-1]
     for k in range(len(coefficients) - 3, -1, -1):
         total = coefficients[k] + x * total
@@ -105,14 +104,14 @@ def cosine(x: Real, tail: Real) -> Real:
 
 
 def arctangent(x: Real, c: Real, head: Real, tail: Real) -> Real:
-    """Return atan(x), 0 <= x <= 1, from atan(c) = head + tail nearby: atan c + atan((x - c) / (1 + x c))."""
+    """Return atan(x), 0 <= x <= 1, from a nearby atan(c) = head + tail: atan c + atan((x - c) / (1 + x c))."""
     t = (x - c) / (1.0 + x * c)
     z = t * t
     return head + (t + (tail + t * z * series(_ARCTANGENT, z)))
 
 
 def turned_sine(x: float, quarters: int) -> float:
-    """Return the sine of `x` rad and `quarters` right angles more; nan of what is not finite."""
+    """Return the sine of `x` rad plus `quarters` right angles; nan unless finite."""
     if not abs(x) < inf:
         return nan
     if abs(x) > MAX_RAD:
@@ -124,22 +123,19 @@ def turned_sine(x: float, quarters: int) -> float:
 
 
 def sin(x: float) -> float:
-    """Return the sine of `x`, rad; nan of what is not finite."""
     return turned_sine(x, 0)
 
 
 def cos(x: float) -> float:
-    """Return the cosine of `x`, rad; nan of what is not finite."""
     return turned_sine(x, 1)
 
 
 def tan(x: float) -> float:
-    """Return the tangent of `x`, rad; nan of what is not finite."""
     return sin(x) / cos(x)
 
 
 def atan2(y: float, x: float) -> float:
-    """Return the angle of the point (x, y), rad, in [-π, π]; signed zeros and infinities count as in C."""
+    """Return the angle of the point (x, y), rad, in [-π, π]; signed zeros and infinities as in C."""
     if isnan(x) or isnan(y):
         return nan
     across, along = abs(y), abs(x)
@@ -158,27 +154,23 @@ def atan2(y: float, x: float) -> float:
 
 
 def atan(x: float) -> float:
-    """Return the arc tangent of `x`, rad."""
     return atan2(x, 1.0)
 
 
 def asin(x: float) -> float:
-    """Return the arc sine of `x`, rad; nan beyond ±1."""
     return atan2(x, sqrt((1.0 - x) * (1.0 + x))) if abs(x) <= 1.0 else nan
 
 
 def acos(x: float) -> float:
-    """Return the arc cosine of `x`, rad; nan beyond ±1."""
     return atan2(sqrt((1.0 - x) * (1.0 + x)), x) if abs(x) <= 1.0 else nan
 
 
 def _growth(x: float, tail: float) -> float:
-    """Return exp(x + tail) - 1, |x| <= 0.35, the tail a rounding of x."""
+    """Return exp(x + tail) - 1, |x| <= 0.35, `tail` the rounding error of x."""
     return x + (x * x * series(_EXPONENTIAL, x) + tail * (1.0 + x))
 
 
 def exp(x: float) -> float:
-    """Return e to the power of `x`; infinite beyond what a double holds."""
     if isnan(x):
         return x
     if x > _MAX_EXPONENT:
@@ -192,12 +184,12 @@ def exp(x: float) -> float:
 
 
 def expm1(x: float) -> float:
-    """Return e to the power of `x`, less 1, exact for small `x`."""
+    """Return e to the power of `x`, minus 1, exact for small `x`."""
     return _growth(x, 0.0) if abs(x) < _SMALL_EXP else exp(x) - 1.0
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of `x`; minus infinity of 0, nan below it."""
+    """Return the natural logarithm of `x`; minus infinity at 0, nan below."""
     if isnan(x) or x < 0.0:
         return nan
     if x == 0.0:
@@ -214,10 +206,10 @@ def log(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """Return `x`, not negative, to the power of `y`: its relative error grows as |y log x| does."""
+    """Return `x` >= 0 to the power of `y`; the relative error grows with |y log x|."""
     return 1.0 if y == 0.0 else exp(y * log(x))
 
 
 def square(x: float) -> float:
-    """Return `x` times itself; Python asks the C library's `pow` for `x**2`."""
+    """Return `x` squared; `x**2` calls the C library's `pow`."""
     return x * x

@@ -1,4 +1,4 @@
-"""The base of every error that a user may see, and the message for an unknown name."""
+"""The base of all errors shown to users, and the message for an unknown name."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,7 @@ class Error(Exception):
 
 
 class ForeignError(Error):
-    """Code of another package raised what is its `__cause__`, whose traceback the author of that package needs."""
+    """An exception in code of another package, kept as `__cause__` with the traceback for its author."""
 
 
 class InFlightError(Error):
@@ -21,7 +21,7 @@ class InFlightError(Error):
 
 
 def unknown(what: str, given: object, known: Iterable[str]) -> str:
-    """Return the message for an unknown name: with the closest match, or with all that is valid."""
+    """Return the message for an unknown name, with the closest match or all valid names."""
     from difflib import get_close_matches
 
     names = [str(name) for name in known]

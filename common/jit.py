@@ -1,4 +1,4 @@
-"""Numerical kernels: how they are compiled."""
+"""Compilation of numerical kernels."""
 
 from collections.abc import Callable
 from functools import cache
@@ -14,33 +14,35 @@ from colibri.common.machine_code.on_disk import MachineCode
 Packed: TypeAlias = NDArray[np.void]
 
 _LINE = 64
-"""Bytes of a line of the cache."""
+"""Bytes of a cache line."""
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Tuple = TypeVar("_Tuple", bound=NamedTuple)
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function at its first call, and keep the machine code on disk for every later process.
+    """Compile a function at its first call, and keep the machine code on disk for later processes.
 
-    The disk's copy is renewed when its own file changes, or that of a kernel it calls.
+    The copy on disk is renewed when the function's file changes, or that of a kernel it calls.
 
-    Arithmetic stays IEEE 754's in the order written, so that a kernel gives the same bits on every computer; division
-    by zero gives an infinity, as in numpy.
+    Arithmetic is IEEE 754 in the order written, so that a kernel gives the same bits on every computer; division by
+    zero
+    gives infinity, as in numpy.
     """
     return cast(_Function, _kernel(function))
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a function as a part of every kernel that calls it.
+    """Compile a function into every kernel that calls it.
 
-    There the shapes of a record's arrays are known, and that no two of them overlap: loops over several are vectorised.
+    There the shapes of a record's arrays are constants and the arrays do not overlap, so loops over several are
+    vectorised.
     """
     return cast(_Function, _kernel(function, forceinline=True))
 
 
 def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
-    """Return `compiled` for arguments of these types alone, at once: whatever else can be is converted to them."""
+    """Compile at once for these argument types alone; other arguments are converted."""
 
     def compiled_now(function: _Function) -> _Function:
         kernel = _kernel(function)
@@ -53,9 +55,9 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 
 def packed(parameters: NamedTuple) -> Packed:
-    """Return the record of `parameters`, (1,): one pointer to hand to a kernel in place of many numbers and arrays.
+    """Return the record of `parameters`, (1,): one pointer for a kernel instead of many arguments.
 
-    Its arrays begin with lines of the cache: what lies across two of them takes twice as long to load.
+    Arrays are aligned to cache lines: a value across two lines takes twice as long to load.
     """
     layout = _layout(parameters)
     memory = np.zeros(layout.itemsize + _LINE, dtype=np.uint8)
@@ -66,10 +68,7 @@ def packed(parameters: NamedTuple) -> Packed:
 
 
 def opened(record: Packed, kind: type[_Tuple]) -> _Tuple:
-    """Return the arrays of a record as the named tuple that was packed, in the record's memory.
-
-    What is a record in it is the tuple of its arrays.
-    """
+    """Return a record's arrays as the named tuple that was packed, sharing its memory; nested records as tuples."""
     return kind._make(_opened(record[name]) for name in kind._fields)
 
 
@@ -79,7 +78,7 @@ def _opened(field: Packed) -> Any:
 
 
 def _layout(parameters: Any) -> np.dtype[np.void]:
-    """Return the type of a record: float64 but for arrays of another type and for what has fields itself."""
+    """Return the type of a record: float64 except for typed arrays and nested records."""
     formats, offsets, end = [], [], 0
     for value in parameters:
         part = _layout(value) if hasattr(value, "_fields") else np.dtype(getattr(value, "dtype", np.float64))
@@ -93,12 +92,12 @@ def _layout(parameters: Any) -> np.dtype[np.void]:
 
 @cache
 def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
-    """Return the first type that equals this: a kernel takes three times as long to recognise another."""
+    """Return the first equal type: a kernel takes three times as long to recognise a copy."""
     return layout
 
 
 def on_compile(report: Callable[[int], None]) -> None:
-    """Call `report` with how many functions this process has compiled so far, as it begins each; none from disk."""
+    """Call `report` with the number of functions compiled so far as each compilation begins."""
     register("numba:compile", _Compiling(report))  # type: ignore[no-untyped-call]
 
 

@@ -1,4 +1,4 @@
-"""The public face of a package: names that are imported when they are first asked for, since most never are."""
+"""Public names of a package, imported on first access because most are never used."""
 
 from collections.abc import Callable
 from functools import cache
@@ -9,15 +9,14 @@ from typing import Any
 
 
 def public(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return the `__getattr__` and the `__dir__` of a package.
+    """Return `__getattr__` and `__dir__` of a package.
 
-    What is public, and so in the `__all__` of `package`, is what its `__init__.py` imports under `if TYPE_CHECKING:`,
-    for type checkers. It is read from there when the first name is asked for.
+    Public names (and `__all__`) are the imports of its `__init__.py` under `if TYPE_CHECKING:`, read at the first
+    access.
     """
 
     @cache
     def places() -> dict[str, str]:
-        """Return the module of each public name."""
         import ast
 
         tree = ast.parse(Path(modules[package].__file__ or "").read_text(encoding="utf-8"))

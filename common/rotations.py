@@ -1,8 +1,8 @@
-"""Rotations, and the only conversions between ENU/FLU (inside) and NED/FRD (the wire).
+"""Rotations of vectors and attitudes between body (FLU) and earth (ENU).
 
-Vectors and quaternions are tuples of floats: at these sizes they are several times faster than arrays, and they
-cannot be changed by whoever reads them. Quaternions are wxyz, Hamilton, and rotate body vectors into the earth frame.
-Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
+Vectors and quaternions are tuples of floats: at these sizes several times faster than arrays, and immutable.
+Quaternions are wxyz, Hamilton, and rotate body vectors into the earth frame. Euler angles are Z-Y'-X'': yaw psi,
+pitch theta, roll phi.
 """
 
 from math import degrees, floor, pi, sqrt
@@ -35,7 +35,7 @@ def rotation_matrix(q: Quaternion) -> Matrix:
 
 
 def tilt_deg(q: Quaternion) -> float:
-    """Return how far the body's z axis points from straight up, degrees."""
+    """Return the angle between the body's z axis and the vertical, degrees."""
     return degrees(acos(min(1.0, max(-1.0, rotation_matrix(q)[2][2]))))
 
 
@@ -47,7 +47,7 @@ def earth_from_body(q: Quaternion, vector: Vector) -> Vector:
 
 
 def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
-    """Build the quaternion of roll `phi`, pitch `theta`, yaw `psi` (rad, Z-Y'-X'')."""
+    """Return the quaternion of roll `phi`, pitch `theta`, yaw `psi` (rad, Z-Y'-X'')."""
     cr, sr = cos(0.5 * phi), sin(0.5 * phi)
     cp, sp = cos(0.5 * theta), sin(0.5 * theta)
     cy, sy = cos(0.5 * psi), sin(0.5 * psi)
@@ -69,12 +69,9 @@ def euler_from_quaternion(q: Quaternion) -> Vector:
 
 
 def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
-    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7]; singular at theta = ±pi/2.
+    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7], of body `rate` (FLU, rad/s).
 
-    Args:
-        phi: Roll, rad.
-        theta: Pitch, rad.
-        rate: Body rates p, q, r in FLU, rad/s.
+    Singular at theta = ±pi/2.
     """
     p, q, r = rate
     s, c = sin(phi), cos(phi)
@@ -83,5 +80,5 @@ def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
 
 
 def nearest_turn(angle: float, reference: float) -> float:
-    """Add full turns to `angle` (rad) so that it lies within half a turn of `reference` (rad)."""
+    """Add full turns to `angle` (rad) to bring it within half a turn of `reference` (rad)."""
     return angle - 2.0 * pi * floor((angle - reference) / (2.0 * pi) + 0.5)

@@ -1,4 +1,4 @@
-"""Plain data ⇄ bytes: named tuples of numbers, texts and arrays of floats, as they are kept over a restart."""
+"""Plain data ⇄ bytes: named tuples of numbers, texts and float arrays, to survive a restart."""
 
 from typing import Any, TypeVar
 
@@ -10,16 +10,11 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 def to_bytes(data: Any) -> bytes:
-    """Return the bytes of plain data.
-
-    Raises:
-        TypeError: It holds something else.
-    """
     return _ENCODER.encode(data)
 
 
 def of_bytes(kind: type[Data], content: bytes) -> Data | None:
-    """Return the data of type `kind` that `to_bytes` made `content` of; None where that cannot be."""
+    """Return the data of type `kind` encoded by `to_bytes`; `None` if the content is invalid."""
     try:
         return msgspec.msgpack.decode(content, type=kind, dec_hook=_decoded)
     except (msgspec.DecodeError, TypeError, ValueError):
@@ -33,10 +28,10 @@ def _encoded(value: Any) -> Any:
 
 
 def _decoded(kind: Any, value: Any) -> Any:
-    """Return an array: nothing else of what is kept is not known to msgspec.
+    """Return an array, the only type that msgspec cannot decode itself.
 
     Raises:
-        ValueError: Its bytes are not of its shape.
+        ValueError: Size and shape disagree.
     """
     del kind
     shape, content = value

@@ -1,10 +1,10 @@
-"""Options of a flight as typed fields of frozen dataclasses: read from a command line, keywords or JSON.
+"""Options of a flight as typed fields of frozen dataclasses, read from a command line, keywords or JSON.
 
-A field carries all that is known of an option, and whatever takes options is derived from it:
+Command lines, keywords and checks are derived from a field's `Option`:
 
     latency: Annotated[float, Option("the delay of the link, one way", least=0.0, most=1000.0, unit="ms")] = 0.0
 
-Values are Python's, or the command line's texts: `wind="5@270"`, `start={"x": 1.0}`.
+Values are Python's, or command-line texts: `wind="5@270"`, `start={"x": 1.0}`.
 """
 
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
@@ -28,20 +28,20 @@ S = TypeVar("S")
 
 
 class SpecError(Error):
-    """An unknown option, or a value that it cannot have; the message names both."""
+    """An unknown option or an invalid value; the message names both."""
 
 
 class Option(NamedTuple):
-    """What is known of a field beside its type and default.
+    """Description of an option beyond type and default.
 
     Attributes:
         help: One line for a user.
-        metavar: Its value on a command line; derived from choices and unit where it is left out.
+        metavar: Placeholder on the command line; by default choices or unit.
         unit: Of a number, in error messages.
-        least, above, most: The range of a number.
+        least, above, most: Range of a number.
         endless: Whether a number may be infinite, `max` as text.
-        read: Reads a text; without it, the type says how.
-        flag: Its name on a command line where that is another.
+        read: Parser of a text; by default chosen by type.
+        flag: Name on the command line, if different.
         on_command_line: Whether command lines have it.
         keyword: Whether Python and campaigns have it.
     """
@@ -63,11 +63,9 @@ class Field(NamedTuple):
     """An option of a specification.
 
     Attributes:
-        name: Of the field and the keyword.
-        kind: Type of the value, of each of several where it is repeated; None left out.
+        kind: Type of the value, or of each of several, without `None`.
         repeated: Whether the value is a tuple.
-        default: The default; MISSING for none.
-        option: What else is known.
+        default: MISSING if a value is required.
     """
 
     name: str
@@ -78,21 +76,20 @@ class Field(NamedTuple):
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The words that the value may be; empty where it is no word of a list."""
+        """The valid words, if the value is one of a list."""
         if get_origin(self.kind) is Literal:
             return get_args(self.kind)
         return tuple(self.kind) if isinstance(self.kind, type) and issubclass(self.kind, StrEnum) else ()
 
     @property
     def _kinds(self) -> tuple[Any, ...]:
-        """The types that the value may have."""
         return get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
 
     def read(self, given: Any) -> Any:
-        """Return the value for what is `given`: a value of Python, or a text; None is the default.
+        """Return the value of a `given` Python value or text; `None` is the default.
 
         Raises:
-            ArgumentTypeError: It cannot be the value.
+            ArgumentTypeError: The value is invalid.
         """
         if given is None or given == "":
             return self.default
@@ -102,10 +99,10 @@ class Field(NamedTuple):
         return tuple(map(self._one, given if several else (given,)))
 
     def read_text(self, text: str) -> Any:
-        """Return the value of a text, of each where it is repeated.
+        """Return the value of a text (one item of a repeated option).
 
         Raises:
-            ArgumentTypeError: It cannot be the value.
+            ArgumentTypeError: The value is invalid.
         """
         if self.option.read is not None:
             return self.option.read(text)
@@ -159,7 +156,6 @@ class Field(NamedTuple):
         return value
 
     def _range(self) -> str:
-        """Return in words which numbers are valid."""
         option = self.option
         unit = f" {option.unit}" if option.unit else ""
         whole = "a whole number" if self.kind is int else "a number"
@@ -209,11 +205,11 @@ def add_options(
     Args:
         parser: Of the command line.
         spec: The specification.
-        leave_out: Fields that this command does not have.
-        defaults: Other defaults than those of the fields.
+        leave_out: Fields to omit.
+        defaults: Defaults that replace the fields' own.
         shown: Defaults in words, by field.
-        given_only: Whether options that are not given leave nothing.
-        keywords_only: Whether the command flies many flights, and has only what Python and campaigns have.
+        given_only: Whether omitted options set no attribute.
+        keywords_only: Whether the command has only the options of Python and campaigns, as it flies many flights.
     """
     for field in fields_of(spec).values():
         wanted = field.option.keyword if keywords_only else field.option.on_command_line
@@ -242,7 +238,7 @@ def _add(parser: ArgumentParser, field: Field, shown: Mapping[str, str], *, give
 
 
 def described(field: Field, default: str | None = None) -> str:
-    """Return the help of an option with its default, in words or as it is."""
+    """Return an option's help with its default."""
     words = field.option.help
     if default is not None:
         return f"{words} (default: {default})"
@@ -254,7 +250,7 @@ def described(field: Field, default: str | None = None) -> str:
 
 
 def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:
-    """Return the specification that a command line was read into; `others` are values that it has not."""
+    """Return the specification of a parsed command line; `others` are further values."""
     given = vars(args) | others
     values = {name: given[name] for name in fields_of(spec) if name in given}
     return spec(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
@@ -266,10 +262,10 @@ def from_values(
     error: type[Error] = SpecError,
     only: Collection[str] | None = None,
 ) -> S:
-    """Return the specification of values by name: of Python, or texts as the command line has them.
+    """Return the specification of named values: Python's or command-line texts.
 
     Raises:
-        error: An option is unknown, or none of `only`, or cannot have its value; names it.
+        error: An option is unknown, not in `only`, or invalid; names it.
     """
     return spec(**read_values(spec, values, error, only))
 
@@ -280,11 +276,7 @@ def read_values(
     error: type[Error] = SpecError,
     only: Collection[str] | None = None,
 ) -> dict[str, Any]:
-    """Return values by name as a specification has them, see `from_values`.
-
-    Raises:
-        error: An option is unknown, or none of `only`, or cannot have its value; names it.
-    """
+    """Return validated values by name, see `from_values`."""
     known = fields_of(spec)
     for name in values:
         if name not in (known if only is None else only):
@@ -303,26 +295,25 @@ def _checked(field: Field, value: Any, error: type[Error]) -> Any:
 
 
 def keywords_of(spec: type) -> list[str]:
-    """Return the names of the options that Python and campaigns have, in alphabetical order."""
+    """Return the names of the options of Python and campaigns, sorted."""
     return sorted(name for name, field in fields_of(spec).items() if field.option.keyword)
 
 
 def values_of(spec: object) -> dict[str, Any]:
-    """Return the values of a specification by name."""
     return {name: getattr(spec, name) for name in fields_of(type(spec))}
 
 
 def part_of(spec: object, kind: type[S], **others: Any) -> S:
-    """Return the specification of another kind that has the same values by name, but for `others`."""
+    """Return a specification of another kind with the values it shares, updated by `others`."""
     known = fields_of(kind)
     return kind(**({name: value for name, value in values_of(spec).items() if name in known} | others))
 
 
 def plain_values(spec: object, *, whole: bool = False) -> dict[str, Any]:
-    """Return values as JSON has them, those that are not defaults or the `whole`: an infinite number is `max`.
+    """Return values as JSON types, without defaults unless `whole`; infinity is `max`.
 
     Raises:
-        SpecError: A value is code, which JSON cannot hold.
+        SpecError: A value is a Python object without a JSON form.
     """
     values = {}
     for name, field in fields_of(type(spec)).items():
@@ -348,16 +339,16 @@ def to_json(spec: object) -> bytes:
     """Return a specification as JSON.
 
     Raises:
-        SpecError: A value is code, which JSON cannot hold.
+        SpecError: A value is a Python object without a JSON form.
     """
     return msgspec.json.encode(plain_values(spec))
 
 
 def from_json(spec: type[S], text: bytes) -> S:
-    """Return the specification that `to_json` made a text of.
+    """Return the specification encoded by `to_json`.
 
     Raises:
-        SpecError: It is none.
+        SpecError: The text is invalid.
     """
     try:
         values = msgspec.json.decode(text, type=dict[str, Any])

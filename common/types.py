@@ -1,4 +1,4 @@
-"""What numbers are called that every package hands on: arrays, vectors, the numbers of four rotors, addresses."""
+"""Type aliases shared by all packages: arrays, vectors, values per rotor, addresses."""
 
 from typing import TypeAlias
 
@@ -11,6 +11,6 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 """w, x, y, z."""
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 FourRotors: TypeAlias = tuple[float, float, float, float]
-"""A number of each rotor."""
+"""One number per rotor."""
 Address: TypeAlias = tuple[str, int]
 """Host and port."""

@@ -1,4 +1,4 @@
-"""The conversions of `geodesy`, compiled: for who converts every fix of GPS. The same bits."""
+"""The conversions of `geodesy`, compiled, for every GPS fix; the same bits."""
 
 from functools import partial
 

@@ -1,7 +1,6 @@
 """Latitude and longitude ⇄ metres east and north of an origin: the azimuthal equidistant projection of a sphere.
 
-The projection and the radius are those that PX4 and the ground stations that fly it use, so that both sides put a
-waypoint on the same spot. Altitude is not projected: z is the height above the origin's.
+Projection and radius are PX4's and its ground stations', so that all agree on a waypoint. Altitude is not projected.
 """
 
 from collections.abc import Callable
@@ -17,7 +16,7 @@ MAX_LONGITUDE_DEG = 180.0
 
 
 class Geodetic(NamedTuple):
-    """A place on earth; its altitude is above mean sea level."""
+    """A place on earth; the altitude is above mean sea level."""
 
     latitude_deg: float
     longitude_deg: float
@@ -25,11 +24,10 @@ class Geodetic(NamedTuple):
 
 
 DEFAULT_ORIGIN = Geodetic(47.397742, 8.545594, 488.0)
-"""Where simulated vehicles of this kind have always flown: Zurich, Irchel."""
+"""Zurich, Irchel: the usual origin of PX4's simulators."""
 
 
 def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
-    """Whether these can be a latitude and a longitude, degrees."""
     return (
         isfinite(latitude_deg)
         and isfinite(longitude_deg)
@@ -41,7 +39,7 @@ def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
 def offset_m(
     latitude_deg: float, longitude_deg: float, first_latitude_deg: float, first_longitude_deg: float
 ) -> tuple[float, float]:
-    """Return how far east and north a place is of a first one, m."""
+    """Return the offset east and north from the first place, m."""
     latitude, first = radians(latitude_deg), radians(first_latitude_deg)
     along = radians(longitude_deg - first_longitude_deg)
     cosine = sin(first) * sin(latitude) + cos(first) * cos(latitude) * cos(along)
@@ -55,7 +53,7 @@ def offset_m(
 def place_deg(
     east_m: float, north_m: float, distance_m: float, first_latitude_deg: float, first_longitude_deg: float
 ) -> tuple[float, float]:
-    """Return latitude and longitude, degrees, of what is so far east and north of a first place; not of itself."""
+    """Return latitude and longitude at an offset (of positive length `distance_m`) from the first place."""
     angle, first = distance_m / EARTH_RADIUS_M, radians(first_latitude_deg)
     latitude = asin(cos(angle) * sin(first) + north_m * sin(angle) * cos(first) / distance_m)
     longitude = radians(first_longitude_deg) + atan2(
@@ -65,7 +63,7 @@ def place_deg(
 
 
 def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[float, float]] = offset_m) -> Vector:
-    """Return where `place` is seen from `origin`, m, ENU; `offset` may be another `offset_m`."""
+    """Return the position of `place` from `origin`, m, ENU; `offset` may be a compiled `offset_m`."""
     east, north = offset(place.latitude_deg, place.longitude_deg, origin.latitude_deg, origin.longitude_deg)
     return (east, north, place.altitude_m - origin.altitude_m)
 
@@ -73,7 +71,7 @@ def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[flo
 def geodetic_of(
     position_enu_m: Vector, origin: Geodetic, *, place: Callable[..., tuple[float, float]] = place_deg
 ) -> Geodetic:
-    """Return the place at `position_enu_m` from `origin`; `place` may be another `place_deg`."""
+    """Return the place at `position_enu_m` from `origin`; `place` may be a compiled `place_deg`."""
     east, north, up = position_enu_m
     distance = hypot(east, north)
     latitude_deg, longitude_deg, altitude_m = origin

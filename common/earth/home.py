@@ -1,4 +1,4 @@
-"""Where on earth a vehicle begins: LAT,LON,ALT,YAW of the command line."""
+"""Home of a vehicle: LAT,LON,ALT,YAW of the command line."""
 
 from argparse import ArgumentTypeError
 from math import isfinite
@@ -10,7 +10,7 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -500.0, 10_000.0
 
 
 class HomePlace(NamedTuple):
-    """Where the vehicle stands when everything begins; the origin of the ENU frame is there.
+    """Initial place of the vehicle, and origin of the ENU frame.
 
     Attributes:
         altitude_m: Above mean sea level.
@@ -24,7 +24,6 @@ class HomePlace(NamedTuple):
 
     @property
     def origin(self) -> Geodetic:
-        """The place, without the heading."""
         return Geodetic(self.latitude_deg, self.longitude_deg, self.altitude_m)
 
     @property
@@ -33,7 +32,6 @@ class HomePlace(NamedTuple):
         return 90.0 - self.yaw_deg
 
     def __str__(self) -> str:
-        """Return what `home` reads back."""
         return ",".join(map(repr, self))
 
 
@@ -41,7 +39,6 @@ DEFAULT_HOME = HomePlace(*DEFAULT_ORIGIN, 0.0)
 
 
 def home(text: str) -> HomePlace:
-    """Read LAT,LON,ALT,YAW of the command line."""
     try:
         place = HomePlace(*map(float, text.split(",")))
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 
 YEAR = 2026.0
-"""Of the model, which is good from 2025 to 2030: no clock is asked, so that a flight can be flown again."""
+"""Fixed instead of the clock's, so that flights are repeatable; the model is valid from 2025 to 2030."""
 
 _GAUSS_PER_NT = 1e-5
 _DECIMALS_NT = 6
@@ -23,9 +23,7 @@ _MIN_HEIGHT_KM, _MAX_HEIGHT_KM = -1.0, 850.0
 def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
     """Return the magnetic field at `place`, gauss, ENU of true north.
 
-    Args:
-        place: On earth; its altitude is taken within what the model is made for, -1 to 850 km.
-        year: Decimal year, 2025 to 2030.
+    The altitude is clamped to the model's range, -1 to 850 km; `year` is decimal, 2025 to 2030.
     """
     altitude_km = min(max(place.altitude_m / 1e3, _MIN_HEIGHT_KM), _MAX_HEIGHT_KM)
     field = GeoMag(coefficients_data=WMM_2025).calculate(
@@ -35,5 +33,5 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
 
 
 def _gauss(field_nt: float) -> float:
-    """Return a component in gauss, rounded far below the model's accuracy: libm's last bits differ by computer."""
+    """Return a component rounded far below the model's accuracy: the last bits of libm differ by computer."""
     return round(field_nt, _DECIMALS_NT) * _GAUSS_PER_NT

@@ -1,1 +1,1 @@
-"""The machine code of kernels on disk: where it is kept, what of it, and when it is renewed."""
+"""Cache of compiled kernels on disk."""

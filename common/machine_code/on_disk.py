@@ -1,4 +1,4 @@
-"""Machine code as numba's dispatcher asks for it: from a folder, renewed when a file that it is made of changes."""
+"""numba's cache of machine code in a folder, renewed when a source file changes."""
 
 import os
 import sys
@@ -23,27 +23,23 @@ _NOWHERE = (
 
 
 class MachineCode:
-    """The machine code of one kernel. Its folder is looked for when it is first asked for.
+    """The machine code of one kernel. The folder is located on first use.
 
-    For most kernels it never is: they are part of the machine code of those that call them.
+    Most kernels never need it: their code is part of their callers'.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        """Keep the machine code of `function`."""
         self._function = function
 
     @property
     def cache_path(self) -> str | None:
-        """Return the folder; None where it is kept nowhere."""
         folder: str | None = self._cache.cache_path
         return folder
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what compiling for a signature has given; None where it has not been done, or from other files."""
         return self._cache.load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what compiling for a signature has given."""
         self._cache.save_overload(sig, data)
 
     @cached_property
@@ -71,7 +67,7 @@ class _OnDisk(FunctionCache):
 
 @cache
 def _use_private_folder() -> bool:
-    """Have this process and its children keep machine code in the private folder; return if they can."""
+    """Keep machine code of this process and its children in the private folder; return success."""
     folder = private_folder()
     if folder is not None:
         config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""A temporary folder of this user's, where nothing else can be written to."""
+"""A private temporary folder, the fallback if all other folders are read-only."""
 
 import os
 from pathlib import Path
@@ -7,9 +7,9 @@ from tempfile import gettempdir
 
 
 def private_folder() -> Path | None:
-    """Return a temporary folder of this user's, made where it is missing; None where it cannot be.
+    """Return this user's temporary folder, created if missing; `None` if impossible.
 
-    What is kept there is run: nobody else may own the folder or write to it.
+    Code in it is executed, so the folder must belong to this user and be writable by this user only.
     """
     try:
         folder = Path(gettempdir()) / f"colibri-{os.getuid()}"

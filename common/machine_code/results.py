@@ -1,7 +1,7 @@
-"""Results of compiling, as they are kept on disk: most so that they are loaded without numba's front end.
+"""Compilation results on disk, in a form that loads without numba's front end.
 
-Left to itself numba loads all that it compiles with, and SciPy, before it takes the first kernel from disk; and of
-each kernel it reads the intermediate code, too, which only the compilation of a caller needs.
+By default, numba imports its compiler and SciPy before it loads the first kernel, and parses each kernel's intermediate
+code, which only the compilation of a caller needs.
 """
 
 from functools import cache
@@ -18,16 +18,15 @@ _EMPTY = Environment({})
 
 
 class _Kept(NamedTuple):
-    """What is kept of a kernel that is loaded without numba's front end.
+    """A kernel that can be loaded without numba's front end.
 
     Attributes:
-        name: Of its code.
-        machine_code: What runs.
-        intermediate_code: What is compiled into callers.
+        name: Of its code library.
+        intermediate_code: For inlining into callers.
         defined: Names of its functions and globals.
-        needed: Names of what is not its own: of Python, of the C library, of numba's runtime.
-        environments: Names of those that it uses beside its own; they are empty.
-        description: Of its arguments and its result.
+        needed: Names of external symbols: of Python, the C library, numba's runtime.
+        environments: Names of further environments it uses; they are empty.
+        description: Of arguments and result.
         environment: The Python objects that it uses.
         signature: The types.
     """
@@ -44,21 +43,19 @@ class _Kept(NamedTuple):
 
 
 class Results(CompileResultCacheImpl):
-    """What numba asks how a result is written and read.
+    """Writer and reader of compilation results for numba.
 
     Attributes:
-        version: Of all that a result is made of. It is kept beside each: two processes of two versions that write at
-            once leave the index of one and the result of the other.
+        version: Of all inputs of a result. It is stored with each result: two versions that write at once may leave the
+            index of one and the result of the other.
     """
 
     version: tuple[str, ...] = ()
 
     def reduce(self, cres: Any) -> Any:
-        """Return what is kept of a result, with its version."""
         return self.version, self._kept(cres)
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Return a result from what is kept of it; None if that is of another version."""
         if payload[0] != self.version:
             return None
         kept = payload[1]
@@ -68,7 +65,7 @@ class Results(CompileResultCacheImpl):
         return super().rebuild(target_context, kept)
 
     def _kept(self, cres: Any) -> Any:
-        """Return what numba keeps, where a result needs more than `_Kept` has."""
+        """Return a `_Kept` if it holds all of the result, otherwise numba's own reduction."""
         whole = super().reduce(cres)
         (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
         object_mode, lifted, _, reload_init, environments = others
@@ -107,7 +104,7 @@ def _loaded(target_context: Any, kept: _Kept) -> Any:
 
 
 class _Library(JITCodeLibrary):
-    """The code of a kernel, from disk; its intermediate code is read when a caller is compiled."""
+    """A kernel's code from disk; intermediate code is parsed when a caller is compiled."""
 
     def __init__(self, codegen: Any, kept: _Kept) -> None:
         super().__init__(codegen, kept.name)
@@ -125,12 +122,12 @@ class _Library(JITCodeLibrary):
 
 @cache
 def _name_runtime() -> None:
-    """Tell LLVM where numba's runtime is. Numba does it, too, and compiles what of it goes into kernels."""
+    """Register numba's runtime with LLVM; numba's own registration also compiles the runtime."""
     for name, address in _nrt_python.c_helpers.items():
         add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 @cache
 def _is_loaded(name: str) -> bool:
-    """Return whether there is such a function or global in this process: LLVM ends it where one is missing."""
+    """Return whether a symbol exists in this process: LLVM aborts on a missing one."""
     return address_of_symbol(name) is not None

@@ -1,4 +1,4 @@
-"""The files that a kernel's machine code is made of, and their hashes."""
+"""Source files of a kernel's machine code, and their hashes."""
 
 from collections.abc import Callable
 from functools import cache
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def files_of(function: Callable[..., Any]) -> set[str]:
-    """Return the files that a function's machine code is made of: its own, and those of what it calls by name."""
+    """Return the files of a function and of the functions it calls by global name."""
     files: set[str] = set()
     seen: set[Any] = set()
     waiting: list[Any] = [function]
@@ -26,5 +26,5 @@ def files_of(function: Callable[..., Any]) -> set[str]:
 
 @cache
 def hash_of(file: str) -> str:
-    """Return the hash of a file as it was when first asked for."""
+    """Return the hash of a file at the first call."""
     return sha256(Path(file).read_bytes()).hexdigest()

@@ -1,4 +1,1 @@
-"""What a process shares with the world.
-
-Arguments, signals and exit codes, status lines, log files, crash-safe slots.
-"""
+"""Process support: arguments, signals, exit codes, status lines, log files, crash-safe slots."""

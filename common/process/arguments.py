@@ -1,4 +1,4 @@
-"""The command line: errors of one line, and the numbers that options take."""
+"""Command lines: one-line errors, and numeric arguments."""
 
 import argparse
 import re
@@ -10,20 +10,17 @@ from colibri.common.process.lifecycle import fail
 
 
 class ArgumentParser(argparse.ArgumentParser):
-    """A parser whose errors are one line and exit code 2, and to which what begins like `-33.9,` is a value."""
+    """A parser with one-line errors and exit code 2, and with values like `-33.9,` accepted."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        """Take what argparse takes."""
         super().__init__(*args, **options)
         self._negative_number_matcher = re.compile(r"^-\.?\d")
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where to read on."""
         fail(f"{message} (see {self.prog} --help)")
 
 
 def number(text: str) -> float:
-    """Read a finite number of the command line."""
     value = float(text)
     if not isfinite(value):
         raise ValueError
@@ -31,7 +28,6 @@ def number(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """Read a number above zero of the command line."""
     value = number(text)
     if value <= 0.0:
         raise ArgumentTypeError(f"must be above zero, not {text}")
@@ -39,7 +35,6 @@ def positive(text: str) -> float:
 
 
 def natural(text: str) -> int:
-    """Read a whole number from 0 on of the command line."""
     value = int(text)
     if value < 0:
         raise ArgumentTypeError(f"must not be below zero, not {text}")
@@ -47,7 +42,6 @@ def natural(text: str) -> int:
 
 
 def seeds(text: str) -> range:
-    """Read FIRST-LAST, or one seed, of the command line."""
     first, dash, last = text.partition("-")
     try:
         chosen = range(int(first), int(last if dash else first) + 1)

@@ -1,4 +1,4 @@
-"""`failure.txt` in the folder of a flight: why it came to an early end, and the traceback where foreign code raised."""
+"""`failure.txt` in a flight's folder: the reason of an early end, with the traceback of foreign code."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -10,7 +10,7 @@ FAILURE = "failure.txt"
 
 
 def keep_failure(error: Error, folder: Path | None) -> str:
-    """Write why a flight has ended to `folder`, if there is one; return the line that a user needs."""
+    """Write the reason of a flight's end to `folder`, if any; return the line for the user."""
     if folder is None:
         return str(error)
     path = folder / FAILURE
@@ -21,7 +21,7 @@ def keep_failure(error: Error, folder: Path | None) -> str:
 
 
 def failure_text(error: Error, file: str) -> tuple[str, str]:
-    """Return the line that a user needs of an error, and the content of its `file`."""
+    """Return an error's line for the user, and the content of its `file`."""
     line, raised = str(error), ""
     if isinstance(error, ForeignError) and error.__cause__ is not None:
         line, raised = f"{line}; its traceback is in {file}", "".join(format_exception(error.__cause__))
@@ -29,7 +29,7 @@ def failure_text(error: Error, file: str) -> tuple[str, str]:
 
 
 def kept_failure(folder: Path) -> str | None:
-    """Return why the flight in `folder` has ended early; None where it has not, or where nobody could say."""
+    """Return the reason of an early end of the flight in `folder`, if recorded."""
     try:
         return (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0] or None
     except (OSError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""Folders that one process at a time writes to."""
+"""Exclusive locks on folders."""
 
 import fcntl
 import os
@@ -8,18 +8,18 @@ from colibri.common.errors import Error
 
 
 class FolderInUseError(Error):
-    """Another process writes to a folder; the message names it."""
+    """The folder is locked by another process; the message names it."""
 
 
 class FolderLock:
-    """Keeps a folder for whoever holds this, and leaves nothing in it; the system releases it with the process."""
+    """An exclusive lock on a folder, without a lock file; released by the system when the process ends."""
 
     def __init__(self, folder: Path, option: str) -> None:
-        """Lock `folder`, made where it is missing; errors name the `option` that it was given by.
+        """Lock `folder`, created if missing; errors name its command-line `option`.
 
         Raises:
-            FolderInUseError: Somebody else holds it.
-            OSError: It cannot be made or read.
+            FolderInUseError: The folder is locked by another process.
+            OSError: The folder cannot be created or read.
         """
         folder.mkdir(parents=True, exist_ok=True)
         self._folder: int | None = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -32,15 +32,12 @@ class FolderLock:
             return  # a file system without locks
 
     def close(self) -> None:
-        """Release the folder."""
         if self._folder is not None:
             os.close(self._folder)
             self._folder = None
 
     def __enter__(self) -> "FolderLock":
-        """Hold it."""
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Release it."""
         self.close()

@@ -1,4 +1,4 @@
-"""A process's life: one-line errors and exit codes, a clean and quick end, one thread, no pauses."""
+"""Process life cycle: one-line errors, exit codes, quick end, one thread, no garbage-collection pauses."""
 
 import atexit
 import gc
@@ -17,34 +17,34 @@ EXIT_INTERRUPTED = 130
 
 
 def use_one_thread() -> None:
-    """Keep linear algebra to one thread: at a dozen states the others only spin, on the cores that the flight needs.
+    """Limit linear algebra to one thread; call before numpy is loaded.
 
-    To be called before numpy is loaded.
+    At a dozen states further threads only spin, on cores that the flight needs.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def use_safe_path() -> None:
-    """Keep the working directory off the path of processes to come: its files, of whatever names, shadow no module."""
+    """Keep the working directory off the module path of child processes: its files must not shadow modules."""
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
 def escape_what_no_stream_encodes() -> None:
-    """Have standard output and error escape characters that their encodings lack, in place of an exception."""
+    """Escape characters that standard output and error cannot encode, instead of raising."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def nudge_m() -> float:
-    """Return how far every flight begins beside its start, m: a test of the tests, 0 unless COLIBRI_NUDGE_M is set."""
+    """Return the offset of every flight's start, m: COLIBRI_NUDGE_M, which tests the tests; default 0."""
     return float(os.environ.get("COLIBRI_NUDGE_M", "0"))
 
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Load modules, or what they are made into, without the garbage collector in between: what is loaded stays."""
+    """Load modules without garbage collection: loaded objects stay."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -56,10 +56,10 @@ def loading() -> Iterator[None]:
 
 @contextmanager
 def gc_frozen() -> Iterator[None]:
-    """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time.
+    """Exclude all existing objects from garbage collection, to save flight time.
 
-    What of it is garbage, a thousand objects, stays until the end: to search for it would take 0.15 s of every start.
-    What somebody else has frozen, a process that flies many times say, stays frozen, and nothing is added to it.
+    Existing garbage, about a thousand objects, stays until the end: collecting it would add 0.15 s to every start. If
+    objects are already frozen (in a process with many flights), this changes nothing.
     """
     ours = not gc.get_freeze_count()
     if ours:
@@ -73,9 +73,9 @@ def gc_frozen() -> Iterator[None]:
 
 
 def freeze_once() -> None:
-    """Freeze what exists at the first call; at each later one collect the garbage of the flights in between.
+    """Freeze all objects at the first call; afterwards collect the garbage of previous flights.
 
-    For a process in which many flights begin and end: to freeze each one's garbage would keep it for good.
+    For processes with many flights: freezing each one's garbage would leak it.
     """
     if gc.get_freeze_count():
         gc.collect()
@@ -85,30 +85,30 @@ def freeze_once() -> None:
 
 
 def end_quickly() -> None:
-    """Spare this process at its end the search for garbage through all that it has loaded: a third of a second."""
+    """Skip the final garbage collection over all loaded modules, which takes a third of a second."""
     atexit.unregister(gc.freeze)
     atexit.register(gc.freeze)
 
 
 def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
-    """End the process with one line on standard error."""
     sys.stderr.write(f"colibri: error: {message}\n")
     sys.stderr.flush()
     raise SystemExit(code)
 
 
 _PARENT_EVERY = 8
-"""A process asks at each frame, or ten times a second."""
+"""Checks between two looks at the parent; a process checks every frame, or ten times a second."""
 
 
 class Stop:
-    """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
+    """True once the process should end: on SIGINT, SIGTERM, or optionally the parent's death."""
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
-        """Take over SIGINT and SIGTERM; `starting`: until first asked they end the process at once.
+        """Handle SIGINT and SIGTERM; with `starting` they end the process at once until the first check.
 
-        What is still loading has nothing to put in order, and may load for seconds before it asks. The parent passes
-        its id: it may have died before this process could ask.
+        A loading process has nothing to clean up, and may not check for seconds. The parent passes its own id because
+        it may
+        die before this process reads it.
         """
         self._signalled = False
         self._starting = starting
@@ -118,7 +118,6 @@ class Stop:
         signal.signal(signal.SIGTERM, self._handle)
 
     def __bool__(self) -> bool:
-        """Whether to end now; whether the parent lives is seen every few times."""
         self._starting = False
         self._asked += 1
         if self._parent is not None and self._asked % _PARENT_EVERY == 1 and os.getppid() != self._parent:

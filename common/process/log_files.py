@@ -1,4 +1,4 @@
-"""Log files: records that are written whole, as they come or block by block."""
+"""Log files of whole records, written immediately or in blocks."""
 
 from contextlib import suppress
 from itertools import accumulate
@@ -10,16 +10,16 @@ from colibri.common.process.lifecycle import fail
 
 
 class LogError(InFlightError):
-    """A log that cannot be written any further; the message names its file."""
+    """A log can no longer be written; the message names its file."""
 
 
 def set_aside(*paths: Path) -> None:
-    """Give logs that are over a name of their own, so that others can begin: flight.ulg becomes flight-1.ulg.
+    """Rename finished logs so that new ones can begin: flight.ulg becomes flight-1.ulg.
 
-    All get the same number, the first that none of them has had; what is not there is passed over.
+    All get the same number, the first that is free for each; missing files are skipped.
 
     Raises:
-        LogError: One cannot be renamed.
+        LogError: A file cannot be renamed.
     """
     number = 1
     while any(_numbered(path, number).exists() for path in paths):
@@ -36,10 +36,10 @@ def _numbered(path: Path, number: int) -> Path:
 
 
 class LogFile:
-    """A file of records, each of which gets into it whole or not at all, in their order."""
+    """A file of records, each written whole or not at all, in order."""
 
     def __init__(self, path: Path, how: Literal["wb", "ab"] = "wb") -> None:
-        """Open the file, its folder made where it is missing, or end the process with one line."""
+        """Open the file and create its folder, or end the process with one line."""
         self._path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -48,10 +48,10 @@ class LogFile:
             fail(f"cannot write {path}: {error.strerror}")
 
     def append(self, *records: bytes) -> None:
-        """Append records, which reach the system at once; nothing once that has failed.
+        """Append records at once; ignored after a failure.
 
         Raises:
-            LogError: They cannot be written, the disk being full, say; the file holds those that were.
+            LogError: The write failed, for instance on a full disk; the file keeps all whole records.
         """
         if self._file.closed:
             return
@@ -66,42 +66,30 @@ class LogFile:
             raise LogError(f"cannot go on writing {self._path}: {error.strerror}") from error
 
     def close(self) -> None:
-        """Close."""
         self._file.close()
 
 
 class BlockLog(LogFile):
-    """A file whose records are written `BLOCK` at a time: a process that is killed loses those since the last block."""
+    """A file written `BLOCK` records at a time: a killed process loses the records since the last block."""
 
     BLOCK = 64
 
     def __init__(self, path: Path) -> None:
-        """Open the file, its folder made where it is missing, or end the process with one line."""
         super().__init__(path)
         self._waiting: list[bytes] = []
 
     def add(self, record: bytes) -> None:
-        """Append a record, and write all that wait once they are a block.
-
-        Raises:
-            LogError: They cannot be written.
-        """
         self._waiting.append(record)
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 
     def flush(self) -> None:
-        """Write what waits.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         waiting, self._waiting = self._waiting, []
         if waiting:
             self.append(*waiting)
 
     def close(self) -> None:
-        """Write what waits, if that can be done, and close: who must know whether it can flushes before."""
+        """Write pending records if possible, and close; call `flush` first to detect failure."""
         with suppress(LogError):
             self.flush()
         super().close()

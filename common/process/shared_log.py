@@ -1,4 +1,4 @@
-"""A log file that several processes write to at once: each appends blocks, which the system keeps whole."""
+"""A log file with several concurrent writers; the system keeps appended blocks whole."""
 
 import fcntl
 from contextlib import suppress
@@ -8,15 +8,15 @@ from colibri.common.process.log_files import LogError, LogFile
 
 
 class SharedLog(LogFile):
-    """A file that goes on while anybody has it open: so an autopilot that was killed goes on in that of its flight."""
+    """A log that continues while any process has it open, so a restarted autopilot appends to its flight's log."""
 
     def __init__(self, path: Path, beginning: bytes, *, goes_on: bool = False) -> None:
-        """Open the file, its folder made where it is missing, or end the process with one line.
+        """Open the file and create its folder, or end the process with one line.
 
         Args:
-            path: Where it is.
-            beginning: What is written first, unless somebody has done so.
-            goes_on: Whether to append to what nobody has open, too, in place of beginning anew.
+            path: The file.
+            beginning: Written first in a new file.
+            goes_on: Whether to append to an existing file even if it is not open in any process.
 
         Raises:
             LogError: The beginning cannot be written.
@@ -34,16 +34,16 @@ class SharedLog(LogFile):
 
 
 def remove_unused(path: Path) -> None:
-    """Remove a shared log of an earlier flight: one that nobody has open."""
+    """Remove a shared log that no process has open."""
     with suppress(OSError), path.open("rb") as file:
         if _is_alone(file.fileno()):
             path.unlink()
 
 
 def _is_alone(file: int) -> bool:
-    """Return whether nobody else has a file open, and let nobody else open it; wait for whoever is about to begin it.
+    """Return whether the file is open here only, and then lock others out; wait for a process that is creating it.
 
-    On a file system without locks nobody can know: then it is not alone.
+    Without file locks this is unknown: return False.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

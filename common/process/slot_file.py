@@ -1,8 +1,7 @@
-"""A file of two slots that outlives the process at any instant: what was written last and whole is what it holds.
+"""A file of two slots that survives a crash at any instant with the last complete write.
 
-The file is mapped into memory, so a write is a copy: the system has it at once, also when the process is killed the
-instant after. Slots are written in turn, each with a number and a checksum, so one of them is always whole. Only a
-computer that loses its power may lose more.
+The file is memory-mapped, so the system has a write at once, even if the process is killed right after. Slots are
+written alternately with number and checksum, so one is always whole. Only a power failure may lose more.
 """
 
 from mmap import mmap
@@ -12,22 +11,22 @@ from zlib import crc32
 
 SLOT = 256 << 10
 _HEAD = Struct("<QII")
-"""Number, from 1 on; length; checksum of both and of the content."""
+"""Number, from 1; length; checksum of both and of the content."""
 _COUNTED = Struct("<QI")
 MAX_BYTES = SLOT - _HEAD.size
-"""Bytes that fit."""
+"""Capacity of a slot."""
 
 
 class Slots:
-    """Keeps the newest of what it is given."""
+    """The newest of a sequence of contents, on disk."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file, made where it is missing or of another size.
+        """Open the file; create it if it is missing or has another size.
 
-        All of it is written once: a page for which the disk has no room would end the process by SIGBUS.
+        All of it is written once: a page without disk space would later end the process by SIGBUS.
 
         Raises:
-            OSError: It cannot be made, read or written.
+            OSError: The file cannot be created, read or written.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("r+b" if path.exists() else "w+b") as file:
@@ -42,11 +41,10 @@ class Slots:
         self._number = max((number for number, _ in self._whole()), default=0)
 
     def newest(self) -> bytes | None:
-        """Return what was written last; None before anything was."""
         return max(self._whole(), default=(0, None))[1]
 
     def write(self, content: bytes) -> bool:
-        """Keep `content` in place of what was written before the last; return whether it fits."""
+        """Replace the older slot by `content`; return whether it fits."""
         if len(content) > MAX_BYTES:
             return False
         number = self._number + 1
@@ -57,11 +55,10 @@ class Slots:
         return True
 
     def close(self) -> None:
-        """Let go of the file."""
         self._map.close()
 
     def _whole(self) -> list[tuple[int, bytes]]:
-        """Return number and content of each slot that is whole."""
+        """Return number and content of each intact slot."""
         slots = []
         for at in (0, SLOT):
             number, length, checksum = _HEAD.unpack_from(self._map, at)

@@ -1,4 +1,4 @@
-"""What plant and autopilot have in common as processes, and who started one."""
+"""Common options of plant and autopilot processes, and the starting process."""
 
 import sys
 from argparse import SUPPRESS, Namespace
@@ -31,11 +31,11 @@ class ProcessSpec:
 
 
 class Starter(NamedTuple):
-    """Who started a process.
+    """The starter of a process.
 
     Attributes:
-        as_json: Whether it reads the status as JSON lines on standard output.
-        parent: Its process, whose end ends this one; None for a user's.
+        as_json: Whether the starter reads status as JSON lines on standard output.
+        parent: Process id; this process ends with it. `None` if started by a user.
     """
 
     as_json: bool = False
@@ -43,7 +43,7 @@ class Starter(NamedTuple):
 
 
 def add_process_options(parser: ArgumentParser) -> None:
-    """Add the options by which another program starts a process."""
+    """Add the options for programs that start this process."""
     add = parser.add_argument
     add("--json", action="store_true", help="status as JSON lines on standard output")
     add("--parent", type=int, metavar="PID", help="end when that process, which started this one, ends")
@@ -51,9 +51,9 @@ def add_process_options(parser: ArgumentParser) -> None:
 
 
 def read_process(spec: type[S], args: Namespace) -> tuple[S, Starter]:
-    """Return what a command line describes, or with `--spec` the JSON on standard input; and who started the process.
+    """Return specification and starter from the command line, or with `--spec` from JSON on standard input.
 
-    A specification that cannot be read ends the process with one line.
+    An invalid specification ends the process with one line.
     """
     starter = Starter(args.json, args.parent)
     if not args.spec:

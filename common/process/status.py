@@ -1,4 +1,4 @@
-"""Status lines: in words for a user, as JSON for whoever started the process."""
+"""Status lines: text for users, JSON for programs."""
 
 import json
 import os
@@ -7,21 +7,19 @@ from typing import Any, TextIO
 
 
 class Status:
-    """Reports what the process is doing: lines for a person on standard error, or JSON lines on standard output."""
+    """Reports status as text on standard error, or JSON lines on standard output."""
 
     def __init__(self, name: str, *, as_json: bool) -> None:
-        """Speak as `name`."""
         self._name = name
         self.as_json = as_json
         self._stream: TextIO | None = None
 
     def take_standard_output(self) -> None:
-        """Keep standard output for status lines alone: what else is printed, by a control law say, is an error line."""
+        """Reserve standard output for status lines; redirect other output to standard error."""
         self._stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
 
     def say(self, event: str, text: str, **facts: Any) -> None:
-        """Report `event`: `text` for a person, `facts` for a program."""
         if self.as_json:
             _print(self._stream or sys.stdout, json.dumps({"event": event, "text": text, **facts}))
         else:
@@ -29,7 +27,7 @@ class Status:
 
 
 def _print(stream: TextIO, line: str) -> None:
-    """Print a line; where nobody reads any more, for good into the void: `Stop` sees whose end that was."""
+    """Print a line; if the reader has gone, discard all further output: `Stop` detects the parent's end."""
     try:
         stream.write(line + "\n")
         stream.flush()
@@ -38,16 +36,14 @@ def _print(stream: TextIO, line: str) -> None:
 
 
 class Progress:
-    """Reports how far a flight is, often to a program and seldom to a person."""
+    """Reports flight progress: every 0.1 s to programs, every 2 s to people."""
 
     def __init__(self, status: Status) -> None:
-        """Report through `status`."""
         self._status = status
         self._every_s = 0.1 if status.as_json else 2.0
         self._due_s = self._every_s
 
     def report(self, sim_time_s: float, wall_time_s: float) -> None:
-        """Report, if it is time to."""
         if wall_time_s < self._due_s:
             return
         self._due_s = wall_time_s + self._every_s

@@ -1,4 +1,4 @@
-"""Where libraries keep what they remember, in a home that cannot be written to."""
+"""Cache folders of libraries when the home is read-only."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from colibri.common.machine_code.private_folder import private_folder
 
 
 def use_writable_folders() -> None:
-    """Have matplotlib keep settings and fonts in the private folder where it cannot in the home: it would say so."""
+    """Move matplotlib's settings and fonts to the private folder if the home is read-only: it would warn."""
     if os.environ.get("MPLCONFIGDIR"):
         return
     try:
@@ -24,6 +24,6 @@ def use_writable_folders() -> None:
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Whether files can be made in a folder, which may have to be made itself."""
+    """Return whether files can be created in a folder, which may not exist yet."""
     there = next(path for path in (folder, *folder.absolute().parents) if os.path.exists(path))
     return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
