@@ -1,4 +1,4 @@
-"""MAVLink: codec, links, and the conversations of vehicle and client as state machines without input or output."""
+"""MAVLink: codec, links, and the protocols of vehicle and client as state machines without I/O."""
 
 from typing import TYPE_CHECKING
 

@@ -4,4 +4,4 @@ from colibri.common.errors import Error
 
 
 class MavlinkError(Error):
-    """A link, a key or a file of MAVLink's that cannot be used."""
+    """An unusable link, key or MAVLink file."""

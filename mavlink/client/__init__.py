@@ -1,1 +1,1 @@
-"""The client side of MAVLink: what a ground station, a companion computer or a test asks of a vehicle. No I/O."""
+"""The client side of MAVLink, for ground stations, companion computers and tests; without I/O."""

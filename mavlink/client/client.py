@@ -2,7 +2,7 @@
 
     for datagram in received:                     the owner's link and clock
         for message in client.receive(datagram, now_us):
-            ...                                   telemetry, to be read as it comes
+            ...                                   telemetry
     for datagram in client.poll(now_us):
         link.send(datagram)
     for event in client.take_events():
@@ -10,22 +10,21 @@
 
 Theory
 ------
-MAVLink is datagrams that may be lost, duplicated and reordered. Some messages are streamed: losing one costs nothing.
-The others are requests, https://mavlink.io/en/services/, and each microservice solves the loss in the same way: the
-client repeats its request until the vehicle answers, and the vehicle recognises a repetition. So a `Conversation` is a
-state machine with two inputs: `poll(now)` returns the current request when it is due, first at once and then after each
-silence; `receive(message)` reads an answer, which ends the conversation or moves it to its next request. After too many
-requests in vain its result is UNANSWERED. Nothing is sent from `receive`, so however many copies of an answer
-arrive, one request follows.
+MAVLink datagrams may be lost, duplicated and reordered. Losing one of a stream costs little. Requests
+(https://mavlink.io/en/services/) are repeated by the client until the vehicle answers, and the vehicle recognises
+repetitions. So a `Conversation` is a state machine with two inputs: `poll(now)` returns the current request when it is
+due, first at once and then after each silence; `receive(message)` reads an answer, which ends the conversation or moves
+it to its next request. After too many unanswered requests the result is UNANSWERED. `receive` never sends, so
+duplicate answers cause one request only.
 
-An answer does not name the request that it answers: a COMMAND_ACK holds no more than the number of the command, a
-MISSION_ACK the type of the plan. Conversations whose answers could not be told apart share a *lane*, in which they take
-turns; conversations in different lanes run side by side. What remains is a copy of an old answer that arrives during
-the next conversation of its lane. Where the content shows it (an acknowledgement before the last item was sent, the
-value from before the change) it is disregarded; the answer to a repeated command cannot be recognised as old.
+An answer does not identify its request: a COMMAND_ACK has only the number of the command, a MISSION_ACK the type of the
+plan. Conversations with indistinguishable answers share a *lane* and take turns; different lanes run side by side. An
+old answer may still arrive during the next conversation of its lane. It is ignored if its content shows its age (an
+acknowledgement before the last item was sent, the value from before the change); an old answer to a repeated command
+cannot be recognised.
 
-Vehicles are found by their HEARTBEAT, and are lost after a silence. A client talks with any number of them. With a key
-(`Signing`) it signs what it sends and drops what is not signed; without, it reads over signatures.
+A vehicle is found by its HEARTBEAT and lost after a silence. With a key (`Signing`) the client signs its messages and
+drops unsigned ones.
 """
 
 from collections import Counter, deque
@@ -45,7 +44,7 @@ from colibri.mavlink.wire.signing import Signing
 
 HEARTBEAT_EVERY_US = 1_000_000
 LOST_AFTER_US = 3_500_000
-"""Three heartbeats are missing, and a half: as QGroundControl has it."""
+"""Three and a half heartbeats, as in QGroundControl."""
 _MAVLINK_VERSION = 3
 _EVENTS = 1000
 
@@ -53,15 +52,14 @@ Talk = TypeVar("Talk", bound=Conversation)
 
 
 class Vehicle(NamedTuple):
-    """A vehicle as it identifies itself.
+    """Identity of a vehicle.
 
     Attributes:
         system: System id.
         autopilot: MAV_AUTOPILOT.
         kind: MAV_TYPE.
-        heartbeat_us: When its last HEARTBEAT arrived.
-        lost: Whether it has been silent for too long.
-        capabilities: MAV_PROTOCOL_CAPABILITY bits of its AUTOPILOT_VERSION; None before the first.
+        heartbeat_us: Arrival of its last HEARTBEAT.
+        capabilities: MAV_PROTOCOL_CAPABILITY bits of its AUTOPILOT_VERSION; `None` before the first.
         uid2: Unique id of its AUTOPILOT_VERSION; empty before the first.
     """
 
@@ -75,18 +73,18 @@ class Vehicle(NamedTuple):
 
     @property
     def target(self) -> tuple[int, int]:
-        """System and component that requests are for."""
+        """System and component of its autopilot."""
         return self.system, AUTOPILOT_COMPONENT
 
 
 class Found(NamedTuple):
-    """A vehicle has sent its first HEARTBEAT, or the first after it was lost."""
+    """The first HEARTBEAT of a vehicle, or the first after it was lost."""
 
     vehicle: Vehicle
 
 
 class Lost(NamedTuple):
-    """A vehicle has been silent for too long."""
+    """A vehicle has been silent for `LOST_AFTER_US`."""
 
     vehicle: Vehicle
 
@@ -101,12 +99,12 @@ Event: TypeAlias = Found | Lost | Ended
 
 
 class Client:
-    """One MAVLink component that talks with vehicles.
+    """A MAVLink component in conversation with any number of vehicles.
 
     Attributes:
-        source: Its own system and component id.
-        vehicles: All that were found, by system id, in this order.
-        dropped: Input that was no message or had no valid signature, counted by reason.
+        source: Own system and component id.
+        vehicles: By system id, in the order of discovery.
+        dropped: Malformed or badly signed input, counted by reason.
     """
 
     def __init__(
@@ -119,15 +117,9 @@ class Client:
         only: int = 0,
         all_components: bool = False,
     ) -> None:
-        """Speak as a component of MAV_TYPE `kind`.
+        """Create a component of MAV_TYPE `kind`; `only`, unless 0, is the one system id to receive.
 
-        Args:
-            system: Own system id.
-            component: Own component id.
-            kind: What its HEARTBEAT says.
-            heartbeat_every_us: Interval of its HEARTBEAT; None for none.
-            only: System id of the one vehicle to listen to; 0 for all.
-            all_components: Whether to return the messages of components that are no autopilots, too.
+        With `all_components`, `receive` also returns messages of components other than autopilots.
         """
         self.source = (system, component)
         self.vehicles: dict[int, Vehicle] = {}
@@ -143,21 +135,20 @@ class Client:
 
     @property
     def vehicle(self) -> Vehicle | None:
-        """The vehicle that was found first."""
         return next(iter(self.vehicles.values()), None)
 
     def sign_with(self, signing: Signing | None) -> None:
-        """Sign what is sent, and drop what is not signed with the same key; None: neither."""
+        """Sign outgoing messages and drop those without a valid signature; `None` turns both off."""
         self._signing = signing
         self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
 
     def begin(self, conversation: Talk) -> Talk:
-        """Begin a conversation: its first request is sent at the next poll, or when its lane is free."""
+        """Queue a conversation: its first request is sent at the next poll when its lane is free."""
         self._lanes.setdefault((conversation.target, conversation.lane), []).append(conversation)
         return conversation
 
     def cancel(self, conversation: Conversation) -> None:
-        """Abandon a conversation, without an event; one that has ended may be cancelled, too."""
+        """Abandon a conversation without an event; ignored if it has ended."""
         key = (conversation.target, conversation.lane)
         lane = self._lanes.get(key, [])
         if conversation in lane:
@@ -166,11 +157,10 @@ class Client:
                 del self._lanes[key]
 
     def encode(self, name: str, *fields: object) -> bytes:
-        """Return a message that needs no answer, to be sent now."""
         return self._codec.encode(name, *fields)
 
     def receive(self, datagram: bytes, now_us: int) -> list[Message]:
-        """Read a datagram; return the messages in it that come from vehicles."""
+        """Return the vehicles' messages in a datagram."""
         self._now_us = now_us
         messages = []
         for message in self._codec.decode(datagram):
@@ -191,7 +181,7 @@ class Client:
         return messages
 
     def poll(self, now_us: int) -> list[bytes]:
-        """Return the datagrams that are due: the own HEARTBEAT, and the requests of conversations."""
+        """Return the due datagrams: HEARTBEAT and requests."""
         self._now_us = now_us
         datagrams = []
         if self._heartbeat_every_us is not None and now_us >= (self._heartbeat_at_us or now_us):
@@ -206,7 +196,6 @@ class Client:
         return datagrams
 
     def poll_requests(self, now_us: int) -> list[bytes]:
-        """Return what conversations have to send, without the HEARTBEAT."""
         if not self._lanes:
             return []
         self._now_us = now_us
@@ -223,7 +212,6 @@ class Client:
         return events
 
     def _identify(self, message: Message, now_us: int) -> None:
-        """Note what a vehicle says of itself."""
         fields, system = message.fields, message.source[0]
         known = self.vehicles.get(system)
         if message.name == "AUTOPILOT_VERSION":
@@ -239,7 +227,6 @@ class Client:
                 self._events.append(Found(met))
 
     def _converse(self, message: Message, now_us: int) -> None:
-        """Hand an answer to the conversations that it may be for: the first of each lane."""
         for conversation in [lane[0] for lane in self._lanes.values()]:
             if (
                 message.name in conversation.answers

@@ -1,10 +1,8 @@
-"""The vehicle's clock by TIMESYNC: its offset, and the time that messages take.
+"""Estimation of the vehicle's clock offset and of round-trip time by TIMESYNC.
 
-The quickest exchange of the last seconds gives the offset: jitter, all of it in one direction, delayed the others (the
-clock filter of RFC 5905, section 10). An older exchange must have been quicker by as much as the clocks may have
-drifted since. A simulator's clock may drift by percents: where the exchanges show a drift, it is estimated and
-compensated.
-https://mavlink.io/en/services/timesync.html
+Of recent exchanges the quickest gives the offset, as delay disturbs the others (clock filter of RFC 5905, section 10).
+An older exchange must be quicker by the possible drift since. A simulator's clock may drift by percents, so a
+significant drift is estimated and compensated. https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
@@ -15,25 +13,25 @@ from typing import NamedTuple
 
 NS_PER_US = 1000
 WINDOW_US = 10_000_000
-"""Exchanges older than this do not count: the clocks drift apart by microseconds a second."""
+"""Older exchanges are discarded."""
 ENOUGH = 5
 _EVERY_US = 100_000
 _RESET_AFTER = 3
 _RESET_US = 10_000
 _DRIFT = 0.002
-"""Uncertainty of the estimated drift: a simulator's clock is not a quartz."""
+"""Uncertainty of the estimated drift, large because of simulators' clocks."""
 _UNEVEN = 0.1
-"""Fraction of a drift that varies: such a clock is held up by the load on its computer."""
+"""Fraction of a drift that varies with the load on the computer."""
 _LEAST_EXCHANGES = 10
 """Fewest exchanges to estimate a drift from."""
 _MAX_DRIFT = 0.2
-"""Largest plausible drift; a larger change of the offset means that the vehicle was restarted."""
+"""Largest plausible drift; a larger change of the offset is a restart of the vehicle."""
 _SURE = 4.0
-"""A drift counts from this many times its uncertainty."""
+"""Significance threshold of a drift, in standard deviations."""
 
 
 class Exchange(NamedTuple):
-    """One TIMESYNC and its answer: arrival time, round trip and offset, µs."""
+    """A TIMESYNC and its answer: arrival time, round trip and offset, µs."""
 
     received_us: int
     round_trip_us: int
@@ -41,7 +39,7 @@ class Exchange(NamedTuple):
 
 
 class VehicleClock:
-    """Estimates the offset of the vehicle's clock."""
+    """Estimator of the vehicle's clock offset."""
 
     def __init__(self) -> None:
         self._exchanges: deque[Exchange] = deque(maxlen=round(WINDOW_US / _EVERY_US))
@@ -53,20 +51,19 @@ class VehicleClock:
 
     @property
     def known(self) -> bool:
-        """Whether there were enough exchanges."""
         return self._known
 
     @property
     def round_trip_us(self) -> int:
-        """The median time to the vehicle and back, µs; 0 before the first exchange."""
+        """The median round-trip time, µs; 0 before the first exchange."""
         trips = sorted(exchange.round_trip_us for exchange in self._exchanges)
         return trips[len(trips) // 2] if trips else 0
 
     def own_us(self, vehicle_us: int) -> int:
-        """Return the own time of a time of the vehicle's; before the first exchange there is none.
+        """Convert a time of the vehicle's clock to the own clock.
 
         Raises:
-            ValueError: There was no exchange.
+            ValueError: Before the first exchange.
         """
         if self._best is None:
             raise ValueError("no TIMESYNC has been answered")
@@ -81,7 +78,7 @@ class VehicleClock:
         return (0, now_us * NS_PER_US)
 
     def receive(self, tc1: int, ts1: int, now_us: int) -> None:
-        """Read a TIMESYNC; a request, or an answer to something never sent, is ignored."""
+        """Read a TIMESYNC; requests and unsolicited answers are ignored."""
         sent_us = ts1 // NS_PER_US
         if tc1 == 0 or not now_us - WINDOW_US <= sent_us <= now_us:
             return
@@ -103,7 +100,7 @@ class VehicleClock:
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
-        """Whether no delay explains the difference to the best exchange: the vehicle was restarted."""
+        """Return whether delay cannot explain the change of the offset: the vehicle was restarted."""
         best = self._best
         if best is None:
             return False
@@ -113,9 +110,9 @@ class VehicleClock:
 
 
 def drift_of(exchanges: Iterable[Exchange]) -> float:
-    """Return by how much the vehicle's clock is faster, in parts of the own; 0 where that is not sure.
+    """Return the relative drift of the vehicle's clock, positive if fast; 0 if insignificant.
 
-    The median slope between exchanges that are half of all apart (Theil and Sen).
+    The median slope between exchanges half the window apart (Theil and Sen).
     """
     told = tuple(exchanges)
     half = len(told) // 2

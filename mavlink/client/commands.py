@@ -1,4 +1,4 @@
-"""Commands, repeated until they are acknowledged: https://mavlink.io/en/services/command.html."""
+"""Commands, repeated until acknowledged: https://mavlink.io/en/services/command.html."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from colibri.mavlink.services.command import IN_PROGRESS, NOT_GIVEN
 from colibri.mavlink.wire.dialect import Message, definition_of, mav
 
 PROGRESS_WITHIN_US = 3_000_000
-"""A vehicle that works on a command reports so at least this often, or the command is repeated."""
+"""Longest interval of progress reports before the command is repeated."""
 _MAX_CONFIRMATION = 255
 _PARAMS, _INT_PARAMS = 7, 4
 
@@ -18,13 +18,12 @@ class Command(Conversation):
 
     Attributes:
         number: MAV_CMD.
-        progress: Percent, of a vehicle that works on it; None before.
+        progress: Percent, once reported.
     """
 
     answers = frozenset({"COMMAND_ACK"})
 
     def __init__(self, target: Target, number: int, *params: float, repeat: Repeat = USUALLY) -> None:
-        """Command `target`; parameters that are left out are 0."""
         super().__init__(target, ("command", number), repeat)
         self.number = number
         self.progress: int | None = None
@@ -46,7 +45,7 @@ class Command(Conversation):
 
 
 class CommandInt(Command):
-    """A COMMAND_INT: a command with a place; `result` is its MAV_RESULT."""
+    """A COMMAND_INT with up to four parameters, a MAV_FRAME, and a place in its units."""
 
     def __init__(
         self,
@@ -59,7 +58,6 @@ class CommandInt(Command):
         z: float = 0.0,
         repeat: Repeat = USUALLY,
     ) -> None:
-        """Command `target` with up to four parameters, a MAV_FRAME, and a place in its units."""
         super().__init__(target, number, repeat=repeat)
         self._fields = (*target, frame, number, 0, 0, *padded(params, _INT_PARAMS), x, y, z)
 
@@ -68,16 +66,13 @@ class CommandInt(Command):
 
 
 def request_message(target: Target, name: str, *, repeat: Repeat = USUALLY) -> Command:
-    """Return the command to send one message of this name."""
     return Command(target, mav.MAV_CMD_REQUEST_MESSAGE, float(definition_of(name).id), repeat=repeat)
 
 
 def set_message_interval(target: Target, name: str, interval_us: float, *, repeat: Repeat = USUALLY) -> Command:
-    """Return the command to stream a message at an interval."""
     number = float(definition_of(name).id)
     return Command(target, mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, interval_us, repeat=repeat)
 
 
 def padded(params: Sequence[float], count: int) -> tuple[Any, ...]:
-    """Return the parameters with zeros for those that are left out."""
     return (*params, *(0.0,) * (count - len(params)))

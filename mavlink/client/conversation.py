@@ -1,4 +1,4 @@
-"""What all conversations with a vehicle share: a request that is repeated until it is answered, and one outcome."""
+"""Base of all conversations with a vehicle: a request, repeated until answered, and its result."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
@@ -9,20 +9,20 @@ from colibri.mavlink.wire.dialect import Message
 Target: TypeAlias = tuple[int, int]
 """System and component id of a vehicle's autopilot."""
 Encoded: TypeAlias = tuple[str, tuple[Any, ...]]
-"""Name and fields of a message to send, in the order of its MAVLink definition, in wire units and frames."""
+"""Name and fields of an outgoing message, in the order of its MAVLink definition, in wire units and frames."""
 
 OK = 0
 """ACCEPTED or NO_ERROR: the same number in MAV_RESULT, MAV_MISSION_RESULT and MAV_PARAM_ERROR."""
 UNANSWERED = -1
-"""The result of a conversation whose requests were never answered."""
+"""The result of a conversation without any answer."""
 _AT_ONCE = -(2**63)
 
 
 class Repeat(NamedTuple):
-    """How often a request is sent, and how long each answer may take.
+    """Repetition of requests.
 
     Attributes:
-        every_us: Time between two requests, and after the last one until the vehicle counts as silent.
+        every_us: Time between requests, and after the last one until the vehicle counts as silent.
         tries: Requests without any answer.
     """
 
@@ -34,16 +34,14 @@ USUALLY = Repeat()
 
 
 class Conversation(ABC):
-    """One request to a vehicle, with everything that follows until its outcome.
+    """A request to a vehicle and its course until the result.
 
-    A subclass returns the messages of its current request and reads the answers. An answer never sends: it changes what
-    the next `poll` returns.
+    A subclass returns the messages of its current request and reads the answers.
 
     Attributes:
-        target: The vehicle.
-        lane: What makes its answers distinguishable; see `client`.
+        lane: Distinguishes its answers from others'; see `client`.
         answers: Names of the messages that answer it.
-        result: The result as the protocol defines it, or UNANSWERED; None before the end.
+        result: The protocol's result code, or UNANSWERED; `None` until the end.
     """
 
     answers: ClassVar[frozenset[str]]
@@ -58,11 +56,9 @@ class Conversation(ABC):
 
     @property
     def accepted(self) -> bool:
-        """Whether it ended well."""
         return self.result == OK
 
     def poll(self, now_us: int) -> Sequence[Encoded]:
-        """Return the messages that are due."""
         if self.result is not None or now_us < self._due_us:
             return ()
         if self._sent >= self._repeat.tries:
@@ -73,22 +69,20 @@ class Conversation(ABC):
         return self._request()
 
     def receive(self, message: Message, now_us: int) -> None:
-        """Read a message of the target that is named in `answers` and addressed to this client or to everybody."""
         self._now_us = now_us
         self._read(message)
 
     @abstractmethod
-    def _read(self, message: Message) -> None:
-        """Read a message that may be an answer."""
+    def _read(self, message: Message) -> None: ...
 
     @abstractmethod
     def _request(self) -> Sequence[Encoded]:
-        """Return the current request; `_sent` counts how often it has been sent, this time included."""
+        """Return the current request; `_sent` counts its transmissions including this one."""
 
     def _go_on(self) -> None:
-        """Send the next request at once: the current one is answered."""
+        """Send the next request at the next poll."""
         self._sent, self._due_us = 0, _AT_ONCE
 
     def _wait(self, longer_us: int) -> None:
-        """Wait for the rest of an answer that has begun."""
+        """Wait for the rest of an answer."""
         self._sent, self._due_us = 0, self._now_us + longer_us

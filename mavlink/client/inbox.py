@@ -1,4 +1,4 @@
-"""The messages that a client has received from a vehicle, kept for whoever asks later."""
+"""Storage of received messages for later inspection."""
 
 from collections import Counter
 from difflib import get_close_matches
@@ -8,13 +8,13 @@ from colibri.mavlink.wire.dialect import Message, mav
 
 
 class Heard(dict[str, list[Any]]):
-    """The fields of received messages by message name, the latest last; empty for a message that was not received."""
+    """Fields of received messages by name, the latest last; empty for messages not received yet."""
 
     def __missing__(self, name: str) -> list[Any]:
-        """Return an empty list for a message's name.
+        """Return an empty list for a message of the dialect.
 
         Raises:
-            ValueError: There is no such message: it would never be received.
+            ValueError: The name is unknown.
         """
         names = [it.msgname for it in mav.mavlink_map.values()]
         if name not in names:
@@ -25,17 +25,17 @@ class Heard(dict[str, list[Any]]):
 
 
 class Inbox:
-    """The messages that were received from a vehicle.
+    """The messages received from a vehicle.
 
     Attributes:
-        heard: Messages, as their fields, by name, the latest last.
-        counts: How many were received, by name.
-        acks: Every COMMAND_ACK, in order, whoever it is for.
+        heard: Fields of messages by name, the latest last.
+        counts: Numbers of received messages by name.
+        acks: Every COMMAND_ACK, in order, for any receiver.
         texts: Every STATUSTEXT, in order.
     """
 
     def __init__(self, remembers: int = 20_000) -> None:
-        """Keep at most `remembers` messages of a name, and at least the last half of them."""
+        """Keep at most `remembers` messages of a name; on overflow the older half is deleted."""
         self._remembers = remembers
         self.heard = Heard()
         self.counts: Counter[str] = Counter()
@@ -72,7 +72,6 @@ class Inbox:
             self._add_text(fields)
 
     def _add_text(self, fields: Any) -> None:
-        """Add a line; a long one comes in chunks of 50 characters."""
         if fields.chunk_seq and self.texts:
             self.texts[-1] += fields.text
         else:

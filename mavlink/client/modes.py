@@ -1,4 +1,4 @@
-"""Flight modes of PX4 (which Colibri shares) and of ArduPilot's copters: their words, and their numbers on the wire."""
+"""Flight modes of PX4 (shared by Colibri) and ArduPilot's copters: names and numbers on the wire."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ class FlightMode(NamedTuple):
     """A flight mode of an autopilot.
 
     Attributes:
-        name: As its ground stations call it.
+        name: As in its ground stations.
         custom: `custom_mode` of its HEARTBEAT.
         command: Parameters 1 to 3 of MAV_CMD_DO_SET_MODE.
     """
@@ -71,11 +71,10 @@ MODES: dict[int, dict[str, FlightMode]] = {PX4: PX4_MODES, ARDUPILOT: COPTER_MOD
 
 
 def mode_named(autopilot: int | None, name: str) -> FlightMode | None:
-    """Return a mode of a MAV_AUTOPILOT by its name; None where it is unknown."""
     return MODES.get(autopilot or 0, {}).get(name)
 
 
 def mode_name(autopilot: int, custom_mode: int) -> str:
-    """Return the name of a HEARTBEAT's mode; its number where that is unknown."""
+    """Return the name of a HEARTBEAT's mode, or its number if unknown."""
     names = (mode.name for mode in MODES.get(autopilot, {}).values() if mode.custom == custom_mode)
     return next(names, f"mode {custom_mode}")

@@ -1,7 +1,7 @@
 """Parameters of a vehicle, read, set and listed: https://mavlink.io/en/services/parameter.html.
 
-Every value travels in a float of 32 bits. Integers are either copied into it byte by byte (PX4, Colibri) or converted
-to a number (ArduPilot): the parameter encodings of the specification, `by_bits` here.
+Every value travels in a 32-bit float. Integers are either copied into it byte by byte (PX4, Colibri; `by_bits` here) or
+converted to a number (ArduPilot).
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,9 @@ from colibri.mavlink.parameters.store import ParamError, Value
 from colibri.mavlink.wire.dialect import Bits, Message, mav, param_bits
 
 DIFFERS = -2
-"""The result of a change after which the vehicle still reports another value."""
+"""The result of a change if the vehicle still reports another value."""
 _BELIEVED_AFTER = 3
-"""A different value may have been sent before the change: it counts after so many requests."""
+"""Requests before a different value counts: it may have been sent before the change."""
 _GAPS_AT_ONCE = 10
 _BY_NAME = -1
 _REAL: int = mav.MAV_PARAM_TYPE_REAL32
@@ -33,7 +33,7 @@ _LAYOUTS = {
 
 
 class Held(NamedTuple):
-    """A parameter as a vehicle holds it.
+    """A parameter of a vehicle.
 
     Attributes:
         kind: MAV_PARAM_TYPE.
@@ -44,7 +44,6 @@ class Held(NamedTuple):
 
 
 def held_in(message: Message, *, by_bits: bool = True) -> Held:
-    """Return the parameter in a PARAM_VALUE."""
     kind = message.fields.param_type
     layout = _LAYOUTS.get(kind)
     if layout is not None and (by_bits or kind == _REAL):
@@ -55,7 +54,7 @@ def held_in(message: Message, *, by_bits: bool = True) -> Held:
 
 
 def on_wire(value: Value, kind: int, *, by_bits: bool = True) -> Bits | float:
-    """Return a value as PARAM_SET holds it; integers are rounded.
+    """Return a value in PARAM_SET's form; integers are rounded.
 
     Raises:
         ValueError: The type cannot hold it.
@@ -71,11 +70,7 @@ def on_wire(value: Value, kind: int, *, by_bits: bool = True) -> Bits | float:
 
 
 class ReadParameter(Conversation):
-    """The value of one parameter; `result` is OK or a MAV_PARAM_ERROR.
-
-    Attributes:
-        held: The parameter; None before it is read.
-    """
+    """Read one parameter into `held`; `result` is OK or a MAV_PARAM_ERROR."""
 
     answers = frozenset({"PARAM_VALUE", "PARAM_ERROR"})
 
@@ -102,7 +97,7 @@ class ReadParameter(Conversation):
 
 
 class SetParameter(ReadParameter):
-    """A change of one parameter; `result` is OK, a MAV_PARAM_ERROR, or DIFFERS. Its type is read first if need be."""
+    """Set one parameter; `result` is OK, a MAV_PARAM_ERROR, or DIFFERS. An unknown type is read first."""
 
     def __init__(
         self,
@@ -114,7 +109,6 @@ class SetParameter(ReadParameter):
         by_bits: bool = True,
         repeat: Repeat = USUALLY,
     ) -> None:
-        """Set a parameter of MAV_PARAM_TYPE `kind`; None where that is not known."""
         super().__init__(target, name, by_bits=by_bits, repeat=repeat)
         self._kind = kind
         self._value = value
@@ -146,11 +140,10 @@ class SetParameter(ReadParameter):
 
 
 class ListParameters(Conversation):
-    """All parameters of a vehicle; what was lost of the list is read one by one.
+    """Read all parameters into `held` by name; lost ones are requested one by one.
 
     Attributes:
-        held: What has come so far, by name.
-        count: How many there are; None before the first.
+        count: Their number; `None` before the first answer.
     """
 
     answers = frozenset({"PARAM_VALUE"})

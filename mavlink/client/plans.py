@@ -1,4 +1,4 @@
-"""Missions, fences and rally points, uploaded, downloaded and cleared: https://mavlink.io/en/services/mission.html."""
+"""Missions, fences and rally points, uploaded and downloaded: https://mavlink.io/en/services/mission.html."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ class _PlanConversation(Conversation):
     """A conversation about one plan; `result` is a MAV_MISSION_RESULT.
 
     Attributes:
-        opaque_id: The vehicle's id of the plan that was accepted or announced; 0 where it has none.
+        opaque_id: The vehicle's id of the plan; 0 without one.
     """
 
     def __init__(self, target: Target, plan: int, repeat: Repeat) -> None:
@@ -38,10 +38,10 @@ class _PlanConversation(Conversation):
 
 
 class Upload(_PlanConversation):
-    """An upload: the vehicle requests item after item, and accepts or refuses the plan.
+    """An upload: the vehicle requests each item, then accepts or refuses the plan.
 
     Attributes:
-        seq: The item that was sent last, which a refusal is about; None before the first.
+        seq: The last item sent, the subject of a refusal; `None` before the first.
     """
 
     answers = frozenset({"MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"})
@@ -74,10 +74,10 @@ class Upload(_PlanConversation):
 
 
 class Download(_PlanConversation):
-    """A download, item after item, which the client acknowledges.
+    """A download, item by item, acknowledged by the client.
 
     Attributes:
-        count: How many items there are; None before the vehicle has said.
+        count: Announced number of items; `None` before.
     """
 
     answers = frozenset({"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"})
@@ -89,7 +89,7 @@ class Download(_PlanConversation):
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """The items that have come, in order."""
+        """The received items, in order."""
         return tuple(item for _, item in sorted(self._items.items()))
 
     def _take(self, message: Message) -> None:

@@ -1,4 +1,4 @@
-"""What a vehicle reports beside its state: mode, arming, battery, estimator, fence, home."""
+"""A vehicle's reports beside its state: mode, arming, battery, estimator, fence, home."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -8,7 +8,7 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
 
 _OLDER_FROM = 128
-"""A sequence number this far ahead, of 256, belongs to an older message that the link has delayed."""
+"""A sequence number this far ahead, of 256, belongs to an older, delayed message."""
 _AIRBORNE = frozenset(
     {mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING},
 )
@@ -26,23 +26,18 @@ _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 
 @dataclass
 class VehicleReport:
-    """What a vehicle last reported.
+    """The last reports of a vehicle.
 
     Attributes:
-        heartbeat_us: When the last HEARTBEAT came; None before the first.
         autopilot: MAV_AUTOPILOT.
         mode: `custom_mode`.
-        mode_us: When a mode was last reported.
-        armed: Whether its rotors may turn.
         system_status: MAV_STATE.
         landed_state: MAV_LANDED_STATE.
-        battery: Remaining charge, 0..1; nan where unknown.
-        estimator_ok: Whether attitude, velocity and position are estimated; None before it is reported.
-        prearm_ok: Whether it could be armed; None where it is not reported.
-        fence_breached: Whether it is beyond its fence.
-        altitude_amsl_m: Height above the sea; nan where unknown.
-        home: None before it is reported.
-        origin: Of its local frame; None before it is reported.
+        battery: Remaining charge, 0..1; nan if unknown.
+        estimator_ok: Whether attitude, velocity and position are estimated; `None` before a report.
+        prearm_ok: Whether arming checks pass; `None` if not reported.
+        altitude_amsl_m: Above mean sea level; nan if unknown.
+        origin: Of its local frame.
         texts: STATUSTEXT lines.
     """
 
@@ -68,7 +63,7 @@ class VehicleReport:
 
     @property
     def airborne(self) -> bool | None:
-        """Whether it flies; None where it is not reported."""
+        """Whether it flies; `None` if not reported."""
         return None if self.landed_state == _UNKNOWN_LANDED else self.landed_state in _AIRBORNE
 
     def take_new_texts(self) -> list[str]:
@@ -77,11 +72,9 @@ class VehicleReport:
         return new
 
     def mode_rate_hz(self, now_us: int) -> float:
-        """Return how often the mode was reported in the last second, Hz."""
         return float(sum(1 for at_us in self.mode_reports_us if now_us - at_us <= 1_000_000))
 
     def receive(self, message: Message, now_us: int) -> None:
-        """Read a message of the vehicle."""
         fields, newest = message.fields, self._is_newest(message)
         match message.name:
             case "HEARTBEAT":
@@ -118,7 +111,7 @@ class VehicleReport:
         self.mode_reports_us = [at_us for at_us in self.mode_reports_us if now_us - at_us < 1_000_000] + [now_us]
 
     def _is_newest(self, message: Message) -> bool:
-        """Whether no later message came before: a link may deliver an old mode after a new one."""
+        """Return whether this is the newest message so far: a link may reorder two modes."""
         sequence = sequence_of(message.frame)
         if self._sequence is not None and (sequence - self._sequence) % 256 >= _OLDER_FROM:
             return False

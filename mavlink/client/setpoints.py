@@ -1,4 +1,4 @@
-"""Setpoints and sticks on the wire, from SI, ENU and FLU; nobody acknowledges them.
+"""Setpoints and sticks from SI, ENU and FLU to the wire; without acknowledgement.
 
 Field layouts: common.xml, POSITION_TARGET_TYPEMASK, ATTITUDE_TARGET_TYPEMASK, MANUAL_CONTROL.
 """
@@ -33,13 +33,9 @@ def position_target(
     *,
     time_us: int = 0,
 ) -> Encoded:
-    """Return a setpoint in the local frame, ENU; what is None is masked.
+    """Return a setpoint in m, m/s and m/s^2, local ENU; missing groups are masked.
 
     Args:
-        target: The vehicle.
-        position: m.
-        velocity: m/s.
-        acceleration: m/s^2.
         yaw: Counter-clockwise from east, rad.
         yaw_rate: Counter-clockwise, rad/s.
         time_us: The sender's clock.
@@ -61,7 +57,7 @@ def attitude_target(
     thrust: float,
     time_us: int = 0,
 ) -> Encoded:
-    """Return an attitude (FLU to ENU) or body rates (FLU, rad/s) with a thrust of 0..1; what is None is masked."""
+    """Return an attitude (FLU to ENU) or body rates (FLU, rad/s) with a thrust of 0..1; missing ones are masked."""
     mask = _NO_ATTITUDE * (attitude is None) | _NO_RATES * (rates is None)
     q = _LEVEL if attitude is None else ned_frd_from_enu_flu(attitude)
     return "SET_ATTITUDE_TARGET", (_ms(time_us), *target, mask, q, *frd_from_flu(rates or _STILL), thrust)
@@ -70,7 +66,7 @@ def attitude_target(
 def manual_control(
     system: int, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0
 ) -> Encoded:
-    """Return sticks: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
+    """Return stick positions: forward, right, up (0..1, centre 0.5), clockwise, the others -1..1."""
     return "MANUAL_CONTROL", (system, *(round(1000.0 * axis) for axis in (pitch, roll, thrust, yaw)), 0)
 
 

@@ -1,4 +1,4 @@
-"""The vehicle's state from what it streams: ODOMETRY, or separate messages for attitude and position."""
+"""The vehicle's state from telemetry: ODOMETRY, or separate messages for attitude and position."""
 
 from math import isfinite
 from typing import Any, NamedTuple
@@ -10,20 +10,20 @@ from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_fro
 
 _MS = 1000
 _ODOMETRY_STAYS_US = 500_000
-"""After this long without ODOMETRY the other messages count."""
+"""Silence of ODOMETRY after which the other messages count."""
 _PAIRED_US = 60_000
-"""A position must not differ more than this in time from the attitude it is paired with."""
+"""Largest difference in time between an attitude and its position."""
 _EARTH: int = mav.MAV_FRAME_LOCAL_NED
 
 HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})
 
 
 class TimedState(NamedTuple):
-    """The state of the vehicle by its own estimate.
+    """The vehicle's own estimate of its state.
 
     Attributes:
-        vehicle_us: When, by the vehicle's clock.
-        position_enu_m, velocity_enu_m_s: In the vehicle's local frame, turned to ENU.
+        vehicle_us: By the vehicle's clock.
+        position_enu_m, velocity_enu_m_s: In the vehicle's local frame, converted to ENU.
         attitude: FLU to ENU.
         rate_flu_rad_s: Body rates.
     """
@@ -36,10 +36,10 @@ class TimedState(NamedTuple):
 
 
 class StateAssembler:
-    """Assembles states from messages.
+    """Assembler of states from messages.
 
     Attributes:
-        refused: How many messages held no finite state.
+        refused: Number of states with non-finite values.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class StateAssembler:
         self.refused = 0
 
     def receive(self, message: Message, now_us: int) -> TimedState | None:
-        """Return the state that a message completes; None where it does not, or is older than the last one."""
+        """Return the state completed by a message, if any and newer than the last."""
         name, fields = message.name, message.fields
         if name == "ODOMETRY":
             state = _of_odometry(fields)
@@ -74,7 +74,7 @@ class StateAssembler:
         return state
 
     def _of_attitude(self, name: str, fields: Any, now_us: int) -> TimedState | None:
-        """Return the state of an attitude, with the last position carried to its time."""
+        """Return the state of an attitude, with the last position extrapolated to its time."""
         if name == "ATTITUDE_QUATERNION":
             self._quaternion_us = now_us
             ned_frd: Quaternion = (fields.q1, fields.q2, fields.q3, fields.q4)
@@ -94,7 +94,7 @@ class StateAssembler:
 
 
 def _of_odometry(fields: Any) -> TimedState | None:
-    """Return the state of an ODOMETRY; None of one whose frames are no vehicle's in its local frame."""
+    """Return the state of an ODOMETRY in the local frame; `None` for other frames."""
     if fields.frame_id != _EARTH:
         return None
     attitude = _unit(ned_frd_from_enu_flu(tuple(fields.q)))

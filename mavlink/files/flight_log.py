@@ -1,4 +1,4 @@
-"""The log of each flight: a numbered file, from arming to disarming, of whatever is recorded then."""
+"""Numbered logs of flights, from arming to disarming."""
 
 from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names
 
@@ -9,15 +9,15 @@ WRITE_EVERY_US = 1_000_000
 
 
 class FlightLog:
-    """Writes logs into a folder, and removes the oldest for new ones.
+    """Writer of logs into a folder; removes the oldest for new ones.
 
     Attributes:
-        name: Of the file that is written to; None between flights.
-        refusal: Why the last write failed and the log ended there; None where none did.
+        name: Of the open file; `None` between flights.
+        refusal: Why the last write failed and ended the log.
     """
 
     def __init__(self, files: Files, folder: Names = (), kept: int = KEPT) -> None:
-        """Write into `folder` and keep the last `kept` logs, the one being written among them."""
+        """Write into `folder` and keep the last `kept` logs, the open one included."""
         self._files = files
         self._folder = folder
         self._kept = kept
@@ -29,12 +29,11 @@ class FlightLog:
         self._write_at_us = 0
 
     def record(self, data: bytes) -> None:
-        """Append bytes, if a flight is being logged."""
         if self.name is not None:
             self._waiting += data
 
     def update(self, armed: bool, now_us: int) -> None:
-        """Begin and end logs; write what waits. Called once a frame of the plant."""
+        """Begin and end logs, write pending bytes; called at every frame of the plant."""
         if armed != self._armed:
             self._armed = armed
             if armed:
@@ -46,7 +45,6 @@ class FlightLog:
             self._write_at_us = now_us + WRITE_EVERY_US
 
     def close(self) -> None:
-        """End the log, if one is written."""
         if self._waiting:
             self._write()
         self.name = None
@@ -67,7 +65,7 @@ class FlightLog:
         self._write_at_us = now_us + WRITE_EVERY_US
 
     def _write(self) -> None:
-        """Write what waits; where there is no space, the oldest logs give it."""
+        """Write pending bytes; on a full disk, remove the oldest logs first."""
         data = bytes(self._waiting)
         self._waiting.clear()
         if self.name is None:
@@ -91,6 +89,6 @@ class FlightLog:
 
 
 def _number(name: str) -> int:
-    """Return the number of a log; 0 for any other file."""
+    """Return the number of a log; 0 for other files."""
     number = name.removesuffix(SUFFIX)
     return int(number) if name != number and number.isascii() and number.isdigit() else 0

@@ -1,7 +1,7 @@
-"""Files in a folder of the disk, and in none but that: the one place of the vehicle's files that does input and output.
+"""Files in a folder on disk: the only I/O of the vehicle's files.
 
-Every path is walked from the folder's own handle, name by name, and no link is followed: whatever is asked for, and
-whoever changes the folder meanwhile, nothing outside it is reached. Only regular files and folders are shown.
+Paths are walked name by name from the folder's own handle without following links, so files outside are unreachable
+whatever a client requests or another process changes. Only regular files and folders are shown.
 """
 
 import os
@@ -18,7 +18,7 @@ from colibri.mavlink.files.tree import Entry, FileRefusal, Names, Quota, Reading
 DEFAULT_QUOTA = Quota(64 << 20, 1000)
 
 _SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-"""Follow no link; do not wait for the other end of a pipe."""
+"""Follow no link; do not block on a pipe."""
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
 
 _REFUSALS = {
@@ -41,7 +41,7 @@ _Result = TypeVar("_Result")
 
 
 class _RefusedError(Exception):
-    """Ends what cannot be done, with the reason."""
+    """An operation was refused."""
 
     def __init__(self, refusal: FileRefusal) -> None:
         super().__init__(refusal.value)
@@ -51,7 +51,7 @@ class _RefusedError(Exception):
 def _refusing(
     method: Callable[Concatenate["Folder", _Arguments], _Result],
 ) -> Callable[Concatenate["Folder", _Arguments], _Result | FileRefusal]:
-    """Return `method` with every error of the system as a refusal."""
+    """Return `method` with system errors converted to refusals."""
 
     @wraps(method)
     def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | FileRefusal:
@@ -68,16 +68,16 @@ def _refusing(
 
 
 class Folder:
-    """Files in a folder of the disk: a method for each operation of `Files`, and what they share.
+    """Files in a folder on disk, see `Files`.
 
-    Nobody else is expected to fill it: how much it holds is counted once, and then with what is done here.
+    Its size is measured once and then updated with each operation: other writers are not expected.
     """
 
     def __init__(self, path: Path, quota: Quota = DEFAULT_QUOTA) -> None:
-        """Open the folder, made where it is missing.
+        """Open the folder, created if missing.
 
         Raises:
-            OSError: It cannot be made or read.
+            OSError: It cannot be created or read.
         """
         path.mkdir(parents=True, exist_ok=True)
         self._quota = quota
@@ -85,24 +85,20 @@ class Folder:
         self._size, self._entries = self._measure()
 
     def close(self) -> None:
-        """Let go of the folder."""
         os.close(self._root)
 
     @_refusing
     def list(self, names: Names) -> list[Entry]:
-        """Return what a folder holds, by name."""
         with self._open_folder(names) as folder, os.scandir(folder) as found:
             return sorted(entry for entry in map(_entry_of, found) if entry is not None)
 
     @_refusing
     def open(self, names: Names) -> Reading:
-        """Open a file to read it."""
         with self._open_file(names, os.O_RDONLY) as file:
             return Reading(os.fstat(file).st_size, partial(self._read, names))
 
     @_refusing
     def create(self, names: Names) -> None:
-        """Make an empty file; one that exists is emptied."""
         with self._open_parent(names) as (folder, name):
             if _kind(folder, name) is None:
                 self._allow_new(name)
@@ -113,7 +109,6 @@ class Folder:
 
     @_refusing
     def write(self, names: Names, offset: int, data: bytes) -> None:
-        """Put `data` into a file; a gap before it is zeros."""
         with self._open_file(names, os.O_WRONLY) as file:
             more = max(offset + len(data) - os.fstat(file).st_size, 0) if data else 0
             if self._size + more > self._quota.size:
@@ -124,12 +119,10 @@ class Folder:
 
     @_refusing
     def truncate(self, names: Names, size: int) -> None:
-        """Keep the first `size` bytes of a file; nothing where it has fewer."""
         self._cut(names, size)
 
     @_refusing
     def remove(self, names: Names) -> None:
-        """Remove a file."""
         with self._open_parent(names) as (folder, name):
             status = self._existing(folder, name)
             if stat.S_ISDIR(status.st_mode):
@@ -140,7 +133,6 @@ class Folder:
 
     @_refusing
     def rename(self, old: Names, new: Names) -> None:
-        """Give a file or folder another place, where nothing is yet."""
         with self._open_parent(old) as (old_folder, old_name), self._open_parent(new) as (new_folder, new_name):
             self._existing(old_folder, old_name)
             if _kind(new_folder, new_name) is not None:
@@ -151,7 +143,6 @@ class Folder:
 
     @_refusing
     def make_folder(self, names: Names) -> None:
-        """Make a folder."""
         with self._open_parent(names) as (folder, name):
             if _kind(folder, name) is not None:
                 raise _RefusedError(FileRefusal.EXISTS)
@@ -161,7 +152,6 @@ class Folder:
 
     @_refusing
     def remove_folder(self, names: Names) -> None:
-        """Remove an empty folder."""
         with self._open_parent(names) as (folder, name):
             os.rmdir(name, dir_fd=folder)
             self._entries -= 1
@@ -185,7 +175,7 @@ class Folder:
             raise _RefusedError(FileRefusal.NO_SPACE)
 
     def _existing(self, folder: int, name: str) -> os.stat_result:
-        """Return the status of a file or folder that is shown."""
+        """Return the status of a regular file or folder."""
         status = os.stat(name, dir_fd=folder, follow_symlinks=False)
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
             raise _RefusedError(FileRefusal.NOT_FOUND)
@@ -193,7 +183,7 @@ class Folder:
 
     @contextmanager
     def _open_folder(self, names: Names) -> Iterator[int]:
-        """Open the folder at `names`, no link followed on the way."""
+        """Open the folder at `names` without following links."""
         folder = os.open(".", _FOLDER, dir_fd=self._root)
         try:
             for name in names:
@@ -206,7 +196,7 @@ class Folder:
 
     @contextmanager
     def _open_parent(self, names: Names) -> Iterator[tuple[int, str]]:
-        """Open the folder that holds `names`; the root itself cannot be changed."""
+        """Open the parent of `names`; the root itself cannot be changed."""
         if not names:
             raise _RefusedError(FileRefusal.PROTECTED)
         with self._open_folder(names[:-1]) as folder:
@@ -229,7 +219,7 @@ class Folder:
             os.close(file)
 
     def _measure(self) -> tuple[int, int]:
-        """Return the bytes, and the files and folders, that are there already."""
+        """Return the present number of bytes, and of files and folders."""
         size = entries = 0
         for _, folders, files, folder in os.fwalk(".", dir_fd=self._root):
             entries += len(folders) + len(files)
@@ -238,14 +228,14 @@ class Folder:
 
 
 def _plain(name: str) -> str:
-    """Return `name` if it names something in its folder, and nothing elsewhere."""
+    """Return `name` if it can only name an entry of its folder."""
     if name in ("", ".", "..") or "/" in name:
         raise _RefusedError(FileRefusal.NOT_FOUND)
     return name
 
 
 def _kind(folder: int, name: str) -> int | None:
-    """Return the mode of what is there, a link as such; None where nothing is."""
+    """Return the mode of an entry, of a link itself; `None` if missing."""
     try:
         return os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode
     except FileNotFoundError:
@@ -253,7 +243,7 @@ def _kind(folder: int, name: str) -> int | None:
 
 
 def _entry_of(found: os.DirEntry[str]) -> Entry | None:
-    """Return a file or a folder; None for anything else, and for what is gone already."""
+    """Return a regular file or folder, otherwise `None`."""
     try:
         status = found.stat(follow_symlinks=False)
     except OSError:

@@ -1,13 +1,12 @@
 """The file transfer protocol: a ground station lists, reads and writes the vehicle's files.
 
-Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice, or clients differ from it:
+Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice, or clients deviate:
 
-- A client names its session when it opens a file, and the server takes that number (PX4 and MAVSDK know session 0
-  only and ignore another that the server gives; MAVProxy picks a fresh one for each transfer). So sessions are counted
-  for each client on its own, and every answer echoes the session of its request: clients drop any other.
-- The session of a client that opens another file with the number of one that is open is taken over once it was idle
-  for a moment: the client has lost track of it. Before, it is refused: it may still be read.
-- MAVSDK repeats a request with a new sequence number, so whatever can be is the same when done twice.
+- The client chooses the session number when it opens a file (PX4 and MAVSDK only support session 0; MAVProxy picks a
+  fresh one for each transfer). So sessions are per client, and every answer echoes the request's session.
+- A client that reopens a session number after a moment's idleness takes it over, having lost track of it. Before, the
+  session may still be in use, so the request is refused.
+- MAVSDK repeats a request with a new sequence number, so operations are idempotent where possible.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -36,25 +35,25 @@ MAX_SESSIONS = 32
 MAX_SESSIONS_OF_A_PEER = 8
 SESSION_ENDS_AFTER_US = 20_000_000
 TAKEN_OVER_AFTER_US = 1_000_000
-"""Twice the time after which MAVSDK repeats a request."""
+"""Twice MAVSDK's repeat interval."""
 
 REMEMBERED_FOR_US = 3_000_000
 MAX_REMEMBERED = 64
 
 BURST_PACKETS_A_POLL = 8
 MAX_BURST_PACKETS = 1000
-"""Packets: a client that is gone gets no more than these."""
+"""Limit of packets to a client that has gone."""
 CHECKSUM_BYTES_A_POLL = 256 << 10
 
 _UINT32_MAX = 0xFFFFFFFF
 
 Outcome: TypeAlias = bytes | Nak | FileRefusal | None
-"""Data of the ACK, a refusal, or None where the answer comes by and by."""
+"""Data of the ACK, a refusal, or `None` if the answer follows later."""
 
 
 @dataclass(slots=True)
 class _Session:
-    """An open file: to be read where there is a reading, else to be written."""
+    """An open file, for reading if `reading` is set, otherwise for writing."""
 
     names: Names
     reading: Reading | None
@@ -63,7 +62,7 @@ class _Session:
 
 @dataclass(slots=True)
 class _Burst:
-    """A burst on its way. The sequence numbers of its packets follow that of the request."""
+    """A burst in progress. Its packets' sequence numbers follow the request's."""
 
     request: Request
     reading: Reading
@@ -72,7 +71,7 @@ class _Burst:
 
 @dataclass(slots=True)
 class _Checksum:
-    """A checksum being computed."""
+    """A checksum in progress."""
 
     request: Request
     names: Names
@@ -82,12 +81,11 @@ class _Checksum:
 
 
 class Ftp:
-    """Serves files. Each opcode has a method of its own, so it has more than most classes."""
+    """Serves files."""
 
     handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 
     def __init__(self, files: Files) -> None:
-        """Serve `files`."""
         self._files = files
         self._sessions: dict[Key, _Session] = {}
         self._bursts: dict[Key, _Burst] = {}
@@ -116,7 +114,6 @@ class Ftp:
         }
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Do what a client asks for."""
         request = request_of(bytes(message.fields.payload), peer, now_us)
         if request.opcode in (Opcode.ACK, Opcode.NAK):  # of another server, and to answer it would begin a quarrel
             return ()
@@ -131,7 +128,6 @@ class Ftp:
         return () if outcome is None else (answer(request, outcome),)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Go on with bursts and checksums."""
         del now_us
         if not self._bursts and not self._checksums:
             return IDLE
@@ -151,10 +147,7 @@ class Ftp:
         return sends
 
     def _changed(self, request: Request) -> Send:
-        """Make a change once, however often it is asked for in the same words: Timeouts/Resending.
-
-        To answer any other request again does no harm.
-        """
+        """Make a change once, however often the identical request is repeated (Timeouts/Resending)."""
         asked = (request.peer, request.payload)
         if asked in self._remembered:
             return self._remembered[asked][1]
@@ -168,7 +161,7 @@ class Ftp:
         return done
 
     def _forget(self, now_us: int) -> None:
-        """Drop sessions that nobody uses, and answers that nobody will ask for again."""
+        """Drop idle sessions and expired answers."""
         for key, session in list(self._sessions.items()):
             if now_us - session.used_us > SESSION_ENDS_AFTER_US:
                 self._close(key)
@@ -177,7 +170,7 @@ class Ftp:
                 del self._remembered[asked]
 
     def _close(self, key: Key) -> None:
-        """Close a session if it is open, and let its client do the same things again: it may be a new one."""
+        """Close a session, and forget its answers: the next client of this number may repeat the same requests."""
         self._sessions.pop(key, None)
         self._bursts.pop(key, None)
         for peer, payload in list(self._remembered):
@@ -185,12 +178,12 @@ class Ftp:
                 del self._remembered[peer, payload]
 
     def _terminate(self, request: Request) -> bytes:
-        """Close a session; one that is not open is as closed as it was asked to be, so that it may be asked twice."""
+        """Close a session; succeeds if it is closed already, so the request may be repeated."""
         self._close(request.key)
         return b""
 
     def _reset(self, request: Request) -> bytes:
-        """Forget all about this client; others keep their sessions."""
+        """Forget this client's sessions and answers."""
         peers = [*self._sessions, *((peer, payload[2]) for peer, payload in self._remembered)]
         for key in peers:
             if key[0] == request.peer:
@@ -256,7 +249,7 @@ class Ftp:
         return session
 
     def _read(self, request: Request) -> Outcome:
-        """Read some of a file; a burst goes on meanwhile, as clients fill its gaps like this."""
+        """Read part of a file; a burst continues meanwhile, as clients fill its gaps like this."""
         session = self._used(request)
         if session is None or session.reading is None:
             return Nak(Error.INVALID_SESSION)
@@ -266,7 +259,7 @@ class Ftp:
         return session.reading.read(request.offset, count) or Nak(Error.END_OF_FILE)
 
     def _begin_burst(self, request: Request) -> Outcome:
-        """Begin a burst; one of this session that is on its way ends."""
+        """Begin a burst, replacing the session's current one."""
         session = self._used(request)
         if session is None or session.reading is None:
             return Nak(Error.INVALID_SESSION)
@@ -337,7 +330,7 @@ class Ftp:
 
 
 def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], Outcome]:
-    """Return what obeys a request whose data is a path."""
+    """Return a handler of requests that carry a path."""
 
     def obey_request(request: Request) -> Outcome:
         names = path_in(request.data)
@@ -347,7 +340,7 @@ def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], O
 
 
 def _sum(checksum: _Checksum) -> bytes | FileRefusal | None:
-    """Add some of the file; return the answer once it is all."""
+    """Process the next part of the file; return the answer at the end."""
     reading = checksum.reading
     data = reading.read(checksum.done, min(CHECKSUM_BYTES_A_POLL, reading.size - checksum.done))
     if isinstance(data, FileRefusal):

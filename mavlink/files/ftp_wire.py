@@ -1,6 +1,6 @@
-"""The file transfer protocol on the wire: requests, answers, errors, the lines of a folder.
+"""Wire format of the file transfer protocol: requests, answers, errors, folder listings.
 
-Specification: https://mavlink.io/en/services/ftp.html, "Payload Format" and what follows it.
+Specification: https://mavlink.io/en/services/ftp.html, "Payload Format" and following.
 """
 
 from enum import IntEnum
@@ -16,7 +16,7 @@ DATA_BYTES = 239
 
 
 class Opcode(IntEnum):
-    """What a request asks for, and what kind an answer is."""
+    """Operation of a request, or type of an answer."""
 
     NONE = 0
     TERMINATE = 1
@@ -40,7 +40,7 @@ class Opcode(IntEnum):
 
 
 class Error(IntEnum):
-    """Why a request is refused."""
+    """Reason of a refusal."""
 
     FAIL_ERRNO = 2
     INVALID_DATA_SIZE = 3
@@ -58,14 +58,14 @@ SIZE = Struct("<I")
 _HEADER = Struct("<HBBBBBxI")
 
 Key: TypeAlias = tuple[Peer, int]
-"""A session: whose, and its number."""
+"""A session: client and number."""
 
 
 class Request(NamedTuple):
     """A request of a client.
 
     Attributes:
-        size: Length of the data, or of what to read.
+        size: Length of the data, or number of bytes to read.
         offset: In a file, or among the entries of a folder.
     """
 
@@ -81,12 +81,11 @@ class Request(NamedTuple):
 
     @property
     def key(self) -> Key:
-        """The session that is meant."""
         return self.peer, self.session
 
 
 class Nak(NamedTuple):
-    """A refusal: why, and errno with FAIL_ERRNO."""
+    """A refusal; errno with FAIL_ERRNO."""
 
     error: Error
     errno: int = 0
@@ -106,7 +105,6 @@ _NAKS = {
 
 
 def request_of(payload: bytes, peer: Peer, now_us: int) -> Request:
-    """Return the request in a message's payload."""
     payload = payload.ljust(PAYLOAD_BYTES, b"\0")
     sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
     data = payload[_HEADER.size :][:size]
@@ -114,7 +112,6 @@ def request_of(payload: bytes, peer: Peer, now_us: int) -> Request:
 
 
 def answer(request: Request, outcome: bytes | Nak | FileRefusal, *, last: bool = False) -> Send:
-    """Answer with data, or with why not."""
     opcode = Opcode.ACK
     if isinstance(outcome, FileRefusal):
         outcome = _NAKS[outcome]
@@ -129,7 +126,6 @@ def answer(request: Request, outcome: bytes | Nak | FileRefusal, *, last: bool =
 
 
 def path_in(data: bytes) -> Names | FileRefusal:
-    """Return the path that data begins with."""
     try:
         return names_of(data.split(b"\0", 1)[0].decode())
     except UnicodeDecodeError:
@@ -137,9 +133,9 @@ def path_in(data: bytes) -> Names | FileRefusal:
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:
-    """Return a folder's entry as it is listed: List Directory, List Directory with Timestamps.
+    """Return a folder's entry in a listing (List Directory, List Directory with Timestamps).
 
-    What cannot be listed is skipped by an "S", so that the entries behind it keep their numbers.
+    An unlistable entry becomes "S" (skip), so that later entries keep their numbers.
     """
     name = entry.name.encode(errors="replace")
     kind = b"D" if entry.is_folder else b"F"

@@ -1,8 +1,8 @@
-"""The logs of flights: listed, downloaded and erased.
+"""Flight logs: listed, downloaded and erased.
 
-Specification: the messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html;
-there is no page of the service. The logs are the files of one folder by name, and a log's id is its place, from 0.
-A client's ids stay those of its last list, whatever is added or removed meanwhile.
+Specification: messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html.
+Logs are the files of one folder sorted by name; a log's id is its index. A client's ids are those of its last list,
+whatever is added or removed later.
 """
 
 from collections import deque
@@ -17,8 +17,9 @@ BLOCK_BYTES = 90
 MESSAGES_A_POLL = 20
 MESSAGES_A_POLL_OF_A_LONG_PART = 8
 SHORT_BYTES = 256 * BLOCK_BYTES
-"""What a client's socket surely holds until it is read: MAVSDK and QGroundControl ask for no more at once. MAVProxy
-asks for a whole log, and cannot read it as fast as it could be sent."""
+"""Fits any client's socket buffer: the most that MAVSDK and QGroundControl request at once. MAVProxy requests
+whole logs, faster than it can read.
+"""
 MAX_TRANSFERS_OF_A_PEER = 32
 MAX_PEERS = 16
 LAST_ID = 0xFFFF
@@ -28,7 +29,7 @@ _UINT32_MAX = 0xFFFFFFFF
 
 @dataclass(slots=True)
 class _Listing:
-    """Entries on their way to a client."""
+    """A list being sent."""
 
     peer: Peer
     next: int
@@ -37,7 +38,7 @@ class _Listing:
 
 @dataclass(slots=True)
 class _Transfer:
-    """A part of a log on its way to a client, who asked for it up to `end`."""
+    """A part of a log being sent, up to `end`."""
 
     peer: Peer
     id: int
@@ -54,7 +55,7 @@ class Logs:
     def __init__(
         self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None
     ) -> None:
-        """Serve the files in `folder`, all of which are logs; the one that is `being_written` is not erased."""
+        """Serve the files in `folder`; the one `being_written` is not erased."""
         self._files = files
         self._folder = folder
         self._being_written = being_written
@@ -63,7 +64,6 @@ class Logs:
         self._transfers: deque[_Transfer] = deque()
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in a request."""
         del now_us
         fields = message.fields
         if message.name == "LOG_REQUEST_LIST":
@@ -77,7 +77,6 @@ class Logs:
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Go on with what was asked for."""
         del now_us
         if not self._transfers and not self._listings:
             return IDLE
@@ -116,7 +115,7 @@ class Logs:
             self._listings.pop(listing.peer, None)
 
     def _look(self, peer: Peer) -> list[Entry]:
-        """Return the logs that there are now, and stay with their ids for this client."""
+        """Return the present logs, and fix their ids for this client."""
         found = self._files.list(self._folder)
         logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
         self._shown.pop(peer, None)
@@ -159,7 +158,7 @@ class Logs:
 
 
 def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:
-    """Send the next blocks; where the log ends with a full one, an empty one ends it."""
+    """Yield the next blocks; if the log ends with a full one, an empty one marks the end."""
     wanted = min(maximum * BLOCK_BYTES, transfer.end - transfer.offset)
     data = transfer.reading.read(transfer.offset, wanted)
     if isinstance(data, FileRefusal):

@@ -1,4 +1,4 @@
-"""Files in memory: what a vehicle keeps that was given no folder."""
+"""Files in memory, for a vehicle without a folder."""
 
 from functools import partial
 
@@ -8,17 +8,15 @@ DEFAULT_QUOTA = Quota(8 << 20, 1000)
 
 
 class Memory:
-    """Files in memory."""
+    """Files in memory, see `Files`."""
 
     def __init__(self, quota: Quota = DEFAULT_QUOTA) -> None:
-        """Begin with nothing."""
         self._quota = quota
         self._files: dict[Names, bytearray] = {}
         self._folders: set[Names] = {()}
         self._size = 0
 
     def list(self, names: Names) -> list[Entry] | FileRefusal:
-        """Return what a folder holds, by name."""
         if names not in self._folders:
             return self._no_way(names) or (FileRefusal.NOT_A_FOLDER if names in self._files else FileRefusal.NOT_FOUND)
         found = [Entry(path[-1], True) for path in self._folders if path and path[:-1] == names]
@@ -26,11 +24,9 @@ class Memory:
         return sorted(found)
 
     def open(self, names: Names) -> Reading | FileRefusal:
-        """Open a file to read it."""
         return self._no_file(names) or Reading(len(self._files[names]), partial(self._read, names))
 
     def create(self, names: Names) -> FileRefusal | None:
-        """Make an empty file; one that exists is emptied."""
         if names in self._files:
             return self.truncate(names, 0)
         refusal = self._no_room(names)
@@ -39,7 +35,6 @@ class Memory:
         return FileRefusal.IS_FOLDER if refusal is FileRefusal.EXISTS else refusal
 
     def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
-        """Put `data` into a file; a gap before it is zeros."""
         refusal = self._no_file(names)
         if refusal is not None:
             return refusal
@@ -53,7 +48,6 @@ class Memory:
         return None
 
     def truncate(self, names: Names, size: int) -> FileRefusal | None:
-        """Keep the first `size` bytes of a file; nothing where it has fewer."""
         refusal = self._no_file(names)
         if refusal is None:
             self._size -= max(len(self._files[names]) - size, 0)
@@ -61,14 +55,12 @@ class Memory:
         return refusal
 
     def remove(self, names: Names) -> FileRefusal | None:
-        """Remove a file."""
         refusal = self._no_file(names) if names else FileRefusal.PROTECTED
         if refusal is None:
             self._size -= len(self._files.pop(names))
         return refusal
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        """Give a file or folder another place, where nothing is yet."""
         refusal = self._no_way(old) if old else FileRefusal.PROTECTED
         refusal = refusal or (self._no_way(new) if new else FileRefusal.PROTECTED)
         if refusal is not None:
@@ -85,14 +77,12 @@ class Memory:
         return None
 
     def make_folder(self, names: Names) -> FileRefusal | None:
-        """Make a folder."""
         refusal = self._no_room(names)
         if refusal is None:
             self._folders.add(names)
         return refusal
 
     def remove_folder(self, names: Names) -> FileRefusal | None:
-        """Remove an empty folder."""
         if not names:
             return FileRefusal.PROTECTED
         found = self.list(names)
@@ -107,7 +97,7 @@ class Memory:
         return self._no_file(names) or bytes(self._files[names][offset : offset + count])
 
     def _no_way(self, names: Names) -> FileRefusal | None:
-        """Return why nothing can be at `names`: the folders that lead there."""
+        """Return the refusal if a parent of `names` is missing or is a file."""
         for depth in range(1, len(names)):
             if names[:depth] not in self._folders:
                 return FileRefusal.NOT_A_FOLDER if names[:depth] in self._files else FileRefusal.NOT_FOUND

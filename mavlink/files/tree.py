@@ -1,6 +1,6 @@
-"""The files that a vehicle shows to its ground stations, as a port without input or output, and what is put together.
+"""The vehicle's files as ground stations see them: an interface without I/O, and its composition.
 
-Whatever names, offsets and data are asked for, nothing here raises: what cannot be done is refused.
+Invalid names, offsets and data are refused; these classes never raise.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -8,14 +8,14 @@ from enum import Enum
 from typing import NamedTuple, Protocol, TypeAlias
 
 Names: TypeAlias = tuple[str, ...]
-"""Where something is: the names of the folders that lead there, and its own. The root is ()."""
+"""A path: the names of the parent folders and its own. The root is ()."""
 
 MAX_NAME_BYTES = 255
 MAX_DEPTH = 16
 
 
 class FileRefusal(Enum):
-    """Why something was not done."""
+    """Reason why an operation was refused."""
 
     NOT_FOUND = "no such file or folder"
     EXISTS = "exists already"
@@ -29,11 +29,11 @@ class FileRefusal(Enum):
 
 
 class Entry(NamedTuple):
-    """What a folder holds.
+    """A file or folder in a folder.
 
     Attributes:
-        size: Bytes; 0 of a folder.
-        modified_s: Last modification, s since 1970 UTC; 0 where it is not known.
+        size: Bytes; 0 for a folder.
+        modified_s: Last modification, Unix time, s; 0 if unknown.
     """
 
     name: str
@@ -43,11 +43,11 @@ class Entry(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A file that is being read.
+    """A file open for reading.
 
     Attributes:
-        size: Bytes that it had when it was opened.
-        read: From an offset, so many bytes: fewer, or none, where the file ends.
+        size: Bytes when it was opened.
+        read: (offset, count) -> bytes, fewer at the end of the file.
     """
 
     size: int
@@ -55,48 +55,43 @@ class Reading(NamedTuple):
 
 
 class Quota(NamedTuple):
-    """How much may be kept."""
+    """Limits of bytes, and of files and folders."""
 
     size: int
     entries: int
 
 
 class Files(Protocol):
-    """Some files in folders."""
+    """Files in folders."""
 
     def list(self, names: Names) -> list[Entry] | FileRefusal:
-        """Return what a folder holds, by name."""
+        """Return the entries of a folder, sorted by name."""
 
     def open(self, names: Names) -> Reading | FileRefusal:
-        """Open a file to read it."""
+        """Open a file for reading."""
 
     def create(self, names: Names) -> FileRefusal | None:
-        """Make an empty file; one that exists is emptied."""
+        """Create an empty file, or empty an existing one."""
 
     def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
-        """Put `data` into a file; a gap before it is zeros."""
+        """Write `data` into a file; a gap before it is filled with zeros."""
 
     def truncate(self, names: Names, size: int) -> FileRefusal | None:
-        """Keep the first `size` bytes of a file; nothing where it has fewer."""
+        """Keep at most the first `size` bytes of a file."""
 
-    def remove(self, names: Names) -> FileRefusal | None:
-        """Remove a file."""
+    def remove(self, names: Names) -> FileRefusal | None: ...
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        """Give a file or folder another place, where nothing is yet."""
+        """Move a file or folder; `new` must not exist."""
 
-    def make_folder(self, names: Names) -> FileRefusal | None:
-        """Make a folder."""
+    def make_folder(self, names: Names) -> FileRefusal | None: ...
 
     def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
 
 
 def names_of(path: str) -> Names | FileRefusal:
-    """Return the names in a path; what begins with a slash and what does not are the same.
-
-    There is no way up: a path with ".." leads nowhere.
-    """
+    """Return the names in a path, with or without a leading slash; ".." is refused."""
     names = tuple(name for name in path.split("/") if name not in ("", "."))
     if ".." in names or "\0" in path:
         return FileRefusal.NOT_FOUND
@@ -106,7 +101,7 @@ def names_of(path: str) -> Names | FileRefusal:
 
 
 def can_be_new(name: str) -> bool:
-    """Whether a new file or folder may be called this: what can be listed again, on any system."""
+    """Whether a new file may have this name: one that can be listed on any system."""
     return name not in ("", ".", "..") and name.isprintable() and "/" not in name and _fits(name)
 
 
@@ -115,16 +110,15 @@ def _fits(name: str) -> bool:
 
 
 def reading_of(data: bytes) -> Reading:
-    """Return a file that holds `data`."""
     return Reading(len(data), lambda offset, count: data[offset : offset + count])
 
 
 Generator: TypeAlias = Callable[[str], bytes]
-"""Makes the content of a file; it is given what stands behind the name's question mark: "withdefaults=1"."""
+"""Content of a file from its query, the text behind the name's question mark: "withdefaults=1"."""
 
 
 class Tree:
-    """Files of several kinds in one tree: generated ones, mounted folders, and one at the root for all the rest."""
+    """Generated files, mounted folders, and a root for the rest, in one tree."""
 
     def __init__(
         self,
@@ -133,12 +127,12 @@ class Tree:
         generated: Mapping[str, Generator],
         aliases: Mapping[str, str] | None = None,
     ) -> None:
-        """Compose.
+        """Compose files by path.
 
         Args:
-            root: Whatever lies in no mount.
+            root: For paths outside all mounts.
             mounts: By path, "logs".
-            generated: By path, "@PARAM/param.pck". They can be read only.
+            generated: By path, "@PARAM/param.pck"; read-only.
             aliases: Second paths of folders at the root, "@MAV_LOG": "logs".
         """
         self._root = root
@@ -149,7 +143,6 @@ class Tree:
         self._folders = {names[:depth] for names in fixed for depth in range(1, len(names))}
 
     def list(self, names: Names) -> list[Entry] | FileRefusal:
-        """Return what a folder holds, by name."""
         if names in self._generated:
             return FileRefusal.NOT_A_FOLDER
         files, rest = self._at(names)
@@ -163,7 +156,6 @@ class Tree:
         return [entries[name] for name in sorted(entries)]
 
     def open(self, names: Names) -> Reading | FileRefusal:
-        """Open a file to read it; what is generated stays as it was when it was opened."""
         if names:
             name, _, query = names[-1].partition("?")
             generator = self._generated.get((*names[:-1], name))
@@ -175,23 +167,18 @@ class Tree:
         return files.open(rest)
 
     def create(self, names: Names) -> FileRefusal | None:
-        """Make an empty file; one that exists is emptied."""
         return self._change(names, lambda files, rest: files.create(rest))
 
     def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
-        """Put `data` into a file; a gap before it is zeros."""
         return self._change(names, lambda files, rest: files.write(rest, offset, data))
 
     def truncate(self, names: Names, size: int) -> FileRefusal | None:
-        """Keep the first `size` bytes of a file; nothing where it has fewer."""
         return self._change(names, lambda files, rest: files.truncate(rest, size))
 
     def remove(self, names: Names) -> FileRefusal | None:
-        """Remove a file."""
         return self._change(names, lambda files, rest: files.remove(rest))
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
-        """Give a file or folder another place, where nothing is yet, in the same mount."""
         if self._is_fixed(old):
             return FileRefusal.PROTECTED
         if self._is_fixed(new):
@@ -201,18 +188,16 @@ class Tree:
         return files.rename(rest, new_rest) if files is new_files else FileRefusal.PROTECTED
 
     def make_folder(self, names: Names) -> FileRefusal | None:
-        """Make a folder."""
         if self._is_fixed(names):
             return FileRefusal.EXISTS
         files, rest = self._at(names)
         return files.make_folder(rest)
 
     def remove_folder(self, names: Names) -> FileRefusal | None:
-        """Remove an empty folder."""
         return self._change(names, lambda files, rest: files.remove_folder(rest))
 
     def _change(self, names: Names, change: Callable[[Files, Names], FileRefusal | None]) -> FileRefusal | None:
-        """Change what `names` name, unless it is part of the composition."""
+        """Change `names` unless it is part of the composition."""
         return FileRefusal.PROTECTED if self._is_fixed(names) else change(*self._at(names))
 
     def _is_fixed(self, names: Names) -> bool:
@@ -241,7 +226,6 @@ class Tree:
 
 
 def _known(path: str) -> Names:
-    """Return the names of a path that the program itself gives."""
     names = names_of(path)
     if isinstance(names, FileRefusal) or not names:
         raise ValueError(path)

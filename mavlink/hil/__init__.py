@@ -1,4 +1,1 @@
-"""What plant and autopilot send each other.
-
-Frames, commands, faults, and the conversations (lockstep, PX4's interface, stepped).
-"""
+"""Plant and autopilot: frames, commands, faults, and their protocols (lockstep, PX4's interface, stepped)."""

@@ -1,8 +1,7 @@
-"""Step messages: what stepped ground stations and a vehicle send each other at one time, as packets between processes.
+"""Step messages: all datagrams of stepped ground stations and a vehicle at one time, exchanged between processes.
 
-The process that steps simulated time sends, with each frame of the plant, all that ground stations send at that time;
-the vehicle answers with all that it sends. So every datagram arrives at a definite frame, however slow either process
-is.
+The process that steps simulated time sends the ground stations' datagrams with each frame of the plant; the vehicle
+answers with its own. So every datagram arrives at a definite frame, however slow either process is.
 """
 
 from collections.abc import Sequence
@@ -14,39 +13,34 @@ _HEAD = Struct("<QIBH")
 _PARCEL = Struct("<HH")
 """Station, length."""
 _PIECE = Struct("<QBB")
-"""Simulated time in µs, number of the piece, how many there are."""
+"""Simulated time in µs, number of the piece, their count."""
 _PIECE_BYTES = 4000
 """Of a link's largest datagram."""
 MAX_PARCEL_BYTES = 4096
-"""A longer datagram is cut, as a link cuts it."""
+"""Longer datagrams are cut, as by a link."""
 
 
 class Parcel(NamedTuple):
-    """A datagram on its way from or to the ground station of that number."""
+    """A datagram from or to a ground station, by number."""
 
     station: int
     datagram: bytes
 
 
 class StepMessage(NamedTuple):
-    """All datagrams of one time in one direction.
-
-    Attributes:
-        custom_mode: The mode that the vehicle is in, as its HEARTBEAT has it; 0 from ground stations.
-        armed: Whether its rotors may turn; False from ground stations.
-    """
+    """All datagrams of one time in one direction; mode and arming only from the vehicle."""
 
     time_us: int
     parcels: Sequence[Parcel]
-    custom_mode: int = 0
+    custom_mode: int = 0  # as in HEARTBEAT
     armed: bool = False
 
 
 def packets(step_message: StepMessage) -> list[bytes]:
-    """Return a step message as packets, each of which fits a datagram.
+    """Return a step message as packets that fit datagrams.
 
     Raises:
-        ValueError: It is more than 255 packets.
+        ValueError: More than 255 packets are needed.
     """
     time_us, parcels, custom_mode, armed = step_message
     content = _HEAD.pack(time_us, custom_mode, armed, len(parcels))
@@ -60,15 +54,14 @@ def packets(step_message: StepMessage) -> list[bytes]:
 
 
 class Gathering:
-    """Puts the packets of one step message together, in any order."""
+    """Reassembly of step messages from packets in any order."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._time_us = -1
         self._pieces: dict[int, bytes] = {}
 
     def take(self, packet: bytes) -> StepMessage | None:
-        """Take in a packet from the other process; return the step message if that completes it."""
+        """Return the step message completed by a packet, if any."""
         time_us, number, count = _PIECE.unpack_from(packet)
         if count == 1:
             return _step_message(packet, _PIECE.size)

@@ -1,8 +1,8 @@
-"""Faults by the names of MAV_CMD_INJECT_FAILURE: which there are, and what the numbers of each mean.
+"""Faults by the names of MAV_CMD_INJECT_FAILURE, and the meaning of each one's numbers.
 
-param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1 on or 0 for all, as
-https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE has them. param4 to param7 mean what is in `TABLE`: a
-number that is 0 or nan is not given. One fault at a time: another one of the same part takes its place, OK ends it.
+param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1, or 0 for all:
+https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE. param4 to param7 are defined by `TABLE`; 0 and nan
+are not given. A part has one fault at a time: a new one replaces it, OK ends it.
 """
 
 from collections.abc import Collection, Mapping
@@ -33,67 +33,51 @@ DELAYED: int = mav.FAILURE_TYPE_DELAYED
 
 SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS, RANGEFINDER)
 ALL = 0
-"""The instance that stands for all of a part."""
+"""The instance for all of a part."""
 MOTORS = 4
 _ROUNDING = 1e-6
-"""Limits are kept to the precision of the wire."""
+"""Tolerance of limits, for the precision of the wire."""
 _NOT_GIVEN: FourRotors = (0.0, 0.0, 0.0, 0.0)
 
 
 class Part(StrEnum):
-    """What a plant must have for a fault of it."""
+    """Equipment that a fault requires of the plant."""
 
     ROTORS = "rotors"
     BATTERY = "battery"
     SENSORS = "sensors"
-    """The autopilot must fly by them, too: by the state, nothing that a sensor does changes a flight."""
+    """The autopilot must use them, too: under state feedback a sensor fault has no effect."""
 
 
 class Fault(NamedTuple):
-    """Something that goes wrong, or is well again.
+    """A fault, or its end."""
 
-    Attributes:
-        unit, kind: FAILURE_UNIT and FAILURE_TYPE, where and how; `values` are param4 to param7.
-        instance: Which, from 1 on; 0 for all.
-    """
-
-    unit: int
-    kind: int
-    instance: int = ALL
-    values: FourRotors = _NOT_GIVEN
+    unit: int  # FAILURE_UNIT
+    kind: int  # FAILURE_TYPE
+    instance: int = ALL  # from 1
+    values: FourRotors = _NOT_GIVEN  # param4 to param7
 
 
 class Value(NamedTuple):
-    """What one of the numbers means.
-
-    Attributes:
-        minimum, maximum: Smallest and largest that is taken.
-        usual: Taken where none of a fault's numbers is given.
-        rest: Taken where another is given and this is not.
-    """
+    """The meaning of one of a fault's numbers."""
 
     name: str
     unit: str
     minimum: float
     maximum: float
-    usual: float
-    rest: float
+    usual: float  # if no number is given
+    rest: float  # if only others are given
 
 
 class Row(NamedTuple):
-    """One kind of fault.
-
-    Attributes:
-        values: What param4 and those behind it mean.
-        instances: How many there are of the unit.
-    """
+    """A kind of fault; `values` from param4 on."""
 
     unit: int
     kind: int
     part: Part
     meaning: str
     values: tuple[Value, ...] = ()
-    instances: int = 1
+    instances: int = 1  # number of units
 
 
 def _scalar(name: str, unit: str, minimum: float, maximum: float, usual: float) -> Value:
@@ -182,21 +166,19 @@ ROWS: tuple[Row, ...] = (
     ),
 )
 TABLE: Mapping[tuple[int, int], Row] = {(row.unit, row.kind): row for row in ROWS}
-"""Every fault that any plant can do."""
+"""All faults that a plant may support."""
 
 
 def unit_name(unit: int) -> str:
-    """Return a FAILURE_UNIT as a person calls it."""
     return str(mav.enums["FAILURE_UNIT"][unit].name).removeprefix("FAILURE_UNIT_")
 
 
 def kind_name(kind: int) -> str:
-    """Return a FAILURE_TYPE as a person calls it."""
     return str(mav.enums["FAILURE_TYPE"][kind].name).removeprefix("FAILURE_TYPE_")
 
 
 def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | None:
-    """Return the fault of a command's parameters; None where what should be counted is no whole number."""
+    """Return the fault of a command's parameters; `None` if unit, type or instance is not a whole number."""
     p3 = 0.0 if isnan(p3) else p3
     if not all(isfinite(number) and number == int(number) for number in (p1, p2, p3)):
         return None
@@ -204,7 +186,7 @@ def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | N
 
 
 def judged(fault: Fault, parts: Collection[Part]) -> Fault | Refusal:
-    """Return a fault with all numbers that it has; or why there can be none such where only `parts` are."""
+    """Return a fault with all its numbers, or the refusal for a plant with these `parts`."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
         return Refusal("no plant does this fault", RESULT_UNSUPPORTED)
@@ -222,7 +204,6 @@ def encode_fault(codec: Codec, fault: Fault, target: tuple[int, int]) -> bytes:
 
 
 def decode_fault(fields: Any) -> Fault | None:
-    """Return the fault of a COMMAND_LONG; None where it names none."""
     values = (fields.param4, fields.param5, fields.param6, fields.param7)
     return fault_from(fields.param1, fields.param2, fields.param3, values)
 

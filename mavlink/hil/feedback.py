@@ -1,12 +1,12 @@
-"""What a plant sends its autopilot at every frame, by the word of the command line."""
+"""The plant's output to the autopilot, by its word on the command line."""
 
 from enum import StrEnum
 
 
 class Feedback(StrEnum):
-    """What the autopilot asks for, and flies by."""
+    """The basis of the autopilot's flight."""
 
     STATE = "state"
     """The true state."""
     SENSORS = "sensors"
-    """What sensors measure: the autopilot estimates its state."""
+    """Sensor measurements, from which the autopilot estimates its state."""

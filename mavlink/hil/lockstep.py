@@ -1,25 +1,23 @@
-"""The lockstep conversation between plant and autopilot, its two ends as state machines without input or output.
+"""The lockstep protocol between plant and autopilot, both ends as state machines without I/O.
 
 Datagrams and the wall-clock time go in, datagrams come out. The plant sends the frame of time t and advances only
-with the command that names t, so nothing that a link does to datagrams can change a flight:
+with the command that names t, so no link can change a flight:
 
-- a frame unanswered for `RESEND_AFTER_S` is sent again;
+- an unanswered frame is sent again after `RESEND_AFTER_S`;
 - a repeated frame gets the remembered answer, so each frame is computed once;
-- what names another time than the one awaited is dropped.
+- messages of a time other than the awaited one are dropped.
 
-The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (which message it wants, and how often:
-ATTITUDE_QUATERNION for frames of the state, HIL_SENSOR for frames of sensors) and a HEARTBEAT. The plant begins with
-the first such call, and answers an autopilot that was started again where the flight stands.
+The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (ATTITUDE_QUATERNION for state frames, HIL_SENSOR
+for sensor frames) and a HEARTBEAT. The plant begins with the first such call, and resumes with a restarted autopilot.
 
-Beside its frame the plant sends its battery twice a second, and to whoever has just called; and where commands take
-effect later than their frame, how much later the last one did (NAMED_VALUE_INT cmd_delay, µs). The autopilot may append
-faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame: they are taken with that answer
-and with no other datagram, so each happens once, at that time; the next frame brings their COMMAND_ACK.
+With its frame the plant sends its battery twice a second and to each new caller, and the delay of the last command's
+effect, if any (NAMED_VALUE_INT cmd_delay, µs). The autopilot may append faults, COMMAND_LONG with
+MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame. Only there are they accepted, so each happens once, at
+that time; the next frame brings their COMMAND_ACK.
 
-A plant that runs freely waits for nobody: `FREE_RUNNING` in its HEARTBEAT. It sends each frame once, and takes any
-answer that is newer than the last. The autopilot then goes on from whatever newer frame it gets. How a plant runs is
-learnt from its first HEARTBEAT, and again after silence. A plant that waits begins a new flight at time 0 and with no
-other frame.
+A free-running plant (`FREE_RUNNING` in its HEARTBEAT) does not wait. It sends each frame once, and accepts any answer
+newer than the last; the autopilot continues from the newest frame. The mode is read from the plant's first HEARTBEAT,
+and again after silence. In lockstep a new flight begins at time 0 only.
 """
 
 from colibri.mavlink.hil.feedback import Feedback
@@ -28,21 +26,21 @@ from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
 RESEND_AFTER_S = 0.02
-"""Wall-clock silence after which the plant sends its frame again."""
+"""Wall-clock silence before the plant repeats its frame."""
 PEER_LOST_AFTER_S = 0.5
-"""Wall-clock silence after which another autopilot may take over the plant."""
+"""Wall-clock silence before another autopilot may take over."""
 CALL_AFTER_S = 1.0
-"""Wall-clock silence after which the autopilot calls the plant again, and would begin a new flight."""
+"""Wall-clock silence before the autopilot calls again, and a new flight may begin."""
 CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 BATTERY_EVERY_US = 500_000
 FREE_RUNNING = 1
-"""HEARTBEAT.custom_mode of a plant that does not wait for answers."""
+"""HEARTBEAT.custom_mode of a free-running plant."""
 MIN_FRAME_INTERVAL_US = 1_000
 MAX_FRAME_INTERVAL_US = 1_000_000
 
 ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: dialect.MSG_HIL_SENSOR}
-"""The message whose interval an autopilot sets."""
+"""The message for which an autopilot sets the interval."""
 ASKS_FOR = {message_id: feedback for feedback, message_id in ASKED_BY.items()}
 MADE_OF = {
     Feedback.STATE: ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"),
@@ -51,6 +49,5 @@ MADE_OF = {
 
 
 def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custom_mode: int = 0) -> bytes:
-    """Return a heartbeat's frame."""
     mode = dialect.MODE_ARMED if armed else 0
     return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)

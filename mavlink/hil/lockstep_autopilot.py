@@ -1,4 +1,4 @@
-"""The autopilot's end of the conversation in lockstep."""
+"""The autopilot's end of the lockstep protocol."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -30,17 +30,16 @@ _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
 class AutopilotEnd:
-    """The autopilot's end: calls the plant, hands each new frame out once, remembers the last answer.
+    """The autopilot's end: calls the plant, returns each new frame once, remembers the last answer.
 
     Attributes:
-        refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
-        repeated: How many frames came again and got the remembered answer.
+        refused: The plant's MAV_RESULT if it refused the requested frames.
+        repeated: Number of repeated frames.
     """
 
     def __init__(
         self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
     ) -> None:
-        """Speak as the autopilot of `system_id`, ask the plant for a frame of `feedback` every `frame_interval_us`."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._plant = (system_id, dialect.PLANT_COMPONENT)
         self._plant_bytes = bytes(self._plant)
@@ -59,11 +58,10 @@ class AutopilotEnd:
         self._outbox: list[bytes] = []
 
     def silence_s(self, now_s: float) -> float:
-        """How long the plant has been silent."""
         return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
-        """Take one datagram in; return its frame if that is the next one to compute."""
+        """Return the datagram's frame if it is the next one to compute."""
         frame = self._read(datagram, self._plant_bytes)
         if frame is None:
             return self._receive_any(datagram, now_s)
@@ -100,7 +98,7 @@ class AutopilotEnd:
         return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
-        """Send the command that answers the frame handed out last, with faults to happen then, and remember it."""
+        """Send and remember the answer to the last frame, with faults for that time."""
         answer = encode_actuators(self._codec, command)
         for fault in faults:
             answer += encode_fault(self._codec, fault, self._plant)
@@ -110,7 +108,7 @@ class AutopilotEnd:
         self._outbox.append(answer)
 
     def poll(self, now_s: float) -> float:
-        """Do what is due at `now_s`; return the time at which something will be due again."""
+        """Repeat the call if due; return the next due time."""
         if self.silence_s(now_s) < CALL_AFTER_S:
             return self._received_s + CALL_AFTER_S
         if now_s >= self._call_at_s:
@@ -119,7 +117,6 @@ class AutopilotEnd:
         return self._call_at_s
 
     def take_outbox(self) -> list[bytes]:
-        """Return the datagrams to send to the plant now, and forget them."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -153,7 +150,7 @@ class AutopilotEnd:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
 
     def _receive_mode(self, heartbeat: Message, now_s: float) -> None:
-        """Take in whether the plant runs freely: that does not change in a flight."""
+        """Note the plant's mode, which is constant in a flight."""
         if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
             self._runs_freely = heartbeat.fields.custom_mode == FREE_RUNNING
 

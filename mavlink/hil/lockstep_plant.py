@@ -1,4 +1,4 @@
-"""The plant's end of the conversation in lockstep."""
+"""The plant's end of the lockstep protocol."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -43,28 +43,25 @@ _WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD})
 
 
 class Outgoing(NamedTuple):
-    """A datagram to send, the address it goes to, and the frames that it is made of."""
+    """A datagram, as its frames, and its destination."""
 
     frames: tuple[bytes, ...]
     address: Address
 
     @property
     def datagram(self) -> bytes:
-        """The bytes to send."""
         return b"".join(self.frames)
 
 
 class PlantEnd:
-    """The plant's end: offers a frame, waits for its answer.
-
-    It has more attributes than most classes: they are one conversation, its frame, its peer, its faults and its counts.
+    """The plant's end: offers a frame and waits for its answer.
 
     Attributes:
-        peer: Where the autopilot is, None until one has called.
-        frame_interval_us: Time between frames; fixed once the first frame was offered.
-        feedback: Which frames the autopilot wants; fixed then, too.
-        received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
-        waits: Whether a frame is sent again until it is answered; else the plant runs freely.
+        peer: Address of the autopilot, once it has called.
+        frame_interval_us: Time between frames, fixed with the first frame.
+        feedback: Kind of frames that the autopilot requests, fixed with the first frame.
+        received: Valid frames of the autopilot; the owner may log and clear it.
+        waits: Whether frames are repeated until answered; otherwise the plant runs freely.
     """
 
     def __init__(
@@ -75,10 +72,7 @@ class PlantEnd:
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
     ) -> None:
-        """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another.
-
-        It may ask for what the plant `serves`; the state, unless it does.
-        """
+        """Wait for the autopilot of `system_id`, which may request other kinds of frames that the plant `serves`."""
         self.waits = waits
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
@@ -102,15 +96,15 @@ class PlantEnd:
         self._outbox: list[Outgoing] = []
 
     def sends_battery(self, time_us: int) -> bool:
-        """Whether a frame of `time_us` has the battery beside it; who calls later is sent that of the frame before."""
+        """Whether a frame is sent with the battery; a later caller gets the previous frame's."""
         return time_us % BATTERY_EVERY_US == 0
 
     def offer(
         self, frame: Frame, now_s: float, plant_status: PlantStatus = NOTHING, truth: StateFrame | None = None
     ) -> None:
-        """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it.
+        """Send `frame` and status; await its command.
 
-        The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
+        The `truth` is appended, as another component's, for a program between plant and autopilot.
         """
         if isinstance(frame, StateFrame):
             frames = encode_state(self._codec, frame)
@@ -134,7 +128,7 @@ class PlantEnd:
         self._send_frame(now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        """Take one datagram in; return the command that answers the frame awaited, if it holds that."""
+        """Return the datagram's command if it answers the awaited frame."""
         command = read_actuators(datagram, self._autopilot_bytes) if sender == self.peer else None
         if command is None:
             return self._receive_any(datagram, sender, now_s)
@@ -166,15 +160,12 @@ class PlantEnd:
         return command
 
     def take_faults(self) -> list[Fault | WorldChange]:
-        """Return the faults and changes of the world that came with the last answer, and forget them.
-
-        Nobody has judged the faults yet.
-        """
+        """Return the unchecked faults and changes of the world in the last answer."""
         faults, self._faults = self._faults, []
         return faults
 
     def poll(self, now_s: float) -> float:
-        """Do what is due at `now_s`; return the time at which something will be due again."""
+        """Repeat the frame if due; return the next due time."""
         if self._awaited_us is None or not self.waits:
             return now_s + RESEND_AFTER_S
         if now_s >= self._resend_at_s:
@@ -183,7 +174,6 @@ class PlantEnd:
         return self._resend_at_s
 
     def take_outbox(self) -> list[Outgoing]:
-        """Return the datagrams to send now, and forget them."""
         outbox, self._outbox = self._outbox, []
         return outbox
 

@@ -1,4 +1,4 @@
-"""What a plant sends its autopilot beside a frame: battery, results of faults requested, the delay of commands."""
+"""The plant's messages beside a frame: battery, results of requested faults, the delay of commands."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,21 +15,16 @@ _MAX_I32 = 2**31 - 1
 
 
 class PlantBattery(NamedTuple):
-    """A battery as the plant has it, and no model of it.
-
-    Attributes:
-        used_ah: Charge taken since it was full.
-        remaining: Part of its charge that is left.
-    """
+    """The plant's battery."""
 
     voltage_v: float
     current_a: float
-    used_ah: float
-    remaining: float
+    used_ah: float  # since full
+    remaining: float  # 0..1
 
 
 class FaultResult(NamedTuple):
-    """What became of a fault that was asked for."""
+    """The result of a requested fault."""
 
     unit: int
     kind: int
@@ -37,13 +32,11 @@ class FaultResult(NamedTuple):
 
 
 class PlantStatus(NamedTuple):
-    """What a plant sends beside a frame.
+    """Status beside a frame.
 
     Attributes:
-        battery: None where there is none, or it is not sent.
-        results: Of the faults that came with the answer to the frame before, in order.
-        delay_us: From the frame that the last command answers to the moment at which the rotors began to follow it, µs;
-            None where they do so at once.
+        results: Of the faults in the previous answer, in order.
+        delay_us: From the frame of the last command to its effect on the rotors, µs; `None` if immediate.
     """
 
     battery: PlantBattery | None = None
@@ -55,7 +48,7 @@ NOTHING = PlantStatus()
 
 
 class ReceivedFrame(NamedTuple):
-    """The next frame to answer, and what the plant sent beside it."""
+    """The next frame to answer, and the plant's status."""
 
     frame: Frame
     plant_status: PlantStatus = NOTHING
@@ -72,7 +65,7 @@ def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
 
 
 def decode_battery(message: Message) -> PlantBattery | None:
-    """Decode a BATTERY_STATUS; None where it has no voltage, charge or remaining part."""
+    """Decode a BATTERY_STATUS; `None` without voltage, charge or remaining part."""
     fields = message.fields
     cells_mv = [cell for cell in fields.voltages if cell != _NO_CELL]
     if not cells_mv or fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:
@@ -82,24 +75,21 @@ def decode_battery(message: Message) -> PlantBattery | None:
 
 
 def encode_results(codec: Codec, results: Sequence[FaultResult], target: tuple[int, int]) -> list[bytes]:
-    """Encode results as COMMAND_ACK; `result_param2` is the fault's: 256 unit + type."""
+    """Encode results as COMMAND_ACK; `result_param2` is 256 unit + type."""
     return [
         codec.encode("COMMAND_ACK", faults.COMMAND, it.result, 0, it.unit << 8 | it.kind, *target) for it in results
     ]
 
 
 def encode_delay(codec: Codec, time_us: int, delay_us: int) -> bytes:
-    """Encode a delay of commands as NAMED_VALUE_INT, µs."""
     return codec.encode("NAMED_VALUE_INT", time_us // 1000, _DELAY, min(delay_us, _MAX_I32))
 
 
 def decode_delay(message: Message) -> int | None:
-    """Decode a NAMED_VALUE_INT that says a delay, µs; None for any other."""
     fields = message.fields
     return fields.value if fields.name == _DELAY and fields.value >= 0 else None
 
 
 def decode_result(message: Message) -> FaultResult:
-    """Decode a COMMAND_ACK of a fault."""
     unit, kind = divmod(message.fields.result_param2, 256)
     return FaultResult(unit, kind, message.fields.result)

@@ -1,11 +1,11 @@
-"""PX4's simulator interface, the autopilot's end, as a state machine: what came and the time in, datagrams out.
+"""PX4's simulator interface, the autopilot's end, as a state machine without I/O.
 
-It calls the simulator with a HEARTBEAT, and goes on with two a second by the wall clock, as a simulator that receives
-none for three seconds restarts. Each HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS that names its time and asks for
-lockstep. A simulator's clock may stand anywhere when it begins: time is counted from its first frame.
+It sends a HEARTBEAT twice a second of wall-clock time, as a simulator restarts after three seconds without. Each
+HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS of the same time that requests lockstep. Time counts from the first
+frame, as a simulator's clock may start anywhere.
 
-jMAVSim's habits are borne: its HIL_GPS comes behind the HIL_SENSOR of the same time, and belongs to the next; older
-ones leave `fields_updated` empty, and mean that everything is new.
+Quirks of jMAVSim: its HIL_GPS follows the HIL_SENSOR of the same time and belongs to the next; old versions leave
+`fields_updated` empty, which counts as all new.
 """
 
 from collections import Counter
@@ -22,26 +22,23 @@ from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
 CALL_EVERY_S = 0.5
-"""Wall-clock time between two HEARTBEAT."""
+"""Wall-clock interval of HEARTBEAT."""
 ANSWER_AGAIN_AFTER_S = 1.0
-"""Wall-clock silence after which the last answer is sent again: a datagram may have been lost."""
+"""Wall-clock silence before the last answer is repeated: a datagram may have been lost."""
 
 _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER | Updated.BAROMETER
 
 
 class FlierEnd:
-    """The autopilot's end: hands each new frame out once, remembers the last answer.
+    """The autopilot's end: returns each new frame once, remembers the last answer.
 
     Attributes:
-        refused: None: a simulator is not asked for anything.
-        repeated: How many frames came again and got the remembered answer.
+        refused: Always `None`, for compatibility with `AutopilotEnd`.
+        repeated: Number of repeated frames.
     """
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
-        """Speak as the autopilot of `system_id`.
-
-        `to_motors` makes what the simulator takes of parts of the rotors' top speeds in the vehicle file's order.
-        """
+        """Create the end; `to_motors` converts rotor speeds 0..1 in the vehicle file's order to the simulator's."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
         self.refused: int | None = None
@@ -57,11 +54,10 @@ class FlierEnd:
         self._outbox: list[bytes] = []
 
     def silence_s(self, now_s: float) -> float:
-        """How long the simulator has been silent."""
         return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
-        """Take one datagram in; return its frame if that is the next one to compute."""
+        """Return the datagram's frame if it is the next one to compute."""
         frame = None
         for message in self._codec.decode(datagram):
             if message.name == "HIL_SENSOR":
@@ -73,7 +69,6 @@ class FlierEnd:
         return None if frame is None else ReceivedFrame(frame)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
-        """Send the command that answers the frame handed out last, and remember it; a simulator takes no faults."""
         assert not faults, "whoever flies a simulator refuses them"
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed
@@ -83,7 +78,6 @@ class FlierEnd:
         self._outbox.append(self._answer)
 
     def poll(self, now_s: float) -> float:
-        """Do what is due at `now_s`; return the time at which something will be due again."""
         if now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
             self._outbox.append(self._heartbeat())
@@ -95,7 +89,6 @@ class FlierEnd:
         return min(self._call_at_s, self._again_at_s)
 
     def take_outbox(self) -> list[bytes]:
-        """Return the datagrams to send now, and forget them."""
         outbox, self._outbox = self._outbox, []
         return outbox
 

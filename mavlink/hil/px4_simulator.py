@@ -1,13 +1,11 @@
-"""PX4's simulator interface, the simulator's end, as a state machine: what came and the time in, datagrams out.
+"""PX4's simulator interface, the simulator's end, as a state machine without I/O.
 
-PX4 calls (over TCP it is the client), begins with a HEARTBEAT and, before or after, asks for HIL_STATE_QUATERNION.
+PX4 calls (over TCP it is the client), begins with a HEARTBEAT and, before or after, requests HIL_STATE_QUATERNION.
 HIL_SENSOR sets its clock; its HIL_ACTUATOR_CONTROLS with bit 0 of `flags` answers it. Until the first such answer,
-while PX4 is starting, the simulator must go on by itself, at the pace of the wall clock. From then on it waits for
-each.
+while PX4 is starting, the simulator advances at the pace of the wall clock. From then on it waits for each answer.
 
-An answer is known by its time, which must be another than that of the answer before: a frame that was lost and sent
-again is answered twice, and counts once. Source: PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and
-https://docs.px4.io/main/en/simulation/.
+An answer counts if its time differs from the previous one's: a repeated frame may be answered twice. Source:
+PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and https://docs.px4.io/main/en/simulation/.
 """
 
 from collections import Counter
@@ -25,7 +23,7 @@ from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu
 
 RESEND_AFTER_S = 1.0
-"""Wall-clock silence after which a frame is sent again: PX4 may have been restarted, or a datagram lost."""
+"""Wall-clock silence before a frame is repeated: PX4 may have restarted, or a datagram been lost."""
 CALL_EVERY_S = 0.5
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
@@ -41,14 +39,14 @@ _TRUTH = FixedFrame(
 
 
 class Motors(NamedTuple):
-    """What PX4 commands: controls, 0 to 1, of its first four motors in its own order."""
+    """Controls, 0..1, of PX4's first four motors in its order."""
 
     controls: FourRotors
     armed: bool
 
 
 class Truth(NamedTuple):
-    """The true state that HIL_STATE_QUATERNION holds, its acceleration against the ground: PX4 only logs it."""
+    """The true state for HIL_STATE_QUATERNION, with coordinate acceleration: PX4 only logs it."""
 
     state: StateFrame
     place: Geodetic
@@ -59,17 +57,14 @@ class Truth(NamedTuple):
 class SimulatorEnd:
     """The simulator's end: offers frames, receives motor commands.
 
-    It has more attributes than most classes: they are one conversation, as those of `PlantEnd`.
-
     Attributes:
-        peer: Where PX4 is; None until it has called, and after it has gone.
-        calls: How many times a PX4 has begun to be served.
-        lockstep: Whether PX4 answers each frame, and is to be waited for.
-        received: Frames of PX4 that were understood, in order; the owner may log and clear it.
+        peer: Address of PX4, from its call until its connection ends.
+        calls: Number of PX4 starts.
+        lockstep: Whether PX4 answers each frame.
+        received: Valid frames of PX4; the owner may log and clear it.
     """
 
     def __init__(self, *, system_id: int) -> None:
-        """Speak as the simulator of the autopilot of `system_id`."""
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self.peer: Address | None = None
         self.calls = 0
@@ -89,11 +84,10 @@ class SimulatorEnd:
         self._outbox: list[tuple[tuple[bytes, ...], Address]] = []
 
     def wants_truth(self, time_us: int) -> bool:
-        """Whether PX4 has requested the true state, and it is due."""
+        """Whether the true state is requested and due."""
         return self._truth_every_us is not None and time_us >= self._truth_at_us
 
     def offer(self, frame: SensorFrame, truth: Truth | None, now_s: float) -> None:
-        """Send a frame, with the truth if it is wanted, and await its answer."""
         frames = [] if truth is None else [self._encode_truth(truth)]
         frames += encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
@@ -103,7 +97,6 @@ class SimulatorEnd:
         self._send(now_s)
 
     def receive(self, datagram: bytes, sender: Address) -> None:
-        """Take in what one sender has sent."""
         if len(datagram) == _CONTROLS.size and sender == self.peer:
             numbers = _CONTROLS.read(datagram, 0, self._source)
             if numbers is not None:
@@ -128,24 +121,21 @@ class SimulatorEnd:
             self.received.append(message.frame)
 
     def close(self, address: Address) -> None:
-        """Forget a PX4 whose connection has ended."""
         if address == self.peer:
             self.peer = None
 
     def call(self, address: Address, now_s: float) -> None:
-        """Call a PX4 that waits to be called, as it does over UDP, now and then until it speaks."""
+        """Call a PX4 that waits to be called, as over UDP, every `CALL_EVERY_S` until it answers."""
         if self.peer is None and now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
             self._outbox.append(((self._heartbeat(),), address))
 
     def poll(self, now_s: float) -> None:
-        """Send the frame again if its answer is overdue."""
         if not self.answered and now_s >= self._resend_at_s:
             self.resent += 1
             self._send(now_s)
 
     def take_outbox(self) -> list[tuple[tuple[bytes, ...], Address]]:
-        """Return the frames to send now and where each datagram of them goes, and forget them."""
         outbox, self._outbox = self._outbox, []
         return outbox
 

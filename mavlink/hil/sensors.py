@@ -1,9 +1,8 @@
-"""What sensors send the autopilot: tuples in SI, ENU/FLU, and the messages of PX4's simulator interface.
+"""Sensor frames from plant to autopilot, in SI, ENU/FLU, and their messages of PX4's simulator interface.
 
-HIL_SENSOR has what is measured on board; its `fields_updated` has the groups that are new. HIL_GPS comes at its own
-rate, and is of the past; each other message of a sensor's own is a row of `OWN_MESSAGES`. Units and frames are those
-that PX4 reads: https://docs.px4.io/main/en/simulation/ and https://mavlink.io/en/messages/common.html. Nothing is
-judged here: an autopilot must cope with any number that a broken sensor sends.
+HIL_SENSOR has the on-board measurements, with the new groups in `fields_updated`. HIL_GPS has its own rate and is
+delayed; further sensors are rows of `OWN_MESSAGES`. Units and frames are PX4's: https://docs.px4.io/main/en/simulation/
+and https://mavlink.io/en/messages/common.html. Values are unchecked: an autopilot must cope with broken sensors.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,27 +30,27 @@ _FIELDS = (
 )
 _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *(FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"))}
-"""With as many bytes of `fields_updated` as are not zero."""
+"""By the number of non-zero bytes of `fields_updated`."""
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")
 _altitude_m = lru_cache(maxsize=1)(altitude_m)
 """Pressure is measured less often than frames are sent."""
 
 
 class Updated:
-    """The groups of HIL_SENSOR.fields_updated; a group is new when all its bits are set.
+    """Groups of HIL_SENSOR.fields_updated; a group is new if all its bits are set.
 
-    Plain numbers: flags of `enum` would cost more than all else that is done with a frame.
+    Plain numbers: `enum` flags would dominate the time per frame.
     """
 
     ACCELEROMETER = 0x7
     GYROSCOPE = 0x38
     MAGNETOMETER = 0x1C0
     BAROMETER = 0x1A00
-    """Pressure, pressure altitude and temperature; 0x400 is differential pressure, which no multicopter measures."""
+    """Without 0x400, differential pressure."""
 
 
 class FixType(IntEnum):
-    """Of GPS_FIX_TYPE what a simulated receiver has."""
+    """GPS_FIX_TYPE of a simulated receiver."""
 
     NO_FIX = 1
     FIX_3D = 3
@@ -59,12 +58,12 @@ class FixType(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix:
-    """A fix of a GPS receiver.
+    """A GPS fix.
 
     Attributes:
-        time_us: Simulated time from which it is sent, µs; it was measured the receiver's delay before, exactly.
-        fix_type: How good it is (`FixType`, or any number that a simulator sends).
-        horizontal_accuracy_m, vertical_accuracy_m: Standard deviations that it claims.
+        time_us: Simulated time of sending; measured the receiver's delay before.
+        fix_type: `FixType`, or any number that a simulator sends.
+        horizontal_accuracy_m, vertical_accuracy_m: Claimed standard deviations.
     """
 
     time_us: int
@@ -77,11 +76,10 @@ class GpsFix:
 
 
 class Distance(NamedTuple):
-    """A sample of a rangefinder that looks down.
+    """A sample of a downward rangefinder.
 
     Attributes:
-        distance_m: To the ground, along the vehicle's own axis; infinite where it sees none.
-        min_m, max_m: What is nearer or farther it does not see.
+        distance_m: To the ground along the body's axis; infinite if out of range.
         field_of_view_rad: Angle of its beam's cone.
     """
 
@@ -92,16 +90,14 @@ class Distance(NamedTuple):
 
 
 class SensorFrame(NamedTuple):
-    """What is measured on board at one instant of simulated time, and what GPS has sent since the frame before.
+    """On-board measurements at one instant of simulated time, and new messages of other sensors.
 
-    A group that `updated` leaves out holds its last value, or zeros.
+    Groups that are not `updated` hold old values or zeros.
 
     Attributes:
-        updated: Which groups are new (`Updated`).
-        specific_force_flu_m_s2: Of the accelerometer: (0, 0, 9.81) at rest and level.
+        updated: Bits of `Updated`.
+        specific_force_flu_m_s2: (0, 0, 9.81) at rest and level.
         temperature_c: Of the barometer, degrees Celsius.
-        gps: None between two fixes.
-        distance: Of the rangefinder; None between two samples, and without one.
     """
 
     time_us: int
@@ -115,15 +111,14 @@ class SensorFrame(NamedTuple):
     distance: Distance | None = None
 
     def has(self, group: int) -> bool:
-        """Whether a group is new."""
         return self.updated & group == group
 
 
 class OwnMessage(NamedTuple):
-    """A sensor with a message of its own, beside HIL_SENSOR, whenever it has something new.
+    """A sensor with a message of its own beside HIL_SENSOR.
 
     Attributes:
-        field: Of `SensorFrame`; None there where nothing is new.
+        field: Of `SensorFrame`; `None` there without a new value.
         encoded: (value, simulated time in µs) -> fields of the message.
         passed_on: Whether ground stations receive the same message.
     """
@@ -136,11 +131,11 @@ class OwnMessage(NamedTuple):
 
 
 Frame: TypeAlias = StateFrame | SensorFrame
-"""What a plant sends its autopilot at one instant of simulated time."""
+"""A frame from plant to autopilot at one instant of simulated time."""
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    """Encode a frame as HIL_SENSOR, and the messages of what else is new; the pressure altitude is the standard's."""
+    """Encode a frame as HIL_SENSOR, with standard pressure altitude, and messages of other new values."""
     messages = [
         _SENSOR.encode(
             codec,
@@ -165,10 +160,7 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
 
 
 def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
-    """Read a datagram that is nothing but a HIL_SENSOR of `source`, with no other zeros left out; None of any other.
-
-    A HIL_GPS may be behind it.
-    """
+    """Read a datagram of one HIL_SENSOR of `source`, full length, and possibly a HIL_GPS; otherwise `None`."""
     layout, fix = _BY_SIZE.get(len(datagram)), None
     if layout is None:
         layout = _BY_SIZE.get(len(datagram) - _GPS.size)
@@ -181,13 +173,12 @@ def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
 
 
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
-    """Decode a HIL_SENSOR, and those of `OWN_MESSAGES` that came with it."""
+    """Decode a HIL_SENSOR and its `OWN_MESSAGES`."""
     own = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
     return _measured([getattr(sensor.fields, name) for name in _FIELDS.split()], **own)
 
 
 def _measured(numbers: Sequence[Any], gps: GpsFix | None = None, distance: Distance | None = None) -> SensorFrame:
-    """Return the frame of a HIL_SENSOR's fields, and of what sensors with messages of their own measured."""
     time_us, xacc, yacc, zacc, xgyro, ygyro, zgyro, xmag, ymag, zmag, hpa, _, _, temperature_c, updated = numbers
     return SensorFrame(
         time_us,
@@ -222,7 +213,7 @@ def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
 
 
 def decode_gps(message: Message) -> GpsFix:
-    """Decode a HIL_GPS; accuracies that it does not know are nan."""
+    """Decode a HIL_GPS; unknown accuracies are nan."""
     g = message.fields
     accuracies, speeds = (g.eph, g.epv), (g.vel, g.vn, g.ve, g.vd, g.cog)
     return _fix(g.time_usec, g.lat, g.lon, g.alt, *accuracies, *speeds, g.fix_type, g.satellites_visible)
@@ -267,7 +258,7 @@ def _accuracy_m(cm: int) -> float:
 
 
 def _distance_fields(measured: Distance, time_us: int) -> tuple[Any, ...]:
-    """DISTANCE_SENSOR: cm; a laser that looks down. What sees nothing has a quality of 1, "invalid"."""
+    """Return DISTANCE_SENSOR, cm, of a downward laser; quality 1 ("invalid") if out of range."""
     sees = isfinite(measured.distance_m)
     limits_cm = (_in(measured.min_m, 1e2, 65534), _in(measured.max_m, 1e2, 65534))
     distance_cm = _in(measured.distance_m, 1e2, 65535) if sees else limits_cm[1] + 1

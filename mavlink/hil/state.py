@@ -1,6 +1,6 @@
-"""What plant and autopilot send each other: tuples in SI, ENU/FLU, and their MAVLink messages.
+"""State frames and commands between plant and autopilot, in SI, ENU/FLU, and their MAVLink messages.
 
-Anything that a receiver could not fly on (not finite, out of range, halves of different frames) decodes to None.
+Invalid input (not finite, out of range, halves of different frames) decodes to `None`.
 """
 
 from math import isfinite, sqrt
@@ -19,27 +19,22 @@ _UNIT_NORM_TOLERANCE = 1e-3
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
 STATE_BYTES = _ATTITUDE.size + _POSITION.size
-"""Size of a datagram that is nothing but a frame of state feedback."""
+"""Size of a state frame's datagram."""
 _ACTUATORS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
 
 
 class StateFrame(NamedTuple):
-    """The vehicle's state at one instant of simulated time.
+    """The vehicle's state at one instant of simulated time."""
 
-    Attributes:
-        time_us: Simulated time, µs; whole milliseconds on the wire.
-        attitude: Unit quaternion, FLU body to ENU earth.
-    """
-
-    time_us: int
+    time_us: int  # whole milliseconds on the wire
     position_enu_m: Vector
     velocity_enu_m_s: Vector
-    attitude: Quaternion
+    attitude: Quaternion  # FLU to ENU
     rate_flu_rad_s: Vector
 
 
 class ActuatorCommand(NamedTuple):
-    """The rotor speeds that answer the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
+    """Rotor speeds in answer to the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
 
     time_us: int
     controls: FourRotors
@@ -57,7 +52,7 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 
 
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
-    """Read a datagram that is nothing but the two frames of `source`, with no zeros left out; None of any other."""
+    """Read a datagram of exactly the two full-length frames of `source`; otherwise `None`."""
     if len(datagram) != STATE_BYTES:
         return None
     attitude = _ATTITUDE.read(datagram, 0, source)
@@ -66,7 +61,6 @@ def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
 
 
 def decode_state(attitude: Message, position: Message) -> StateFrame | None:
-    """Decode an ATTITUDE_QUATERNION and a LOCAL_POSITION_NED; None if they cannot be one frame."""
     a, p = attitude.fields, position.fields
     turning = (a.time_boot_ms, a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed)
     return _state(*turning, p.time_boot_ms, p.x, p.y, p.z, p.vx, p.vy, p.vz)
@@ -89,7 +83,7 @@ def _state(
     vy: float,
     vz: float,
 ) -> StateFrame | None:
-    """Return the frame of the fields of both messages; single floats all, whose sum is finite if each of them is."""
+    """Return the frame of both messages' fields: single floats, with a finite sum if each is finite."""
     all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
     squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
     if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
@@ -105,14 +99,13 @@ def _state(
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
-    """Encode a command as HIL_ACTUATOR_CONTROLS."""
     time_us, controls, armed = command
     mode = MODE_CUSTOM | MODE_HIL | (MODE_ARMED if armed else 0)
     return _ACTUATORS.encode(codec, (time_us, LOCKSTEP_FLAG, *controls, mode))
 
 
 def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:
-    """Read a datagram that is nothing but a command of `source`; None of any other, and as `decode_actuators`."""
+    """Read a datagram of exactly one valid command of `source`; otherwise `None`."""
     if len(datagram) != _ACTUATORS.size:
         return None
     numbers = _ACTUATORS.read(datagram, 0, source)
@@ -120,7 +113,6 @@ def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:
 
 
 def decode_actuators(message: Message) -> ActuatorCommand | None:
-    """Decode a HIL_ACTUATOR_CONTROLS; None if a rotor could not follow it."""
     fields = message.fields
     c1, c2, c3, c4 = fields.controls[:ROTORS]
     return _command(fields.time_usec, fields.flags, c1, c2, c3, c4, fields.mode)

@@ -1,6 +1,6 @@
-"""Changes of a plant's world in flight, as COMMAND_LONG to the plant: the mean wind, and a payload.
+"""In-flight changes of the plant's world, as COMMAND_LONG: mean wind and payload.
 
-They come with the answer to a frame, as faults do, so a flight is the same however often the answer is sent.
+They come with the answer to a frame, as faults do, so repeated answers have no effect.
 """
 
 from math import isfinite
@@ -9,21 +9,21 @@ from typing import Any, NamedTuple, TypeAlias
 from colibri.mavlink.wire.dialect import Codec, mav
 
 WIND: int = mav.MAV_CMD_USER_1
-"""param1: m/s; param2: where it blows from, degrees clockwise from north."""
+"""param1: m/s; param2: direction of origin, degrees clockwise from north."""
 PAYLOAD: int = mav.MAV_CMD_USER_2
-"""param1: kg beside the vehicle's own mass."""
+"""param1: kg added to the vehicle's mass."""
 MAX_WIND_M_S, FULL_TURN_DEG, MAX_PAYLOAD_KG = 150.0, 360.0, 100.0
 
 
 class WindChange(NamedTuple):
-    """The mean wind is another one from now on; gusts and turbulence stay."""
+    """A new mean wind; gusts and turbulence stay."""
 
     speed_m_s: float
     from_deg: float
 
 
 class PayloadChange(NamedTuple):
-    """The vehicle carries so much at its centre of mass from now on."""
+    """A payload at the vehicle's centre of mass."""
 
     mass_kg: float
 
@@ -32,13 +32,11 @@ WorldChange: TypeAlias = WindChange | PayloadChange
 
 
 def encode_change(codec: Codec, change: WorldChange, target: tuple[int, int]) -> bytes:
-    """Encode a change as COMMAND_LONG to system and component `target`."""
     number = WIND if isinstance(change, WindChange) else PAYLOAD
     return codec.encode("COMMAND_LONG", *target, number, 0, *change, *(0.0,) * (7 - len(change)))
 
 
 def decode_change(fields: Any) -> WorldChange | None:
-    """Return the change of a COMMAND_LONG; None where no world can be like that."""
     p1, p2 = fields.param1, fields.param2
     wind = fields.command == WIND
     limits = ((p1, MAX_WIND_M_S), (p2, FULL_TURN_DEG)) if wind else ((p1, MAX_PAYLOAD_KG),)

@@ -1,1 +1,1 @@
-"""Endpoints by URL: UDP and TCP sockets and serial ports that never block; the only sockets."""
+"""Endpoints by URL: non-blocking UDP and TCP sockets and serial ports."""

@@ -1,8 +1,7 @@
 """Endpoints by URL.
 
-`udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only; `tcpin:HOST:PORT` waits for
-clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. The link between plant and autopilot is
-UDP.
+`udpin:HOST:PORT` waits for any sender, `udpout:HOST:PORT` exchanges datagrams with that address only; `tcpin:HOST:PORT`
+waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. Plant and autopilot use UDP.
 """
 
 import os
@@ -22,7 +21,7 @@ _SERIAL, _SERIAL_FORM = "serial:", "serial:DEVICE:BAUD"
 
 
 def open_link(url: str) -> UdpLink:
-    """Open the UDP endpoint that `url` names; port 0 with `udpin:` takes any free port.
+    """Open a UDP endpoint; port 0 with `udpin:` takes any free port.
 
     Raises:
         LinkError: The URL is malformed, the host unknown, or the port taken.
@@ -31,10 +30,10 @@ def open_link(url: str) -> UdpLink:
 
 
 def open_ground_link(url: str) -> GroundLink:
-    """Open the endpoint that `url` names, of UDP or TCP, or a serial port; port 0 takes any free port where it waits.
+    """Open a UDP, TCP or serial endpoint; port 0 takes any free port if it waits.
 
     Raises:
-        LinkError: The URL is malformed, the host unknown, the port taken, the device not there.
+        LinkError: The URL is malformed, the host unknown, the port taken, or the device missing.
     """
     if is_serial(url):
         return SerialLink(url, *_parse_serial(url))
@@ -52,14 +51,11 @@ def open_ground_link(url: str) -> GroundLink:
 
 
 def is_serial(url: str) -> bool:
-    """Whether `url` names a serial port."""
     return url.startswith(_SERIAL)
 
 
 def beyond_loopback(url: str) -> bool:
-    """Whether the endpoint that `url` names can be reached from, or reaches, another computer by a network.
-
-    A serial port cannot: whoever is at its end has a cable here, or a radio that belongs to it.
+    """Whether an endpoint reaches other computers by a network; a serial port does not.
 
     Raises:
         LinkError: The URL is malformed, or the host unknown.
@@ -72,10 +68,10 @@ def beyond_loopback(url: str) -> bool:
 
 
 def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
-    """Check that nobody on the network could fly the vehicle over `urls`, unless that is asked for.
+    """Require a key or `insecure` for each URL that reaches the network.
 
     Raises:
-        LinkError: Somebody could; or a URL is malformed, or its host unknown.
+        LinkError: Neither is given; or a URL is malformed, or its host unknown.
     """
     for url in urls:
         if beyond_loopback(url) and not (signed or insecure):
@@ -83,7 +79,6 @@ def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
 
 
 def unsigned_refusal(url: str) -> str:
-    """Return the line that refuses to open a link beyond loopback without a key."""
     return f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
 
 

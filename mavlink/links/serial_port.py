@@ -1,8 +1,7 @@
-"""A serial port as an endpoint: it never blocks, and is opened again when its device has gone and come back.
+"""A serial port as a non-blocking endpoint, reopened when its device returns.
 
-A frame that noise has broken is dropped, and the next one found; what the line is too slow for is dropped by whole
-datagrams. The port is opened and set up by pyserial and then used as any other file: pyserial's own `write` waits,
-whatever its time-out, for a device that takes nothing.
+Frames broken by noise are dropped; beyond the line's speed, whole datagrams are dropped. pyserial opens the port, which
+is then used as a file: pyserial's own `write` blocks on a stalled device in spite of its time-out.
 """
 
 import errno
@@ -21,13 +20,13 @@ if TYPE_CHECKING:
 
 REOPEN_AFTER_S = 1.0
 QUEUE_S = 0.1
-"""What may wait to be sent, in time on the line: telemetry that is older is of no use."""
+"""Send queue, in time on the line: older telemetry is useless."""
 MIN_QUEUE_BYTES = 1024
-"""What may wait however slow the line is: the longest frames, three of them."""
+"""Three of the longest frames."""
 _BITS_PER_BYTE = 10
 _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16
-"""So that a device that sends without a pause cannot hold the process up."""
+"""Limit per call, so that a continuous sender cannot stall the process."""
 _REASONS = {
     errno.ENOENT: "there is no such device; plug it in, or name another",
     errno.EACCES: "no permission; join the group that owns it (often dialout), and log in again",
@@ -38,12 +37,12 @@ _REASONS = {
 
 
 class SerialLink(Endpoint):
-    """Speaks over a serial port, to whoever is at its other end."""
+    """A serial port."""
 
     target: Address
 
     def __init__(self, url: str, device: str, baud: int, clock: Callable[[], float] = perf_counter) -> None:
-        """Open `device`; `clock` says, in seconds, when to look for it again after it has gone.
+        """Open `device`; `clock`, s, times the reopening.
 
         Raises:
             LinkError: It cannot be opened, or pyserial is not installed.
@@ -55,7 +54,6 @@ class SerialLink(Endpoint):
         self._begin(_opened(url, device, baud))
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send whole frames; they are lost while there is no device, or too much is waiting already."""
         if not self._is_open() or address not in (None, self.target):
             return
         if len(self._pending) + len(datagram) > self._queue_bytes:
@@ -65,7 +63,6 @@ class SerialLink(Endpoint):
             self._flush()
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return the frames that have come."""
         received: list[tuple[bytes, Address]] = []
         if self._is_open():
             self._flush()
@@ -77,14 +74,12 @@ class SerialLink(Endpoint):
         return received
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until something has come, but no longer than `timeout_s`; without a device until it is looked for."""
         if self._port is None:
             select.select([], [], [], max(0.0, min(timeout_s, self._open_again_s - self._clock())))
         else:
             select.select([self._port], [], [], timeout_s)
 
     def close(self) -> None:
-        """Close the port, and open it no more."""
         self._release()
         self._open_again_s = float("inf")
 
@@ -97,7 +92,6 @@ class SerialLink(Endpoint):
             self._opened.append(self.target)
 
     def _is_open(self) -> bool:
-        """Return whether there is a device; look for it if it is time to."""
         if self._port is None and self._clock() >= self._open_again_s:
             try:
                 self._begin(_opened(self.url, *self.target))
@@ -108,10 +102,7 @@ class SerialLink(Endpoint):
         return self._port is not None
 
     def _read(self) -> bytes:
-        """Return what has come, up to a chunk.
-
-        Reading alone would not tell that the device has gone: it returns nothing then, as it does in silence.
-        """
+        """Return a chunk of input; `in_waiting` fails if the device has gone, a plain read would return nothing."""
         if self._port is None:
             return b""
         try:
@@ -123,7 +114,6 @@ class SerialLink(Endpoint):
             return b""
 
     def _flush(self) -> None:
-        """Send what is waiting, as far as it will go now."""
         try:
             while self._pending and self._port is not None:
                 del self._pending[: os.write(self._port.fileno(), self._pending)]
@@ -145,7 +135,7 @@ class SerialLink(Endpoint):
 
 
 def _opened(url: str, device: str, baud: int) -> "Serial":
-    """Open a port for this process alone.
+    """Open a port exclusively.
 
     Raises:
         LinkError: It cannot be opened, or pyserial is not installed.
@@ -163,7 +153,6 @@ def _opened(url: str, device: str, baud: int) -> "Serial":
 
 
 def _reason(error: Exception) -> str:
-    """Return in words why a port cannot be opened."""
     if not isinstance(error, OSError):
         return "it has no such baud rate; name another"
     number = error.errno

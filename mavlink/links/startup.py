@@ -1,4 +1,4 @@
-"""A process's first steps: its link opened, its status line, its end by a signal."""
+"""First steps of a process: link, status line, signals."""
 
 import gc
 from collections.abc import Callable
@@ -15,10 +15,7 @@ COMPILING = "compiling, once: half a minute and more"
 
 
 def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
-    """Open the link at `url` by `opened` and take over signals, or end with one line.
-
-    To be called before numpy is loaded.
-    """
+    """Open the link at `url` and handle signals, or end with one line; call before numpy is loaded."""
     escape_what_no_stream_encodes()
     use_one_thread()
     end_quickly()
@@ -35,10 +32,7 @@ def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) 
 
 
 def report_compiling(status: Status) -> None:
-    """Report from now on what is compiled: to a person once, to a program the number of functions so far.
-
-    It loads numba.
-    """
+    """Report compilation: to people once, to programs with the number of functions so far. Loads numba."""
     from colibri.common.jit import on_compile
 
     def report(functions: int) -> None:

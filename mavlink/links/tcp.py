@@ -1,6 +1,6 @@
-"""TCP endpoints, of a server and of a client: nothing blocks, whole frames come in and go out.
+"""Non-blocking TCP endpoints, server and client, for whole frames.
 
-A reader that is too slow loses frames, as it would over UDP; a connection that has died is closed and forgotten.
+A slow reader loses frames, as over UDP; a dead connection is closed and forgotten.
 """
 
 import select
@@ -12,22 +12,21 @@ from colibri.mavlink.links.link import Endpoint
 from colibri.mavlink.wire.framing import Framer
 
 OUTPUT_BYTES = 1 << 18
-"""What may wait for a slow reader beyond what the system keeps; more is dropped."""
+"""Send queue per connection beyond the system's; more is dropped."""
 CONNECTIONS = 16
-"""Clients that a server has at once; further ones are turned away."""
+"""Limit of a server's clients."""
 RECONNECT_AFTER_S = 1.0
 ACCEPT_EVERY_S = 0.1
-"""How often a server that has clients and is polled without a pause looks for others: each look is a system call."""
+"""Accept interval of a busy server with clients: each attempt is a system call."""
 _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16
-"""So that whoever sends without a pause cannot hold the process up."""
+"""Limit per call, so that a continuous sender cannot stall the process."""
 
 
 class Connection:
-    """One connection."""
+    """A connected socket with framing and a send queue."""
 
     def __init__(self, sock: socket.socket, address: Address) -> None:
-        """Take over a connected socket."""
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = sock
@@ -37,18 +36,15 @@ class Connection:
         self.alive = True
 
     def send(self, datagram: bytes) -> None:
-        """Send whole frames; drop them if too much is waiting already."""
         if len(self._pending) + len(datagram) > OUTPUT_BYTES:
             return
         self._pending += datagram
         self.flush()
 
     def fileno(self) -> int:
-        """Return the socket's descriptor, for `select`."""
         return self._socket.fileno()
 
     def flush(self) -> None:
-        """Send what is waiting, as far as it will go now."""
         try:
             while self._pending and self.alive:
                 del self._pending[: self._socket.send(self._pending)]
@@ -58,7 +54,6 @@ class Connection:
             self.close()
 
     def receive_now(self) -> list[bytes]:
-        """Return the frames that have come."""
         self.flush()
         frames: list[bytes] = []
         for _ in range(_CHUNKS_AT_ONCE if self.alive else 0):
@@ -77,16 +72,14 @@ class Connection:
         return frames
 
     def close(self) -> None:
-        """Close the connection."""
         self.alive = False
         self._socket.close()
 
 
 class TcpServer(Endpoint):
-    """Waits for clients, of which it has several."""
+    """A server for several clients."""
 
     def __init__(self, sock: socket.socket, url: str) -> None:
-        """Take over a listening socket."""
         super().__init__(url, None)
         sock.setblocking(False)
         self._socket = sock
@@ -94,14 +87,12 @@ class TcpServer(Endpoint):
         self._accept_at_s = 0.0
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send whole frames to the client at `address`, or to all; nothing if there is none."""
         for connection in list(self._connections.values()):
             if address is None or connection.address == address:
                 connection.send(datagram)
         self._forget_dead()
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return the frames that have come, and from which client each."""
         if not self._connections or perf_counter() >= self._accept_at_s:
             self._accept()
         received = [
@@ -113,13 +104,11 @@ class TcpServer(Endpoint):
         return received
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until somebody has come, gone or sent something, but no longer than `timeout_s`."""
         sockets = [self._socket.fileno(), *(connection.fileno() for connection in self._connections.values())]
         if self._socket.fileno() in select.select(sockets, [], [], timeout_s)[0]:
             self._accept_at_s = 0.0
 
     def close(self) -> None:
-        """Close every connection and stop waiting."""
         for connection in self._connections.values():
             connection.close()
         self._connections.clear()
@@ -146,12 +135,11 @@ class TcpServer(Endpoint):
 
 
 class TcpClient(Endpoint):
-    """Calls a server, and again `RECONNECT_AFTER_S` later if that failed or the connection ended."""
+    """A client that reconnects `RECONNECT_AFTER_S` after a failure or the end of its connection."""
 
     target: Address
 
     def __init__(self, url: str, target: Address) -> None:
-        """Call `target` at once, and wait for nothing."""
         super().__init__(url, target)
         self._socket: socket.socket | None = None
         self._connection: Connection | None = None
@@ -159,14 +147,12 @@ class TcpClient(Endpoint):
         self._call()
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send whole frames to the server; they are lost while there is no connection."""
         connection = self._connected()
         if connection and address in (None, self.target):
             connection.send(datagram)
             self._notice_end(connection)
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return the frames that have come."""
         connection = self._connected()
         if connection is None:
             return []
@@ -175,19 +161,17 @@ class TcpClient(Endpoint):
         return received
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until the server has sent something, hung up or answered a call, but no longer than `timeout_s`."""
         if self._connection is not None:
             select.select([self._connection], [], [], timeout_s)
         else:
             select.select([], [] if self._socket is None else [self._socket], [], min(timeout_s, RECONNECT_AFTER_S))
 
     def close(self) -> None:
-        """Close the connection and call no more."""
         self._hang_up()
         self._call_again_s = float("inf")
 
     def _connected(self) -> Connection | None:
-        """Return the connection, if there is one; call if it is time to, and see what became of a call."""
+        """Return the connection, if any; call if due, and check a pending call."""
         if self._connection is not None:
             return self._connection
         if self._socket is None:
@@ -224,9 +208,9 @@ class TcpClient(Endpoint):
 
 
 def _established(sock: socket.socket, address: Address) -> Connection | None:
-    """Return the connection that a call led to; None if it led nowhere, or to itself.
+    """Return the connection of a completed call; `None` if it failed, or connected to itself.
 
-    A call to a port of its own host that nobody listens on may be given just that port as its own.
+    A call to an unused port of the own host may be given just that port as its own.
     """
     try:
         if sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or sock.getsockname() == sock.getpeername():

@@ -1,4 +1,4 @@
-"""A UDP endpoint that never blocks."""
+"""A UDP endpoint with bounded blocking."""
 
 import socket
 from ipaddress import ip_address
@@ -10,14 +10,13 @@ from colibri.mavlink.links.link import SPIN_S, Endpoint, LinkError, give_way
 
 _MAX_DATAGRAM_BYTES = 4096
 _DATAGRAMS_AT_ONCE = 64
-"""So that whoever sends without a pause cannot hold the process up."""
+"""Limit per call, so that a continuous sender cannot stall the process."""
 
 
 class UdpLink(Endpoint):
-    """A UDP socket that blocks for no longer than the time given, and polls for `spin_s` before it sleeps."""
+    """A UDP socket, polled for `spin_s` before sleeping; with a `target`, other senders are dropped."""
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
-        """Wrap a bound socket; with a `target`, drop datagrams from other addresses."""
         super().__init__(url, target)
         sock.setblocking(False)
         self._socket = sock
@@ -28,16 +27,16 @@ class UdpLink(Endpoint):
             self.speak_with(target)
 
     def speak_with(self, target: Address) -> None:
-        """Speak with `target`, and hear nobody else from now on."""
+        """Exchange datagrams with `target` only from now on."""
         self.target = target
         self._connected = _connect(self._socket, target)
         self._opened = [target]
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send to `address`, or to the target. What the network will not take now is lost, as UDP may lose it.
+        """Send to `address` or the target, or lose the datagram.
 
         Raises:
-            LinkError: The target can never be reached from here.
+            LinkError: The target is unreachable.
         """
         destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
@@ -54,7 +53,6 @@ class UdpLink(Endpoint):
             raise LinkError(f"cannot send to {destination[0]}:{destination[1]}: {error.strerror}") from error
 
     def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
-        """Return the next datagram and its sender, or None after `timeout_s`."""
         began_s = perf_counter()
         give_up_s = began_s + timeout_s
         spin_until_s = began_s + (self.spin_s if self._waited_s <= self.spin_s else 0.0)
@@ -70,7 +68,6 @@ class UdpLink(Endpoint):
         return received
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return the datagrams that have come, and their senders."""
         received = []
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
@@ -84,11 +81,9 @@ class UdpLink(Endpoint):
         return received
 
     def wait(self, timeout_s: float) -> None:
-        """Sleep until a datagram has come, but no longer than `timeout_s`."""
         select([self._socket], [], [], timeout_s)
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()
 
     def _receive_now(self) -> tuple[bytes, Address] | None:
@@ -108,9 +103,9 @@ class UdpLink(Endpoint):
 
 
 def _connect(sock: socket.socket, target: Address) -> bool:
-    """Connect to a target on this computer, which saves a fifth of an exchange; return whether that was done.
+    """Connect to a loopback target, which saves a fifth of an exchange; return success.
 
-    Not to others: the way to them may change, and that of a connected socket does not.
+    Other routes may change, and a connected socket's would not.
     """
     if not ip_address(target[0]).is_loopback:
         return False

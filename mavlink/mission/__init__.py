@@ -1,1 +1,1 @@
-"""The mission protocol: items, upload, download, one service for mission, fence and rally points."""
+"""The mission protocol: items, upload, and the service for missions, fences and rally points."""

@@ -1,4 +1,4 @@
-"""Mission items as they are stored: every value as it came, so that a download equals the upload.
+"""Mission items with unchanged values, so that a download equals the upload.
 
 Specification: https://mavlink.io/en/services/mission.html, "Mission Items" and "Detecting Mission/Plan Changes".
 """
@@ -29,8 +29,6 @@ class MissionItem(NamedTuple):
     """An item of a plan, in wire units.
 
     Attributes:
-        autocontinue: Whether the next item follows by itself.
-        p1, p2, p3, p4: Parameters one to four.
         x, y: Latitude and longitude, degE7; or parameters five and six.
         z: Altitude, m; or the seventh parameter.
     """
@@ -48,7 +46,7 @@ class MissionItem(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The items of one type that the vehicle holds; the opaque id changes with them, and is 0 without any."""
+    """The stored items of one type; the opaque id changes with them and is 0 without items."""
 
     items: tuple[MissionItem, ...] = ()
     id: int = 0
@@ -58,14 +56,14 @@ NO_PLAN = Plan()
 
 
 def plan_of(items: Sequence[MissionItem]) -> Plan:
-    """Return the plan of these items. Its id is their CRC-32, made 1 where that would be the 0 of "no plan"."""
+    """Return the plan of these items. Its id is their CRC-32, or 1 if that is 0."""
     if not items:
         return NO_PLAN
     return Plan(tuple(items), crc32(b"".join(_PACKED.pack(*item) for item in items)) or 1)
 
 
 def item_of(message_name: str, fields: Any) -> MissionItem | int:
-    """Return the item in a MISSION_ITEM_INT or MISSION_ITEM; a MAV_MISSION_RESULT where its place fits no integer."""
+    """Return the item in a MISSION_ITEM_INT or MISSION_ITEM; a MAV_MISSION_RESULT if its place fits no integer."""
     x, y = fields.x, fields.y
     if message_name == "MISSION_ITEM":
         scale = 1e7 if fields.frame in GLOBAL_FRAMES else 1.0
@@ -79,14 +77,13 @@ def item_of(message_name: str, fields: Any) -> MissionItem | int:
 
 
 def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_type: int) -> Fields:
-    """Return the fields of the MISSION_ITEM_INT that sends `peer` an item."""
     frame, command, autocontinue, p1, p2, p3, p4, x, y, z = item
     target = (peer.system, peer.component)
     return (*target, seq, frame, command, int(current), autocontinue, p1, p2, p3, p4, x, y, z, plan_type)
 
 
 def _whole(value: float, scale: float) -> int | None:
-    """Return a scaled coordinate as an integer; None where it fits none, `NOT_GIVEN` for nan."""
+    """Return a scaled coordinate as an integer; `NOT_GIVEN` for nan, `None` if out of range."""
     if isnan(value):
         return NOT_GIVEN
     if not isfinite(value):

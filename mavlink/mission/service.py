@@ -1,4 +1,4 @@
-"""The mission microservice: plans up and down, which item is current, what was reached.
+"""The mission microservice: plans up and down, the current item, progress.
 
 Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans, each
 stored and handled by itself. Uploads are in `upload`.
@@ -31,40 +31,37 @@ from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
 NO_MISSION_TOTAL = 0xFFFF
-"""MISSION_CURRENT.total of a vehicle without a mission."""
+"""MISSION_CURRENT.total without a mission."""
 GUIDED = 2
-"""MISSION_ITEM.current of an item that is no part of a mission but a place to fly to now, as DroneKit's simple_goto."""
+"""MISSION_ITEM.current of an immediate destination outside the mission, as DroneKit's simple_goto sends."""
 FORGOTTEN_AFTER_US = 5_000_000
-"""A reader that requests nothing so long is sent the newest plan after."""
+"""Silence after which a reader gets the newest plan."""
 MAX_READERS = 32
 
 
 class _Reading(NamedTuple):
-    """What a ground station is reading."""
+    """The plan announced to a reader."""
 
     plan: Plan
     received_us: int
 
 
 class Downloads:
-    """Answers MISSION_REQUEST_LIST, MISSION_REQUEST_INT and MISSION_REQUEST, from any number of readers at once.
+    """Answers MISSION_REQUEST_LIST, MISSION_REQUEST_INT and MISSION_REQUEST for any number of readers.
 
-    It remembers which plan was announced to whom, so that nobody receives the first half of one plan and the second
-    half of the one that replaced it meanwhile: "Download a Mission from the Vehicle".
+    A reader gets the announced plan even if it is replaced meanwhile: "Download a Mission from the Vehicle".
     """
 
     def __init__(self) -> None:
-        """Begin with no reader."""
         self._readings: dict[tuple[Peer, int], _Reading] = {}
 
     def begin(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> Send:
-        """Announce `plan`."""
         self._remember(peer, plan_type, plan, now_us)
         target = (peer.system, peer.component)
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
     def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
-        """Return an item of the plan that was announced, or of the newest; `current` is the one being flown of that.
+        """Return an item of the announced or newest plan; `current` is the newest plan's item being flown.
 
         MISSION_REQUEST, too, is answered by a MISSION_ITEM_INT: "Deprecated Types: MISSION_ITEM".
         """
@@ -79,7 +76,6 @@ class Downloads:
         return to(peer, "MISSION_ITEM_INT", *item_fields(peer, seq, plan.items[seq], is_current, plan_type))
 
     def end(self, peer: Peer, plan_type: int) -> None:
-        """Forget what `peer` was reading: it has acknowledged."""
         self._readings.pop((peer, plan_type), None)
 
     def _remember(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> None:
@@ -91,31 +87,24 @@ class Downloads:
 
 
 class Progress(NamedTuple):
-    """Where the mission stands.
-
-    Attributes:
-        state: MISSION_STATE.
-        mode: 1 while the vehicle flies the mission, 2 while it does something else.
-    """
+    """Progress of the mission."""
 
     seq: int = 0
-    state: int = mav.MISSION_STATE_NO_MISSION
-    mode: int = 2
+    state: int = mav.MISSION_STATE_NO_MISSION  # MISSION_STATE
+    mode: int = 2  # 1 in mission mode, otherwise 2
 
 
 Receiver: TypeAlias = Callable[[Any, Peer, int], Iterable[Send]]
 
 
 class Vehicle(NamedTuple):
-    """What the service asks of the vehicle that flies the plans.
+    """The service's interface to the vehicle.
 
     Attributes:
-        load: (plan type, plan): take a new plan; empty where it was cleared.
-        progress: () -> where the mission stands; called at every poll, best returns the same object while nothing
-            changes.
-        set_current: (seq or -1 for the current, reset the counters) -> why not; None if it was done.
-        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME) -> why not;
-            None if it flies there.
+        load: (plan type, plan): take a new plan; empty if cleared.
+        progress: Called at every poll; best returns the same object while unchanged.
+        set_current: (seq or -1 for the current, reset the counters).
+        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME).
     """
 
     load: Callable[[int, Plan], None]
@@ -125,10 +114,9 @@ class Vehicle(NamedTuple):
 
 
 class MissionService:
-    """Holds the three plans and speaks the mission protocol about them: a method for each of its messages."""
+    """Holds the three plans and serves the mission protocol: one method per message."""
 
     def __init__(self, rules: Mapping[int, Rules], vehicle: Vehicle, text: StatusText) -> None:
-        """Begin without plans; `rules` are those of each of the three types."""
         self.plans: dict[int, Plan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
         self._vehicle = vehicle
         self._progress = vehicle.progress
@@ -152,14 +140,13 @@ class MissionService:
         self.handles = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in one message; return what to send at once."""
         receiver = self._receivers.get(message.name)
         sends = self._item(message, peer, now_us) if receiver is None else receiver(message.fields, peer, now_us)
         self._due_us = min(self._stream_us, self._uploads.due_us)
         return sends
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Request what has not come; send which item is current, once a second and when that changes."""
+        """Repeat item requests; send MISSION_CURRENT once a second and on changes."""
         progress = self._progress()
         if now_us < self._due_us and progress is self._shown and not self._outbox:
             return ()
@@ -173,7 +160,7 @@ class MissionService:
         return sends
 
     def reached(self, seq: int) -> None:
-        """Send to all, at the next poll, that an item is reached ("Monitor Mission Progress")."""
+        """Announce a reached item at the next poll ("Monitor Mission Progress")."""
         self._outbox.append(to_all("MISSION_ITEM_REACHED", seq))
 
     def current(self) -> Fields:
@@ -185,16 +172,14 @@ class MissionService:
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Opaque ids of the plans."""
         mission, fence, rally = self.plans.values()
         return mission.id, fence.id, rally.id
 
     def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
-        """Hold the plans that were kept over a restart; the owner gives them to the vehicle that flies them."""
+        """Hold plans kept over a restart, without loading them into the vehicle."""
         self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
 
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> Plan:
-        """Replace a plan by valid items, as an upload does."""
         plan = plan_of(items)
         self.plans[plan_type] = plan
         self._vehicle.load(plan_type, plan)
@@ -202,7 +187,6 @@ class MissionService:
         return plan
 
     def do_set_mission_current(self, command: Command) -> Refusal | None:
-        """Obey MAV_CMD_DO_SET_MISSION_CURRENT."""
         seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
         if not (-1.0 <= seq <= 0xFFFF and seq == int(seq)):
             return Refusal("mission: not a sequence number")
@@ -214,7 +198,6 @@ class MissionService:
         return refusal
 
     def _announce(self) -> None:
-        """Have the next poll send where the mission stands, changed or not."""
         self._stream_us = self._due_us = 0
 
     def _current(self) -> Send:
@@ -285,7 +268,7 @@ class MissionService:
         return [ack(peer, ACCEPTED, plan_type)]
 
     def _set_current(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Go to an item: that it was done, or why not, is broadcast ("Set Current Mission Item")."""
+        """Set the item; broadcast the result ("Set Current Mission Item")."""
         del peer, now_us
         refusal = self._vehicle.set_current(fields.seq, False)
         if refusal is not None:
@@ -294,6 +277,6 @@ class MissionService:
         return ()
 
     def _partial(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Partial lists are "not an official/standardised part of the mission service"."""
+        """Refuse partial lists: "not an official/standardised part of the mission service"."""
         del now_us
         return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]

@@ -1,13 +1,12 @@
-"""Uploads of plans: the vehicle asks for one item after another and replaces the old plan by a whole, valid one.
+"""Uploads of plans: the vehicle requests each item and replaces the old plan by a complete, valid one.
 
 Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to the Vehicle", "Canceling Operations",
-"Timeouts and Retries". Two things it leaves open, or recommends otherwise, follow PX4, because clients rely on them:
+"Timeouts and Retries". Two choices follow PX4, because clients rely on them:
 
-- The specification recommends five retries of 250 ms. Over a link that loses a fifth of the datagrams each way, two of
-  three uploads of 500 items would then fail; so, as PX4, the vehicle asks every 250 ms until five seconds passed
-  without the item.
-- Any MISSION_ACK ends whatever transfer MAVSDK has under way. So none is sent that the ground station does not wait
-  for: not for strays, and not to give up an upload that the ground station has itself given up for something else.
+- The specification recommends five retries of 250 ms. With a fifth of the datagrams lost each way, two of three uploads
+  of 500 items would then fail; so the vehicle repeats its request every 250 ms for five seconds.
+- Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent: not for strays, and not for an
+  upload that the ground station has abandoned for another transfer.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,18 +19,18 @@ from colibri.mavlink.wire.dialect import Message, mav
 ASK_EVERY_US = 250_000
 PATIENCE_US = 5_000_000
 OLD_FORM_AFTER = 2
-"""Requests for an item that go unanswered before every other one is the old MISSION_REQUEST."""
+"""Unanswered requests before every other one is the old MISSION_REQUEST."""
 ANSWER_AGAIN_AFTER_US = 200_000
-"""A copy of the last item that comes sooner was copied by the link; one that comes later was sent again."""
+"""An earlier copy of the last item is a link's duplicate; a later one was sent again."""
 NEVER_US = 2**63
 
 
 class Rules(NamedTuple):
-    """What a plan of one type may hold.
+    """Limits of a plan of one type.
 
     Attributes:
         check_item: (item) -> MAV_MISSION_RESULT, of an item by itself.
-        check_plan: (items) -> MAV_MISSION_RESULT, of all of them, each checked before.
+        check_plan: (items) -> MAV_MISSION_RESULT, of all, each checked before.
     """
 
     check_item: Callable[[MissionItem], int]
@@ -49,7 +48,7 @@ class _Answer(NamedTuple):
 
 
 class _Upload:
-    """One upload under way."""
+    """An upload in progress."""
 
     def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int) -> None:
         self.peer = peer
@@ -64,9 +63,9 @@ class _Upload:
         self._last_form = False
 
     def ask(self, now_us: int) -> Send:
-        """Request the next item, in the form that the ground station answers.
+        """Request the next item in the form that the ground station supports.
 
-        Some know MISSION_REQUEST alone, some nack it (MAVSDK): the new form goes first.
+        Some only support MISSION_REQUEST, some nack it (MAVSDK): the new form comes first.
         """
         old = bool(self._old_form)
         if self._old_form is None and self._asked >= OLD_FORM_AFTER:
@@ -79,7 +78,6 @@ class _Upload:
         return to(self.peer, name, self.peer.system, self.peer.component, len(self.items), self.plan_type)
 
     def take(self, item: MissionItem, now_us: int) -> None:
-        """Take the item that was asked for; the form that brought it is the one to go on with."""
         self.items.append(item)
         self.received_us = now_us
         self.quiet = False
@@ -90,15 +88,13 @@ class _Upload:
             self._old_form = True
 
     def nacked(self) -> None:
-        """Ask in the new form alone: the ground station does not know the other."""
         self._old_form = False
 
 
 class Uploads:
-    """The uploads under way, at most one of a type and one of a ground station; `poll` has to do at `due_us`."""
+    """The uploads in progress, at most one per type and per ground station; `poll` is due at `due_us`."""
 
     def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], Plan]) -> None:
-        """Check items by the `rules` of each type; hand a whole valid plan to `store`."""
         self._rules = rules
         self._store = store
         self._under_way: dict[int, _Upload] = {}
@@ -106,7 +102,7 @@ class Uploads:
         self.due_us = NEVER_US
 
     def begin(self, peer: Peer, plan_type: int, count: int, now_us: int) -> Send:
-        """Obey a MISSION_COUNT. A repeated one begins again; an upload of another peer is not disturbed."""
+        """Handle a MISSION_COUNT: a repeated one restarts; another peer's upload is not disturbed."""
         other = self._under_way.get(plan_type)
         if other is not None and other.peer != peer:
             return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
@@ -120,12 +116,10 @@ class Uploads:
         return self._asking(upload, now_us)
 
     def expects(self, peer: Peer, plan_type: int) -> bool:
-        """Whether `peer` has an upload of a type under way."""
         upload = self._under_way.get(plan_type)
         return upload is not None and upload.peer == peer
 
     def item(self, message: Message, peer: Peer, now_us: int) -> Send | None:
-        """Take a MISSION_ITEM_INT or MISSION_ITEM in."""
         fields = message.fields
         upload = self._under_way.get(fields.mission_type)
         if upload is None or upload.peer != peer:
@@ -145,7 +139,7 @@ class Uploads:
         return self._complete(upload, now_us)
 
     def acknowledged(self, peer: Peer, plan_type: int, result: int, now_us: int) -> Send | None:
-        """Take a MISSION_ACK in: it cancels an upload, or refuses MISSION_REQUEST."""
+        """Handle a MISSION_ACK: it cancels an upload, or refuses MISSION_REQUEST."""
         upload = self._under_way.get(plan_type)
         if upload is None or upload.peer != peer or result == ACCEPTED:  # a late one of a download accepts
             return None
@@ -156,19 +150,17 @@ class Uploads:
         return None
 
     def drop(self, peer: Peer, plan_types: Sequence[int]) -> None:
-        """Forget the uploads of `peer`, of these types."""
         for plan_type in plan_types:
             if self.expects(peer, plan_type):
                 del self._under_way[plan_type]
         self._schedule()
 
     def hush(self, peer: Peer) -> None:
-        """Give the uploads of `peer` up without a word, should it come to that: it has begun something else."""
+        """End the peer's uploads silently if they time out: it has begun another transfer."""
         for upload in self._under_way.values():
             upload.quiet |= upload.peer == peer
 
     def poll(self, now_us: int) -> list[Send]:
-        """Ask again for what has not come; give up what is not coming."""
         sends = []
         for upload in list(self._under_way.values()):
             if now_us < upload.due_us:
@@ -200,7 +192,7 @@ class Uploads:
         return send
 
     def _answer_again(self, fields: Any, peer: Peer, now_us: int) -> Send | None:
-        """Answer the last item of an upload once more if it comes again: the MISSION_ACK may have been lost."""
+        """Repeat the MISSION_ACK if the last item comes again: it may have been lost."""
         answer = self._answers.get(fields.mission_type)
         if answer is None or answer.peer != peer or answer.seq != fields.seq:
             return None
@@ -211,5 +203,4 @@ class Uploads:
 
 
 def ack(peer: Peer, result: int, plan_type: int, plan_id: int = 0) -> Send:
-    """Answer `peer` with a MISSION_ACK."""
     return to(peer, "MISSION_ACK", peer.system, peer.component, result, plan_type, plan_id)

@@ -1,1 +1,1 @@
-"""One MAVLink component: its channels, routing between them, and the interface of its services."""
+"""A MAVLink component: channels, routing, and the interface of its services."""

@@ -1,29 +1,27 @@
-"""A channel: one remote address on one link, with counts of what was received and frames to send."""
+"""A channel: one remote address on one link, with counts and queued frames."""
 
 from colibri.common.types import Address
 from colibri.mavlink.node.router import SOURCES, Source
 from colibri.mavlink.wire.dialect import Codec, Message, sequence_of
 
 DATAGRAM_BYTES = 1400
-"""What fits a datagram on the networks there are."""
+"""Fits a datagram on common networks."""
 _SEQUENCES = 256
 
 
 class Channel:
-    """Numbers, packs and counts the traffic with one remote address.
+    """Numbering, packing and counting of the traffic with one remote address.
 
     Attributes:
-        fixed: Whether it stays open however long it is silent.
-        codec: Its own, for sequence numbers are counted per channel.
-        received: How many messages were received.
-        sent: How many were sent, forwarded ones too.
-        lost: How many never came, by the gaps in their numbers.
-        sources_us: Simulated time of the last message of each of `sources`, µs.
-        active_us: Simulated time when it was opened or a message received last, µs.
+        fixed: Whether it stays open when silent.
+        codec: Its own, as sequence numbers are counted per channel.
+        sent: Sent messages, including forwarded ones.
+        lost: Missing messages, by gaps in sequence numbers.
+        sources_us: Simulated time of each source's last message.
+        active_us: Simulated time of opening or the last message.
     """
 
     def __init__(self, number: int, link: int, address: Address | None, codec: Codec, now_us: int) -> None:
-        """Open at `now_us`."""
         self.number = number
         self.link = link
         self.address = address
@@ -38,7 +36,6 @@ class Channel:
         self._pending: list[bytes] = []
 
     def receive(self, message: Message, now_us: int) -> None:
-        """Count a received message, and the lost ones before it."""
         self.active_us = now_us
         self.received += 1
         self.sources_us[message.source] = now_us
@@ -55,12 +52,11 @@ class Channel:
         self._sequences[message.source] = sequence
 
     def say(self, frame: bytes) -> None:
-        """Send a whole frame."""
         self.sent += 1
         self._pending.append(frame)
 
     def take(self) -> list[bytes]:
-        """Return the datagrams to send, as few as hold all frames, and forget them."""
+        """Return the queued frames in as few datagrams as possible."""
         if not self._pending:
             return []
         datagrams: list[bytes] = []
@@ -77,15 +73,12 @@ class Channel:
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """System and component ids received."""
         return tuple(self._sequences)
 
     @property
     def received_us(self) -> int | None:
-        """Simulated time of the last message, µs; None before the first."""
         return self.active_us if self.received else None
 
     @property
     def dropped(self) -> int:
-        """How many pieces of input were not used."""
         return self.codec.dropped.total()

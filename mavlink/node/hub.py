@@ -1,4 +1,4 @@
-"""Where all links meet: checks and routes messages, dispatches them to the services, sends their answers."""
+"""The hub of all links: checks and routes messages, dispatches them to services, sends their answers."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -12,22 +12,22 @@ from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import Signing
 
 CHANNELS = 32
-"""Channels open at once; of more, the one silent longest that is not fixed is forgotten."""
+"""Limit of open channels; the longest silent one that is not fixed is replaced."""
 FORGET_AFTER_US = 300_000_000
-"""Silence after which a channel that opened by itself is forgotten: what it is sent costs time in every frame."""
+"""Silence before an unfixed channel is closed: sending to it costs time in every frame."""
 _TIDY_EVERY_US = 1_000_000
 _OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
-"""Nobody can have checked, or signed, these."""
+"""Messages without a verifiable CRC or signature."""
 
 
 _TRIES = 3
-"""A service that raises so often when it is polled is not polled again."""
+"""Exceptions in `poll` before a service is switched off."""
 Caught: TypeAlias = Callable[[str, Exception, str], None]
-"""Is told of an exception: the service that raised it, the exception, and what comes of it."""
+"""(service, exception, consequence): reports an exception of a service."""
 
 
 class Outgoing(NamedTuple):
-    """A datagram of whole frames to send, by the number of its link; without an address, where the link knows."""
+    """A datagram and its link's number; without an address, the link chooses it."""
 
     link: int
     address: Address | None
@@ -35,23 +35,20 @@ class Outgoing(NamedTuple):
 
 
 class ChannelObserver(Protocol):
-    """Whoever must know which channels there are."""
+    """Observer of channels; numbers are never reused."""
 
-    def opened(self, channel: int, now_us: int) -> None:
-        """Take note that `channel` was opened."""
+    def opened(self, channel: int, now_us: int) -> None: ...
 
-    def closed(self, channel: int) -> None:
-        """Take note that `channel` is no more; no other will have its number."""
+    def closed(self, channel: int) -> None: ...
 
 
 class Hub:
     """A component on any number of links.
 
-    A channel is one remote address on one link. It opens with the first valid message from there. Services, links and
-    the owner each see some of its methods, so it has more than most classes.
+    A channel is one remote address on one link. It opens with the first valid message from there.
 
     Attributes:
-        accepts_only: The messages dispatched to services for the time being; None for all.
+        accepts_only: Messages dispatched to services for the time being; `None` for all.
     """
 
     def __init__(
@@ -64,9 +61,9 @@ class Hub:
         observers: Sequence[ChannelObserver] = (),
         caught: Caught | None = None,
     ) -> None:
-        """Be component `component_id` of system `system_id`; without `signing` nobody can switch that on.
+        """Create a component; without `signing` SETUP_SIGNING is refused.
 
-        What a service raises goes to `caught`, the others go on; without it, it is raised.
+        An exception of a service goes to `caught` and the others continue; without `caught` it is raised.
         """
         self._own = (system_id, component_id)
         self._polled = tuple(service for service in services if isinstance(service, PolledService))
@@ -90,38 +87,34 @@ class Hub:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The open channels, with what each was used for so far."""
         return tuple(self._channels.values())
 
     @property
     def dropped(self) -> Counter[str]:
-        """What was received and not used, by reason."""
         total = self._dropped_before + self._strangers.dropped
         for channel in self._channels.values():
             total += channel.codec.dropped
         return total
 
     def open(self, link: int, address: Address | None) -> int:
-        """Open a channel that stays; return its number. With no address, it takes in whatever comes on the link."""
+        """Open a fixed channel and return its number; without address, for the whole link."""
         number = self._numbers.get((link, address))
         channel = self._open(link, address) if number is None else self._channels[number]
         channel.fixed = True
         return channel.number
 
     def close(self, link: int, address: Address) -> None:
-        """Forget the channel to `address`, as its connection has ended."""
         number = self._numbers.get((link, address))
         if number is not None:
             self._forget(number)
 
     def accept_only(self, names: frozenset[str] | None) -> None:
-        """Dispatch only messages of these names to services from now on; None: all."""
         self.accepts_only = names
 
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
     ) -> None:
-        """Take in what came on a link from an address; `loopback`: whether from this computer."""
+        """Handle a datagram; `loopback`: whether it is from this computer."""
         self._now_us = now_us
         number = self._numbers.get((link, address), self._numbers.get((link, None)))
         channel = None if number is None else self._channels[number]
@@ -138,7 +131,6 @@ class Hub:
             self._take_in(message, channel, loopback)
 
     def poll(self, now_us: int) -> None:
-        """Have every polled service do what is due at `now_us`."""
         self._now_us = now_us
         for service in self._awake:
             try:
@@ -155,7 +147,6 @@ class Hub:
             self._forget_silent()
 
     def send(self, sends: Iterable[Send]) -> None:
-        """Send messages, each to its channel or to all; one for a channel that is no more is lost."""
         for name, fields, number in sends:
             if number is None:
                 for channel in self._channels.values():
@@ -165,7 +156,6 @@ class Hub:
                 channel.say(channel.codec.encode(name, *fields))
 
     def take_outbox(self) -> list[Outgoing]:
-        """Return the datagrams to send now, and forget them."""
         return [
             Outgoing(channel.link, channel.address, datagram)
             for channel in self._channels.values()
@@ -204,11 +194,9 @@ class Hub:
                     self._tell(service, error, f"{message.name} dropped")
 
     def _choose(self) -> None:
-        """Poll, from now on, the services that are not idle, always in the same order."""
         self._awake = tuple(service for service in self._polled if service not in self._idle)
 
     def _drop(self, service: Service, error: Exception) -> None:
-        """Poll a service no more that has raised too often."""
         self._raised[service] += 1
         self._tell(service, error, "tried again, then off")
         if self._raised[service] >= _TRIES:
@@ -221,12 +209,12 @@ class Hub:
         self._caught(type(service).__name__, error, instead)
 
     def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:
-        """Forward byte for byte, with the signature of whoever signed it: all share the key."""
+        """Forward unchanged with its signature: all share the key."""
         for number in self._router.onward(message.source, target, channel.number):
             self._channels[number].say(message.frame)
 
     def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, loopback: bool) -> None:
-        """Obey SETUP_SIGNING from this computer, addressed to us: it "should never be broadcast"."""
+        """Obey SETUP_SIGNING from this computer to this component: it "should never be broadcast"."""
         fields, signing = message.fields, self._signing
         addressed = target[0] == self._own[0] and self._router.concerns_us(target)
         if not (signing and loopback and addressed):
@@ -238,7 +226,6 @@ class Hub:
             self._seal(each)
 
     def _seal(self, channel: Channel) -> None:
-        """Have a channel sign, with its number for link id, if there is a key."""
         signing = self._signing
         if signing is None or not signing.active:
             channel.codec.seal = None
@@ -246,7 +233,6 @@ class Hub:
             channel.codec.seal = lambda frame: signing.sign(frame, channel.number, self._now_us)
 
     def _admit(self, link: int, address: Address | None) -> Channel | None:
-        """Open a channel to a new sender; None if there are too many that stay."""
         if len(self._channels) >= CHANNELS:
             passing = [channel for channel in self._channels.values() if not channel.fixed]
             if not passing:

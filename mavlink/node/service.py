@@ -1,8 +1,7 @@
-"""What every microservice is: messages and the simulated time in, messages to send out.
+"""The interface of a microservice: messages and the simulated time in, messages out.
 
-A service receives only messages to this component or to all, from another component: the hub filters them.
-Whatever the fields hold, `receive` and `poll` raise nothing. Nobody has checked the values: NaN, infinities, unknown
-enumerations and lies about counts are the service's to refuse.
+A service receives only messages of other components to this component or to all: the hub filters them. Field values are
+unchecked: NaN, infinities, unknown enumerations and wrong counts must be refused, and never raise.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,7 +14,7 @@ Fields: TypeAlias = tuple[Any, ...]
 
 
 class Peer(NamedTuple):
-    """Who sent a message, and the number of the channel (a remote address on a link) that an answer takes."""
+    """A sender, with the number of its channel (a remote address on a link)."""
 
     channel: int
     system: int
@@ -23,44 +22,36 @@ class Peer(NamedTuple):
 
 
 class Send(NamedTuple):
-    """A message to send.
-
-    Attributes:
-        name: Message name as MAVLink has it, "COMMAND_ACK".
-        channel: The channel to take; None for all of them.
-    """
+    """An outgoing message."""
 
     name: str
     fields: Fields
-    channel: int | None = None
+    channel: int | None = None  # `None` for all
 
 
 IDLE: Final[Sequence[Send]] = []
-"""Nothing, of a service that has nothing under way either: it is not polled again before it receives a message."""
+"""Result of an idle service, which is not polled again before it receives a message."""
 
 
 class Service(Protocol):
-    """A microservice, and the names of the messages that its `receive` is to be given."""
+    """A microservice for the messages in `handles`."""
 
     handles: frozenset[str]
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in one message; return what to send at once."""
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]: ...
 
 
 @runtime_checkable
 class PolledService(Service, Protocol):
-    """A microservice that sends by itself, or later than it received."""
+    """A microservice that also sends by itself, or later."""
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Do what is due at `now_us`; return what to send, or `IDLE`. Called once a frame of the plant."""
+        """Return the due messages, or `IDLE`; called at every frame of the plant."""
 
 
 def to(peer: Peer, name: str, *fields: Any) -> Send:
-    """Return a message to `peer`."""
     return Send(name, fields, peer.channel)
 
 
 def to_all(name: str, *fields: Any) -> Send:
-    """Return a message to all channels."""
     return Send(name, fields)

@@ -1,1 +1,1 @@
-"""Parameters: what they are, the microservice, their file, their packed file, their metadata."""
+"""Parameters: definitions and values, the microservice, text file, packed file, metadata."""

@@ -1,6 +1,6 @@
-"""Parameters as text in QGroundControl's format, so that ground stations load and save the very same files.
+"""Parameter files in QGroundControl's text format.
 
-A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, with tabs between them; `#` begins a remark.
+A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, separated by tabs; `#` begins a comment.
 """
 
 from colibri.mavlink.errors import MavlinkError
@@ -13,11 +13,11 @@ _HEADER = "# Onboard parameters for Vehicle {system}\n#\n# Vehicle-Id Component-
 
 
 class ParameterFileError(MavlinkError):
-    """A parameter file that cannot be used; the message names line and parameter."""
+    """An invalid parameter file; the message names line and parameter."""
 
 
 def write(parameters: Parameters, system_id: int = 1) -> str:
-    """Return the parameters that are not at their defaults as a file."""
+    """Return the parameters that differ from their defaults as a file."""
     lines = [_HEADER.format(system=system_id)]
     for parameter in parameters:
         value = parameters[parameter.name]
@@ -28,13 +28,10 @@ def write(parameters: Parameters, system_id: int = 1) -> str:
 
 
 def read(text: str, parameters: Parameters) -> dict[str, Value]:
-    """Return the values of a file, each of which `parameters` may have.
-
-    Lines of other components than the autopilot, and read-only parameters, are passed over: a ground station saves
-    them too.
+    """Return the valid values of a file, without other components' and read-only parameters.
 
     Raises:
-        ParameterFileError: A line is none, or a parameter is unknown, given twice, or cannot have its value.
+        ParameterFileError: A line is malformed, or a parameter is unknown, repeated, or has an invalid value.
     """
     values: dict[str, Value] = {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -57,7 +54,6 @@ def read(text: str, parameters: Parameters) -> dict[str, Value]:
 
 
 def _parameter(cells: list[str], parameters: Parameters) -> Parameter | None:
-    """Return which parameter a line is about; None where it is another component's."""
     for what, cell in zip(("vehicle", "component"), cells, strict=False):
         if not cell.isascii() or not cell.isdigit() or int(cell) > _MAX_ID:
             raise ValueError(f"no {what} id: {cell!r}")
@@ -89,5 +85,5 @@ def _choices(parameter: Parameter) -> str:
 
 
 def _text(parameter: Parameter, value: Value) -> str:
-    """Return a value so that its 32 bits can be read back."""
+    """Return a value with all 32 bits."""
     return str(value) if parameter.kind == Kind.INT else f"{value:.9g}"

@@ -1,7 +1,7 @@
-"""The component metadata protocol: where ground stations can read what this vehicle and its parameters are.
+"""The component metadata protocol: descriptions of this vehicle and its parameters.
 
-Specification: https://mavlink.io/en/services/component_metadata.html. The files themselves go by file transfer. Their
-version is 1: QGroundControl takes no other.
+Specification: https://mavlink.io/en/services/component_metadata.html. The files are fetched by FTP. Their version is 1,
+the only one that QGroundControl supports.
 """
 
 import json
@@ -24,17 +24,15 @@ _UINT32_MAX = 0xFFFFFFFF
 
 
 class Metadata:
-    """What describes this component; the general file names the others with their checksums."""
+    """Description of this component; the general file lists the others with their checksums."""
 
     def __init__(self, parameters: bytes) -> None:
-        """Describe the component by the JSON of its parameters, which never changes."""
         self._parameters = parameters
         types = [{"type": TYPE_PARAMETER, "uri": f"mftp:///{PARAMETERS}", "fileCrc": checksum(parameters)}]
         self.general = json.dumps({"version": _VERSION, "metadataTypes": types}).encode()
 
     @property
     def files(self) -> Mapping[str, Generator]:
-        """The files to show, by path: for the vehicle's `Tree`."""
         return {GENERAL: lambda _: self.general, PARAMETERS: lambda _: self._parameters}
 
     def provide(self, peer: Peer, now_us: int) -> list[Send]:
@@ -44,18 +42,17 @@ class Metadata:
 
 
 def checksum(data: bytes) -> int:
-    """Return MAVLink's CRC32, which begins with 0 and inverts nothing: https://mavlink.io/en/guide/crc.html."""
+    """Return MAVLink's CRC32, with initial value 0 and without inversion: https://mavlink.io/en/guide/crc.html."""
     return crc32(data, _UINT32_MAX) ^ _UINT32_MAX
 
 
 def metadata_json(parameters: Iterable[Parameter]) -> bytes:
-    """Return what parameters mean as a file of the MAVLink repository's component_metadata/parameter.schema.json."""
+    """Return descriptions of parameters by MAVLink's component_metadata/parameter.schema.json."""
     content = {"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]}
     return json.dumps(content, separators=(",", ":")).encode()
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:
-    """Return a parameter as the schema has it; what is at the schema's default is left out."""
     entry: dict[str, Any] = {
         "name": parameter.name,
         "type": _TYPES[parameter.kind],
@@ -82,5 +79,5 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 
 
 def _shortest(parameter: Parameter, value: float) -> float:
-    """Return a number as it was meant before it was rounded to 32 bits, if seven digits hold it."""
+    """Return the number before its rounding to 32 bits, if seven digits suffice."""
     return value if parameter.kind == Kind.INT else float(f"{value:.7g}")

@@ -1,4 +1,4 @@
-"""`@PARAM/param.pck`: all parameters as one compact file, which ground stations fetch by FTP.
+"""`@PARAM/param.pck`: all parameters in one compact file, fetched by FTP.
 
 Specification: https://mavlink.io/en/services/parameter_ftp.html.
 """
@@ -8,7 +8,7 @@ from struct import Struct
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, bits_of
 
 BLOCK_BYTES = 239
-"""Of every read that a client makes: no value lies across the border of two."""
+"""Read size of clients: a value must not cross a block boundary."""
 
 _HEADER = Struct("<HHH")
 """Magic, parameters in this file, parameters in all."""
@@ -20,7 +20,7 @@ _MAX_COMMON_CHARS = 15
 
 
 def packed(parameters: Parameters, query: str = "") -> bytes | None:
-    """Return the file as the part of its path behind the question mark asks for it; None where it cannot be."""
+    """Return the file for the query part of its path; `None` if that is invalid."""
     wanted = {"withdefaults": 0, "start": 0, "count": 0}
     for pair in filter(None, query.split("&")):
         key, _, digits = pair.partition("=")
@@ -50,7 +50,7 @@ def packed(parameters: Parameters, query: str = "") -> bytes | None:
 
 
 def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
-    """Return type, lengths, and what of the name is not as in the one before: at least a character."""
+    """Return type, lengths, and the name's part that differs from the previous name, at least a character."""
     maximum = min(len(before), len(parameter.name) - 1, _MAX_COMMON_CHARS)
     common = next((i for i in range(maximum) if before[i] != parameter.name[i]), maximum)
     own = parameter.name[common:].encode()

@@ -1,6 +1,6 @@
-"""The parameter microservice, the vehicle's side: every parameter listed, read one by one, and set.
+"""The parameter microservice of the vehicle: list, read and set.
 
-Specification: https://mavlink.io/en/services/parameter.html. Values are encoded bytewise, as PX4 has them
+Specification: https://mavlink.io/en/services/parameter.html. Values are encoded bytewise, as PX4's
 (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE), in two types: INT32 and REAL32.
 """
 
@@ -12,17 +12,17 @@ from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parame
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
 INTERVAL_US = 2_000
-"""Between two parameters of a list: 150 of them take 0.3 s."""
+"""Between two parameters of a list: 150 take 0.3 s."""
 MAX_AT_ONCE = 20
 BY_ID = -1
-"""param_index of who names a parameter by its id."""
+"""param_index of a request by name."""
 _NOT_EXACT_IN_FLOAT = 2**24
-"""From here on, a float can be the nearest of two integers."""
+"""From here on, a float may stand for two integers."""
 
 
 @dataclass(slots=True)
 class _Listing:
-    """A list on its way along a channel: which parameter is next, how many are left, when the last one was due."""
+    """A list being sent: next parameter, number left, time of the last one."""
 
     index: int
     left: int
@@ -30,17 +30,15 @@ class _Listing:
 
 
 class ParameterService:
-    """Answers for `parameters`."""
+    """Lists, reads and sets parameters."""
 
     handles = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
 
     def __init__(self, parameters: Parameters) -> None:
-        """Serve `parameters`."""
         self._parameters = parameters
         self._listings: dict[int, _Listing] = {}
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Answer a request."""
         fields = message.fields
         if message.name == "PARAM_REQUEST_LIST":
             self._begin_list(peer, now_us)
@@ -50,13 +48,13 @@ class ParameterService:
         return self._set(fields.param_id, fields.param_type, param_bits(message), peer)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Send what is due of each list: "allow breaks between each message" (read all parameters)."""
+        """Send the due parameters of each list: "allow breaks between each message" (read all parameters)."""
         if not self._listings:
             return IDLE
         return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
 
     def _begin_list(self, peer: Peer, now_us: int) -> None:
-        """Begin a list. Who asks while one is on its way gets the rest of it, then what went before."""
+        """Begin a list; a repeated request continues it to its end, then from the start."""
         listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
         listing.left = len(self._parameters)
 
@@ -75,7 +73,6 @@ class ParameterService:
         return sends
 
     def _read(self, name: str, index: int, peer: Peer) -> Send:
-        """Answer by PARAM_VALUE, or by PARAM_ERROR where there is no such parameter (read single parameter)."""
         if index == BY_ID:
             known = self._parameters.index(name)
         else:
@@ -85,7 +82,7 @@ class ParameterService:
         return self._value(known, peer.channel)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
-        """Set a parameter, and send its value to all; a refusal is sent to the requester first (write parameters)."""
+        """Set a parameter and send its value to all; a refusal goes to the requester first."""
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:
@@ -104,12 +101,12 @@ class ParameterService:
 
 
 def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamError:
-    """Return the value that somebody sent.
+    """Return the value of a PARAM_SET.
 
-    The type must be the parameter's, with one exception. Who has read the packed file (MAVProxy), or has no types
-    (DroneKit), sets integers as REAL32 and relies on the vehicle to convert them:
-    https://mavlink.io/en/services/parameter_ftp.html, downloading parameters. That is obeyed where a float can mean
-    but one integer.
+    Clients of the packed file (MAVProxy), or without types (DroneKit), send integers as REAL32 and expect conversion
+    (https://mavlink.io/en/services/parameter_ftp.html). That is accepted if the float stands for one integer only;
+    other
+    types must match.
     """
     if wire_type not in tuple(Kind):
         return ParamError.TYPE_UNSUPPORTED

@@ -1,4 +1,4 @@
-"""The parameters of a vehicle: what they are called, may be and are; two kinds, as 32 bits each on the wire."""
+"""Parameters of a vehicle: definitions and values, in two types of 32 bits on the wire."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 from colibri.mavlink.wire.dialect import mav
 
 Value: TypeAlias = int | float
-"""An int of 32 bits, or a float that a float of 32 bits holds exactly."""
+"""An int of 32 bits, or a float exact in 32 bits."""
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 FLOAT32_MAX = 3.4028234663852886e38
@@ -27,7 +27,7 @@ class Kind(IntEnum):
 
 
 class ParamError(IntEnum):
-    """Why a parameter is not what somebody wants: MAV_PARAM_ERROR, of which pymavlink has only the first half."""
+    """MAV_PARAM_ERROR, of which pymavlink defines only the first half."""
 
     DOES_NOT_EXIST = 1
     VALUE_OUT_OF_RANGE = 2
@@ -38,23 +38,23 @@ class ParamError(IntEnum):
 
 
 class Prepared(NamedTuple):
-    """A change that may be made, and what was made for it, so that nobody makes it again; None for nothing."""
+    """An accepted change, with the object built to validate it (reused when adopted), if any."""
 
     made: object | None = None
 
 
 Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
-"""(the parameter that is to change, all values with that one in) -> that it may, or why not. It changes nothing."""
+"""(name, all new values) -> acceptance or refusal of a change; without side effects."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """What a parameter is. Numbers are rounded to what 32 bits hold.
+    """Definition of a parameter. Numbers are rounded to 32 bits.
 
     Attributes:
         name: At most 16 capitals, digits and underscores.
-        decimals: How many a ground station should show.
-        values: The only values that it may have, and what each stands for; none: all between the bounds.
+        decimals: For display in a ground station.
+        values: Valid values and their meanings; empty if all between the bounds are valid.
     """
 
     name: str
@@ -72,11 +72,6 @@ class Parameter:
     read_only: bool = False
 
     def __post_init__(self) -> None:
-        """Round, and check that the default may be.
-
-        Raises:
-            ValueError: It may not, or the name is none.
-        """
         if not fullmatch(_NAME, self.name):
             raise ValueError(f"{self.name}: no name of a parameter")
         if self.kind == Kind.INT:
@@ -89,7 +84,6 @@ class Parameter:
             raise ValueError(f"{self.name}: its default {self.default} is not among the values that it may have")
 
     def refusal(self, value: Value) -> ParamError | None:
-        """Return why this value cannot be; None if it can."""
         if self.kind == Kind.INT and not isinstance(value, int):
             return ParamError.TYPE_MISMATCH
         if not isfinite(value) or not self.minimum <= value <= self.maximum:
@@ -100,18 +94,13 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters in the order of their names, and their values; `prepare` is called before one changes.
+    """The parameters sorted by name, and their values; `prepare` is called before a change.
 
     Attributes:
-        revision: How often a value has changed: whoever adopts changes compares it with the one adopted last.
+        revision: Number of changes so far.
     """
 
     def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
-        """Begin with every parameter at its default.
-
-        Raises:
-            ValueError: Two have one name.
-        """
         self._definitions = tuple(sorted(definitions, key=lambda parameter: parameter.name))
         self._index = {parameter.name: index for index, parameter in enumerate(self._definitions)}
         if len(self._index) < len(self._definitions):
@@ -122,58 +111,41 @@ class Parameters:
         self.revision = 0
 
     def trial(self, values: Mapping[str, Value]) -> "Parameters":
-        """Return the same parameters at other values, to try these; nobody is asked."""
+        """Return a copy with other values, for a trial; `prepare` is not called."""
         trial = Parameters(self._definitions)
         trial.load(values)
         return trial
 
     def ask(self, prepare: Prepare) -> None:
-        """Have `prepare` asked before a value changes from now on."""
         self.prepare = prepare
 
     def __len__(self) -> int:
-        """Return how many there are."""
         return len(self._definitions)
 
     def __iter__(self) -> Iterator[Parameter]:
-        """Yield what they are, in order."""
         return iter(self._definitions)
 
     def __contains__(self, name: object) -> bool:
-        """Whether there is a parameter of that name."""
         return name in self._index
 
     def __getitem__(self, name: str) -> Value:
-        """Return the value of a parameter.
-
-        Raises:
-            KeyError: There is none of that name.
-        """
         return self._values[name]
 
     def default(self, name: str) -> Value:
-        """Return the default of a parameter.
-
-        Raises:
-            KeyError: There is none of that name.
-        """
         return self._definitions[self._index[name]].default
 
     @property
     def values(self) -> Mapping[str, Value]:
-        """All values as they are now."""
         return dict(self._values)
 
     def at(self, index: int) -> Parameter | None:
-        """Return what the parameter at `index` is; None where there is none."""
         return self._definitions[index] if 0 <= index < len(self._definitions) else None
 
     def index(self, name: str) -> int | None:
-        """Return the place of a parameter; None where there is none of that name."""
         return self._index.get(name)
 
     def set(self, name: str, value: Value) -> ParamError | None:
-        """Change a value, if it may be that; return why not. What it is already, it may always be."""
+        """Change a value, if valid and accepted by `prepare`; return the refusal. The present value is always valid."""
         index = self._index.get(name)
         if index is None:
             return ParamError.DOES_NOT_EXIST
@@ -194,18 +166,18 @@ class Parameters:
         return None
 
     def load(self, values: Mapping[str, Value]) -> None:
-        """Take over values that `parameter_file.read` found fit, all at once: `prepare` is not asked."""
+        """Set validated values at once, without calling `prepare`."""
         for name, value in values.items():
             if value != self._values[name]:
                 self._change(name, value)
 
     def reset(self) -> None:
-        """Set every parameter to its default, as far as it may change now."""
+        """Set every parameter to its default, unless refused."""
         for definition in self._definitions:
             self.set(definition.name, definition.default)
 
     def take_made(self) -> object | None:
-        """Return the newest object that was made for a change since the last call; None for nothing."""
+        """Return the newest object made for a change since the last call."""
         made, self._made = self._made, None
         return made
 
@@ -215,7 +187,7 @@ class Parameters:
 
 
 def float32(value: float) -> float:
-    """Return the nearest number that 32 bits hold, infinite where that lies beyond them."""
+    """Return the nearest 32-bit float; infinite on overflow."""
     try:
         (rounded,) = _REAL.unpack(_REAL.pack(value))
     except OverflowError:
@@ -224,12 +196,11 @@ def float32(value: float) -> float:
 
 
 def bits_of(kind: Kind, value: Value) -> int:
-    """Return the 32 bits of a value, as an unsigned integer: bytewise, whatever its kind."""
+    """Return the 32 bits of a value as an unsigned integer."""
     (bits,) = _BITS.unpack(_INT.pack(value) if kind == Kind.INT else _REAL.pack(value))
     return int(bits)
 
 
 def value_of(kind: Kind, bits: int) -> Value:
-    """Return the value that 32 bits stand for."""
     (value,) = (_INT if kind == Kind.INT else _REAL).unpack(_BITS.pack(bits))
     return int(value) if kind == Kind.INT else float(value)

@@ -1,1 +1,1 @@
-"""The MAVLink microservices of a vehicle, each a state machine without input or output, in a file of its own."""
+"""A vehicle's MAVLink microservices, each a state machine without I/O in its own file."""

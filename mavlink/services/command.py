@@ -20,15 +20,15 @@ UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 UNSUPPORTED_MAV_FRAME = 9
-"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out."""
+"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects."""
 
 PENDING = Refusal(result=-1)
-"""The answer to a command that is obeyed within a few frames: its sender receives nothing before `finish`."""
+"""Result of a command that takes a few frames: its sender gets the answer with `finish`."""
 
 PROGRESS_UNKNOWN = 0xFF
-"""COMMAND_ACK.progress of a command that is obeyed later."""
+"""COMMAND_ACK.progress of a pending command."""
 NOT_GIVEN = 2**31 - 1
-"""What x and y of a COMMAND_INT hold where a COMMAND_LONG would hold nan."""
+"""The integer x and y of a COMMAND_INT for nan in a COMMAND_LONG."""
 DEGREES = 1e-7
 
 GLOBAL_FRAMES: frozenset[int] = frozenset(
@@ -41,10 +41,11 @@ GLOBAL_FRAMES: frozenset[int] = frozenset(
         mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
     )
 )
-"""Frames whose x and y are latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name
-ends in INT: so does everybody send them."""
+"""Frames with latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name ends
+in INT, as all clients send them.
+"""
 PLACES: frozenset[int] = GLOBAL_FRAMES | {mav.MAV_FRAME_MISSION}
-"""Frames of a command that goes to a place; MAV_FRAME_MISSION is no frame: the command then names no place."""
+"""Frames of a command with a place; MAV_FRAME_MISSION means without one."""
 
 PROGRESS_EVERY_US = 1_000_000
 REMEMBERED_FOR_US = 10_000_000
@@ -53,30 +54,23 @@ SAME_REASON_AFTER_US = 1_000_000
 
 
 class Command(NamedTuple):
-    """A command, COMMAND_LONG and COMMAND_INT alike.
+    """A command, COMMAND_LONG and COMMAND_INT alike; nan in a parameter means not given."""
 
-    Attributes:
-        id: MAV_CMD.
-        p1, p2, p3, p4: Parameters one to four; nan in any of the seven means that it is not given.
-        x, y, z: Five to seven; x and y in degrees where they are a place, nan where a COMMAND_INT has INT32_MAX.
-        frame: MAV_FRAME of a COMMAND_INT; None of a COMMAND_LONG.
-    """
-
-    id: int
+    id: int  # MAV_CMD
     p1: float
     p2: float
     p3: float
     p4: float
-    x: float
-    y: float
-    z: float
-    frame: int | None
+    x: float  # parameter five, degrees if a latitude
+    y: float  # parameter six, degrees if a longitude
+    z: float  # parameter seven
+    frame: int | None  # MAV_FRAME; `None` of a COMMAND_LONG
     peer: Peer
     now_us: int
 
 
 Handler: TypeAlias = Callable[[Command], Refusal | None]
-"""Obeys one kind of command, or refuses it. Must check every parameter that it uses: they may be anything."""
+"""Executes one kind of command or refuses it. Must check every parameter that it uses."""
 
 
 @dataclass(slots=True)
@@ -93,12 +87,11 @@ class _Answered(NamedTuple):
 
 
 class CommandService:
-    """Hands commands to their handlers and acknowledges each to its sender; denies all, where `closed` for a reason."""
+    """Passes commands to their handlers and acknowledges each to its sender; denies all while `closed` for a reason."""
 
     handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 
     def __init__(self, handlers: Mapping[int, Handler], text: StatusText) -> None:
-        """Obey the commands of `handlers`, by MAV_CMD; send with `text` why one is refused."""
         self._handlers = handlers
         self._text = text
         self.closed = ""
@@ -108,11 +101,9 @@ class CommandService:
         self._said: tuple[str, int] = ("", -SAME_REASON_AFTER_US)
 
     def close(self, reason: str) -> None:
-        """Deny every command for the time being, for a reason; without one, obey."""
         self.closed = reason
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Obey a command, or cancel one."""
         fields = message.fields
         if message.name == "COMMAND_CANCEL":
             # Nothing can be cancelled: what is in progress goes on. "If it has already completed [it] can be ignored".
@@ -130,7 +121,7 @@ class CommandService:
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Report once a second the commands in progress."""
+        """Report commands in progress once a second."""
         if self._report_at_us is None:
             return IDLE
         if 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
@@ -144,7 +135,7 @@ class CommandService:
         return sends
 
     def finish(self, command_id: int, peer: Peer, refusal: Refusal | None) -> list[Send]:
-        """Return the last COMMAND_ACK of the command of `peer` that was in progress; nothing if none was."""
+        """Return the final COMMAND_ACK of the peer's command in progress, if any."""
         running = self._running.get(command_id)
         if running is None or running.command.peer != peer:
             return []
@@ -154,7 +145,7 @@ class CommandService:
         return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
     def _obey(self, handler: Handler, command: Command, confirmation: int) -> list[Send]:
-        """Obey a command unless it was sent again only because its answer got lost, or another is in progress.
+        """Execute a command unless it is a repetition after a lost answer, or another is in progress.
 
         "If no acknowledgement is received the command must be automatically re-sent", with a larger confirmation.
         """
@@ -178,7 +169,6 @@ class CommandService:
         self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
 
     def _answered_with(self, command: Command, confirmation: int, refusal: Refusal | None, at_us: int) -> Send:
-        """Remember the answer to a command, and return its COMMAND_ACK."""
         key = (command.peer, command.id)
         self._answered.pop(key, None)
         if len(self._answered) >= MAX_REMEMBERED:
@@ -187,7 +177,7 @@ class CommandService:
         return _ack(command.id, command.peer, ACCEPTED if refusal is None else refusal.result)
 
     def _reason(self, refusal: Refusal | None, now_us: int) -> list[Send]:
-        """Send to all why a command was refused, the same reason not more than once a second."""
+        """Send the reason of a refusal to all, the same one at most once a second."""
         if refusal is None or not refusal.reason:
             return []
         reason, at_us = self._said
@@ -198,7 +188,7 @@ class CommandService:
 
 
 def _goes_to_a_place(number: int) -> bool:
-    """Whether x and y of a command are a place, as MAVLink defines it: its frame then counts, and only then."""
+    """Whether x and y of a command are a place by MAVLink's definition; only then its frame counts."""
     definition = mav.enums["MAV_CMD"].get(number)
     return definition is not None and definition.has_location
 
@@ -209,7 +199,7 @@ def _from_long(fields: Any, peer: Peer, now_us: int) -> Command:
 
 
 def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> Command:
-    """Bring x and y of a place into degrees: "PARAM5 / global: latitude * 10^7"; MAV_FRAME_MISSION names no place."""
+    """Convert x and y of a place to degrees: "PARAM5 / global: latitude * 10^7"."""
     scale = 1.0
     if goes_to_a_place:
         scale = DEGREES if fields.frame in GLOBAL_FRAMES else nan
@@ -219,7 +209,7 @@ def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> Co
 
 
 def _parameters(command: Command) -> tuple[str, ...]:
-    """Return what distinguishes a command from another of its kind; as text, in which nan equals itself."""
+    """Return the parameters as text, so that nan equals itself."""
     return tuple(map(repr, command[1:9]))
 
 
@@ -229,6 +219,5 @@ def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bo
 
 
 def _ack(command_id: int, peer: Peer, result: int) -> Send:
-    """Return the COMMAND_ACK to the sender. Only a command in progress has a progress."""
     progress = PROGRESS_UNKNOWN if result == IN_PROGRESS else 0
     return to(peer, "COMMAND_ACK", command_id, result, progress, 0, peer.system, peer.component)

@@ -1,8 +1,7 @@
-"""The identity that the autopilot sends.
+"""The autopilot's identity.
 
-Ground stations choose how they speak to a vehicle by MAV_AUTOPILOT. As `px4` they offer everything that they can do
-with a PX4, whose custom modes and conventions Colibri follows; as `generic` only what needs no such knowledge. Either
-way AUTOPILOT_VERSION and the text at the start name Colibri.
+Ground stations adapt to MAV_AUTOPILOT. As `px4` they offer all features of a PX4, whose custom modes and conventions
+Colibri follows; as `generic` only common ones. Either way AUTOPILOT_VERSION and the text at the start name Colibri.
 """
 
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ CAPABILITIES = bits(
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """How the vehicle introduces itself; `speaks` is the release whose interface it follows, None for its own."""
+    """An identity; `speaks` is the release of the emulated interface."""
 
     name: str
     autopilot: int
@@ -37,17 +36,18 @@ IDENTITIES = {identity.name: identity for identity in (PX4, GENERIC)}
 
 
 def version_of(text: str) -> Triple:
-    """Return major, minor and patch of a version like "0.2.1"; zeros for what is missing or no number."""
+    """Return major, minor and patch of a version like "0.2.1"; zeros if missing or not numeric."""
     numbers = [int(part) & 0xFF if part.isdecimal() else 0 for part in text.split(".")[:3]]
     major, minor, patch = (*numbers, 0, 0, 0)[:3]
     return (major, minor, patch)
 
 
 def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fields:
-    """Return the fields of AUTOPILOT_VERSION (148) of Colibri `version`, flown as `system_id`.
+    """Return the fields of AUTOPILOT_VERSION (148).
 
-    The custom version begins with patch, minor and major of Colibri, where clients look for a vendor's version, and
-    goes on with its name. No version is an official one: ground stations would ask to update it to PX4's latest.
+    The custom version is patch, minor and major of Colibri, the place of a vendor's version, then its name. Versions
+    are
+    never marked as official: ground stations would offer an update to PX4's latest.
     """
     major, minor, patch = version
     own = _packed(version)
@@ -58,7 +58,6 @@ def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fi
 
 
 def banner(identity: Identity, version: str) -> str:
-    """Say who this is, whatever its identity."""
     spoken = "" if identity.speaks is None else f", speaking as {identity.name.upper()}"
     return f"Colibri {version}{spoken}"
 

@@ -1,7 +1,7 @@
-"""Messages that set what others set by commands: the origin, home, the mode.
+"""Messages to set origin, home and mode.
 
-SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the very integers that were sent, as MAVSDK waits for them;
-SET_HOME_POSITION and SET_MODE are old ways of DO_SET_HOME and DO_SET_MODE, which ground stations still use.
+SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the same integers, as MAVSDK expects. SET_HOME_POSITION and
+SET_MODE are predecessors of DO_SET_HOME and DO_SET_MODE, still in use.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,7 +17,7 @@ _MIN_HEIGHT_MM, _MAX_HEIGHT_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
-    """What obeys; each returns why not, None if it is done. `mode` takes base mode and custom mode."""
+    """Handlers that return a refusal or `None`. `mode` takes base mode and custom mode."""
 
     origin: Callable[[Geodetic], Refusal | None]
     home: Callable[[Geodetic], Refusal | None]
@@ -30,12 +30,10 @@ class OriginService:
     handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 
     def __init__(self, setters: Setters, text: StatusText) -> None:
-        """Hand what is asked for to `setters`; report why one is refused."""
         self._setters = setters
         self._text = text
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in one message."""
         del peer
         fields = message.fields
         if message.name == "SET_MODE":

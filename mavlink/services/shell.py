@@ -1,4 +1,4 @@
-"""A shell over SERIAL_CONTROL: a line in, text out; a few commands that only report, none that reaches the system.
+"""A shell over SERIAL_CONTROL with a few commands that only report; without access to the system.
 
 Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#SERIAL_CONTROL, device SHELL.
 """
@@ -21,22 +21,20 @@ _REPLY: int = mav.SERIAL_CONTROL_FLAG_REPLY
 _RESPOND: int = mav.SERIAL_CONTROL_FLAG_RESPOND
 
 Command: TypeAlias = Callable[[list[str]], str]
-"""Answers what was typed behind its name, with lines of text."""
+"""(arguments) -> lines of text."""
 
 
 class Shell:
-    """Answers lines."""
+    """Runs the shell's commands."""
 
     handles = frozenset({"SERIAL_CONTROL"})
 
     def __init__(self, commands: Mapping[str, Command]) -> None:
-        """Know `commands`, by name, and "help"."""
         self._commands = {"help": self._help, **commands}
         self._lines: dict[Peer, bytes] = {}
         self._answers: dict[Peer, bytes] = {}
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in what is typed. A reply of another shell is none of it."""
         del now_us
         fields = message.fields
         if fields.device != _SHELL or fields.flags & _REPLY:
@@ -54,7 +52,6 @@ class Shell:
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Send more of the answers."""
         del now_us
         return self._due() if self._answers else IDLE
 
@@ -71,7 +68,7 @@ class Shell:
         return sends
 
     def _answer(self, line: bytes) -> str:
-        """Return what a line is answered with: itself, as a terminal shows what is typed, and the text."""
+        """Return the echo of a line and the command's text."""
         typed = "".join(letter for letter in line.decode(errors="replace") if letter.isprintable())
         name, *arguments = typed.split() or [""]
         if not name:

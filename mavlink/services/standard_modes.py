@@ -1,4 +1,4 @@
-"""The standard modes microservice: which modes there are, and setting one that means the same on every vehicle.
+"""The standard modes microservice: lists the modes, and sets those defined alike on every vehicle.
 
 Specification: mavlink.io/en/services/standard_modes.html. CURRENT_MODE is telemetry.
 """
@@ -13,27 +13,21 @@ from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
 
 NAME_BYTES = 34
-"""Of AVAILABLE_MODES.mode_name, which ends with a zero."""
+"""Of AVAILABLE_MODES.mode_name without its final zero."""
 
 
 class ModeInfo(NamedTuple):
-    """A flight mode, as ground stations list it.
-
-    Attributes:
-        custom_mode: Its number in HEARTBEAT.
-        standard_mode: MAV_STANDARD_MODE; 0 where it is none.
-        advanced: Whether it is "harder to fly".
-    """
+    """A flight mode, as listed for ground stations."""
 
     name: str
-    custom_mode: int
-    standard_mode: int = 0
+    custom_mode: int  # as in HEARTBEAT
+    standard_mode: int = 0  # MAV_STANDARD_MODE or 0
     selectable: bool = True
-    advanced: bool = False
+    advanced: bool = False  # "harder to fly"
 
 
 SetMode: TypeAlias = Callable[[int, Command], Refusal | None]
-"""Flies the custom mode of the first argument, as the command asks."""
+"""Sets the given custom mode for a command."""
 
 
 class StandardModes:
@@ -42,16 +36,13 @@ class StandardModes:
     handles: frozenset[str] = frozenset()
 
     def __init__(self, modes: Sequence[ModeInfo], set_mode: SetMode) -> None:
-        """Offer `modes`; `set_mode` sets one."""
         self._modes = tuple(modes)
         self._set_mode = set_mode
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:  # noqa: ARG002
-        """Everything comes as a command."""
         return ()
 
     def handlers(self) -> dict[int, Handler]:
-        """Return who obeys the commands of this service."""
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
 
     def available_modes(self, command: Command) -> list[Send] | Refusal:
@@ -65,7 +56,6 @@ class StandardModes:
         return [to(command.peer, "AVAILABLE_MODES", *self._fields(int(index)))]
 
     def monitor(self, command: Command) -> list[Send]:
-        """Answer REQUEST_MESSAGE of AVAILABLE_MODES_MONITOR."""
         return [to(command.peer, "AVAILABLE_MODES_MONITOR", 0)]
 
     def _fields(self, index: int) -> Fields:
@@ -76,7 +66,7 @@ class StandardModes:
         return (len(self._modes), index, mode.standard_mode, mode.custom_mode, properties, name)
 
     def _set_standard_mode(self, command: Command) -> Refusal | None:
-        """MAV_CMD_DO_SET_STANDARD_MODE (262): "MAV_RESULT_FAILED if the mode is not supported by the vehicle"."""
+        """Obey MAV_CMD_DO_SET_STANDARD_MODE: "FAILED if the mode is not supported by the vehicle"."""
         for mode in self._modes:
             if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
                 return self._set_mode(mode.custom_mode, command)

@@ -1,7 +1,7 @@
-"""STATUSTEXT: a line for whoever watches, in chunks where it is long.
+"""STATUSTEXT: a line for users, in chunks if long.
 
-Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes goes on in further messages with the same id
-that is not zero, counted by chunk_seq; a chunk that is not full ends it.
+Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes continues in further messages with the same
+non-zero id, counted by chunk_seq; a chunk that is not full ends it.
 """
 
 from collections import deque
@@ -23,30 +23,27 @@ INFO: int = mav.MAV_SEVERITY_INFO
 
 
 _WORDS = ("emergency", "alert", "critical", "error", "warning")
-"""Of severities from 0 on; those behind them are no cause for alarm."""
+"""Of severities from 0; higher ones need no prefix."""
 
 
 class Line(NamedTuple):
-    """A status text and its MAV_SEVERITY."""
+    """A status text and its MAV_SEVERITY, shown as a prefix from warnings on."""
 
     severity: int
     text: str
 
     def __str__(self) -> str:
-        """Return the text, of a warning or worse with a word that says so."""
         return self.text if self.severity > WARNING else f"{_WORDS[self.severity]}: {self.text}"
 
 
 class StatusText:
-    """Numbers the texts that need more than one message, and remembers the last until they are taken."""
+    """Numbers texts of several messages, and keeps the latest for `take`."""
 
     def __init__(self) -> None:
-        """Begin with id 1: 0 means a text of one chunk."""
         self._next = 1
         self._said: deque[Line] = deque(maxlen=_REMEMBERED)
 
     def say(self, severity: int, text: str) -> list[Send]:
-        """Return the STATUSTEXT messages of `text`, to all channels."""
         self._said.append(Line(severity, text))
         data = text.encode()[:MAX_TEXT_BYTES]
         if len(data) <= CHUNK_BYTES:
@@ -59,7 +56,6 @@ class StatusText:
         ]
 
     def take(self) -> list[Line]:
-        """Return all texts since the last time."""
         if not self._said:
             return []
         said = list(self._said)

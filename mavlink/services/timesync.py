@@ -1,4 +1,4 @@
-"""The timesync and ping microservices: the vehicle's clock is simulated time, whose speed need not be the wall's.
+"""The timesync and ping microservices; the vehicle's clock is simulated time.
 
 Specifications: mavlink.io/en/services/timesync.html and mavlink.io/en/services/ping.html.
 """
@@ -13,12 +13,11 @@ INT64_MAX = 2**63 - 1
 
 
 class TimeService:
-    """Answers who asks what time it is, and who asks whether anybody is there. Nobody sets this clock."""
+    """Answers requests for the vehicle's time and for its presence; the clock cannot be set."""
 
     handles = frozenset({"TIMESYNC", "PING", "SYSTEM_TIME"})
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Answer requests; what answers a request of somebody else is ignored, as is SYSTEM_TIME."""
         fields = message.fields
         if message.name == "TIMESYNC" and fields.tc1 == 0:  # "tc1 is set to 0 in the request"
             return (to(peer, "TIMESYNC", min(now_us * NS_PER_US, INT64_MAX), fields.ts1),)

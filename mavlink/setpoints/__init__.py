@@ -1,1 +1,1 @@
-"""What clients ask for from moment to moment: offboard setpoints, sticks, a target to follow, and whose is obeyed."""
+"""Streamed input of clients: offboard setpoints, sticks, a target to follow, and arbitration between clients."""

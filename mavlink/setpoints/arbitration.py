@@ -1,8 +1,8 @@
-"""Services of streamed setpoints, and which client they obey where several stream the same kind.
+"""Services of streamed setpoints, and arbitration between clients of the same kind.
 
-The first client that streams is obeyed until it has been silent for a time-out; then the next one that streams. One
-that engages the mode which its stream is for is obeyed from then on, if it streams. A client is a channel, a system and
-a component: two programs with the same ids on two links are two.
+The first client that streams is obeyed until it is silent for a time-out; then the next one that streams. A client that
+engages the stream's mode takes over, if it streams. A client is a channel, a system and a component, so equal ids on
+two links are two clients.
 """
 
 from abc import ABC, abstractmethod
@@ -14,30 +14,28 @@ from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
 SILENT_AFTER_US = 500_000
-"""A stream without a valid message for longer than this has ended; MAVLink asks clients for 2 Hz at least."""
+"""Silence that ends a stream; MAVLink requires at least 2 Hz."""
 MAX_CLIENTS = 16
 
 Value = TypeVar("Value")
 
 
 class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an error of this program)
-    """A setpoint that is not flown; its text is the reason it is counted under."""
+    """An invalid setpoint; its text is the reason under which it is counted."""
 
 
 class StreamedService(ABC, Generic[Value]):
-    """A service that keeps the latest setpoint of each client, obeys that of `source`, and never answers."""
+    """Keeps each client's latest setpoint and obeys that of `source`; never answers."""
 
     handles: frozenset[str]
 
     def __init__(self, silent_after_us: int = SILENT_AFTER_US) -> None:
-        """Begin without clients; a stream ends `silent_after_us` after its last valid message."""
         self.dropped: Counter[str] = Counter()
         self.source: Peer | None = None
         self._silent_after_us = silent_after_us
         self._received: dict[Peer, tuple[int, Value]] = {}
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Keep a setpoint, or count why it is dropped."""
         try:
             value = self._decode(message, peer, now_us)
         except Refused as refused:
@@ -48,24 +46,24 @@ class StreamedService(ABC, Generic[Value]):
         return ()
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Obey `peer`, which has requested the mode, from now on, if it streams."""
+        """Obey `peer`, which has requested the mode, if it streams."""
         if self._streams(peer, now_us):
             self.source = peer
 
     @abstractmethod
     def _decode(self, message: Message, peer: Peer, now_us: int) -> Value | None:
-        """Return the setpoint in a message; None where it holds none.
+        """Return the setpoint in a message, if any.
 
         Raises:
-            Refused: It cannot be flown.
+            Refused: It is invalid.
         """
 
     def _latest(self, now_us: int, timeout_us: int) -> Value | None:
-        """Return the latest setpoint of the client that is obeyed, if it is no older than `timeout_us`."""
+        """Return the obeyed client's latest setpoint, if not older than `timeout_us`."""
         return None if self.source is None else self._value(self.source, now_us, timeout_us)
 
     def _value(self, peer: Peer, now_us: int, timeout_us: int) -> Value | None:
-        """Return the latest setpoint of one client, obeyed or not, if it is no older than `timeout_us`."""
+        """Return one client's latest setpoint, if not older than `timeout_us`."""
         time_us, value = self._received.get(peer, (now_us + 1, None))
         return value if 0 <= now_us - time_us <= timeout_us else None
 
@@ -73,7 +71,7 @@ class StreamedService(ABC, Generic[Value]):
         return self._value(peer, now_us, self._silent_after_us) is not None
 
     def _keep(self, peer: Peer, value: Value, now_us: int) -> bool:
-        """Store a valid setpoint; return whether it is from the client that is obeyed."""
+        """Store a setpoint; return whether its client is obeyed."""
         if peer not in self._received and len(self._received) >= MAX_CLIENTS:
             self._received = {it: kept for it, kept in self._received.items() if self._streams(it, now_us)}
             if len(self._received) >= MAX_CLIENTS:

@@ -1,8 +1,8 @@
-"""Follow-me: the state of the target from FOLLOW_TARGET.
+"""Follow-me: the target's state from FOLLOW_TARGET.
 
-Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Of `est_capabilities` only the
-position's bit is asked for: velocity counts where it is finite, since by the message's own text (0, 0, 0) is an
-unknown one, and clients that send one leave its bit out.
+Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Only the position bit of
+`est_capabilities` is required: clients that send velocity omit its bit, and by the message's text a velocity of
+(0, 0, 0) is unknown.
 """
 
 from math import hypot, isfinite, isnan
@@ -23,26 +23,24 @@ MAX_ACCELERATION_M_S2 = 100.0
 SILENT_AFTER_US = 3_000_000
 """Trackers send a position once a second."""
 GOES_ON_US = 2_000_000
-"""Without a message the target is extrapolated at its velocity for so long, then it is assumed to stand."""
+"""Extrapolation at the last velocity without messages; then the target is assumed to stand."""
 _DEG = 1e-7
 
 
 class Follow(StreamedService[TargetState]):
-    """Keeps the latest state of the target of each tracker; see `arbitration` for which tracker is obeyed."""
+    """Keeps each tracker's latest target; see `arbitration` for the one that is obeyed."""
 
     handles = frozenset({"FOLLOW_TARGET"})
 
     def __init__(self) -> None:
-        """Begin without a target."""
         super().__init__(SILENT_AFTER_US)
         self._origin = DEFAULT_ORIGIN
 
     def update(self, origin: Geodetic) -> None:
-        """Set the origin of the ENU frame."""
         self._origin = origin
 
     def latest(self, now_us: int, timeout_us: int) -> TargetState | None:
-        """Return the target's state extrapolated to `now_us`, if its message is no older than `timeout_us`."""
+        """Return the target's state extrapolated to `now_us`, if its message is not older than `timeout_us`."""
         target = self._latest(now_us, timeout_us)
         return target.at(now_us, GOES_ON_US) if target else None
 
@@ -70,6 +68,6 @@ class Follow(StreamedService[TargetState]):
 
 
 def _known(ned: Any) -> Vector:
-    """Return a vector in ENU, zero where it is not known."""
+    """Return a vector in ENU, zero if unknown."""
     north, east, down = ned
     return STILL if isnan(north) or isnan(east) or isnan(down) else ned_from_enu((north, east, down))

@@ -1,8 +1,8 @@
-"""Manual control: the sticks of a ground station, as MANUAL_CONTROL or as RC_CHANNELS_OVERRIDE.
+"""Manual control: a ground station's sticks, as MANUAL_CONTROL or RC_CHANNELS_OVERRIDE.
 
 Specification: https://mavlink.io/en/services/manual_control.html and common.xml, messages MANUAL_CONTROL (69) and
-RC_CHANNELS_OVERRIDE (70). Neither is answered. The signs of the yaw stick are the clients': to the right is positive,
-as PX4 and all who fly it have it, though the message's text has counter-clockwise positive. Buttons are not looked at.
+RC_CHANNELS_OVERRIDE (70). Never answered. Yaw is positive to the right, as in PX4 and its clients, although the
+message's text is counter-clockwise. Buttons are ignored.
 """
 
 from typing import Any, NamedTuple
@@ -14,13 +14,13 @@ from colibri.mavlink.wire.dialect import Message
 
 FULL = 1000
 UNUSED = 0x7FFF
-"""INT16_MAX: the axis is not there; its stick is in the middle."""
+"""INT16_MAX: a missing axis; its stick is centred."""
 
 RELEASED, UNCHANGED = 0, 0xFFFF
-"""Of channels 1 to 8: 0 gives a channel back to the radio, UINT16_MAX leaves it as it is."""
+"""Of channels 1 to 8: 0 returns a channel to the radio, UINT16_MAX leaves it unchanged."""
 MIN_US, MIDDLE_US, MAX_US = 1000, 1500, 2000
 VALID_US = (800, 2200)
-"""Transmitters go beyond 1000 and 2000 µs; what lies in here counts as a full stick."""
+"""Transmitters exceed 1000 and 2000 µs; values beyond count as full."""
 _ALL_RELEASED = (RELEASED, RELEASED, RELEASED, RELEASED)
 
 Channels = tuple[int, int, int, int]
@@ -28,24 +28,22 @@ Channels = tuple[int, int, int, int]
 
 
 class Controls(NamedTuple):
-    """What one client holds: its sticks, and the channels that they are made of, if any."""
+    """A client's sticks, and the channels behind them, if any."""
 
     sticks: Sticks
     channels: Channels = _ALL_RELEASED
 
 
 class Manual(StreamedService[Controls]):
-    """Keeps the latest sticks of each client; see `arbitration` for which client is obeyed."""
+    """Keeps each client's latest sticks; see `arbitration` for the one that is obeyed."""
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
     def __init__(self, system_id: int) -> None:
-        """Be the vehicle `system_id`."""
         super().__init__()
         self._system_id = system_id
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
-        """Return the latest sticks of the client that is obeyed, if they are no older than `timeout_us`."""
         controls = self._latest(now_us, timeout_us)
         return controls.sticks if controls else None
 
@@ -80,9 +78,9 @@ class Manual(StreamedService[Controls]):
 
 
 def sticks_of(channels: Channels, now_us: int) -> Sticks:
-    """Return the sticks of four channels, µs; one that is released is in the middle, as there is no radio.
+    """Return the sticks of four channels, µs; a released one is centred, as there is no radio.
 
-    A low value of the elevator's channel is its stick forward, as transmitters for copters have it.
+    A low elevator channel is the stick forward, as on copters' transmitters.
     """
     roll, pitch, thrust, yaw = (
         0.0 if value == RELEASED else (min(max(value, MIN_US), MAX_US) - MIDDLE_US) / (MAX_US - MIDDLE_US)

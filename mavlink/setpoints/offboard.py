@@ -1,15 +1,15 @@
-"""The offboard microservice: setpoints that a client streams.
+"""The offboard microservice: setpoints streamed by a client.
 
 Specification: https://mavlink.io/en/services/offboard_control.html, and common.xml's MAV_FRAME,
-POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. Setpoints are never answered. One that cannot be flown is dropped
-and counted, and keeps no stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
-What the specification leaves open, here:
+POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. Setpoints are never answered. An invalid one is counted and
+dropped, and does not keep a stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
+Choices left open by the specification:
 
-- A group of which every field that is not masked is NaN counts as masked, as PX4 has it.
-- Bits of a type mask that have no meaning are not looked at.
+- A group with only NaN in its unmasked fields counts as masked, as in PX4.
+- Undefined bits of a type mask are ignored.
 - Body frames are level: they turn with the heading, not with roll and pitch.
-- A masked axis of a group whose other horizontal axis is given in a body frame, so that no axis of the earth is masked,
-  counts as: stay at that place, do not move, do not accelerate.
+- If one horizontal axis of a group in a body frame is masked, it means: keep this position, zero velocity, zero
+  acceleration; the earth axes are then both given.
 - Altitude above terrain is altitude above home: the ground is flat.
 """
 
@@ -33,13 +33,13 @@ MAX_SPEED_M_S = 50.0
 MAX_ACCELERATION_M_S2 = 50.0
 MAX_DISTANCE_M = 1e6
 MAX_YAW_RATE_RAD_S = 35.0
-"""Body rates: 2000 degrees a second, the range of a vehicle's gyroscopes."""
+"""Of body rates: 2000 degrees a second, the range of usual gyroscopes."""
 MAX_YAW_RAD = 1e3
 UNIT_WITHIN = 0.01
-"""How far the length of a quaternion may be from 1: clients compute in single precision, some round."""
+"""Tolerance of a quaternion's length: clients use single precision, some round."""
 
 _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
-"""First bit of the three of each group in POSITION_TARGET_TYPEMASK."""
+"""First mask bit of each group of three in POSITION_TARGET_TYPEMASK."""
 _FORCE: int = mav.POSITION_TARGET_TYPEMASK_FORCE_SET
 _NO_YAW: int = mav.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 _NO_YAW_RATE: int = mav.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
@@ -53,21 +53,13 @@ _NO_ATTITUDE: int = mav.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 
 
 class Frame(NamedTuple):
-    """What a local MAV_FRAME means.
+    """Meaning of a local MAV_FRAME."""
 
-    Attributes:
-        from_vehicle: Whether positions count from the vehicle.
-        turned_position: Whether positions are along the heading.
-        body: Whether velocities and accelerations are along the heading.
-        turned_yaw: Whether yaw counts from the heading.
-        up: Whether the axes are FLU and not FRD.
-    """
-
-    from_vehicle: bool = False
-    turned_position: bool = False
-    body: bool = False
-    turned_yaw: bool = False
-    up: bool = False
+    from_vehicle: bool = False  # positions are relative to the vehicle
+    turned_position: bool = False  # positions are along the heading
+    body: bool = False  # velocities and accelerations are along the heading
+    turned_yaw: bool = False  # yaw is relative to the heading
+    up: bool = False  # FLU, not FRD
 
 
 _ALONG_HEADING = Frame(from_vehicle=True, turned_position=True, body=True, turned_yaw=True)
@@ -86,7 +78,7 @@ AMSL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
 
 class Whereabouts(NamedTuple):
-    """What setpoints count from."""
+    """References of setpoints."""
 
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0
@@ -95,11 +87,6 @@ class Whereabouts(NamedTuple):
 
 
 def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
-    """Decode a SET_POSITION_TARGET_LOCAL_NED.
-
-    Raises:
-        Refused: It cannot be flown.
-    """
     frame = LOCAL_FRAMES.get(fields.coordinate_frame)
     if frame is None:
         raise Refused("frame")
@@ -111,11 +98,6 @@ def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoin
 
 
 def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
-    """Decode a SET_POSITION_TARGET_GLOBAL_INT.
-
-    Raises:
-        Refused: It cannot be flown.
-    """
     if fields.coordinate_frame not in GLOBAL_FRAMES:
         raise Refused("frame")
     velocity, acceleration = _derivatives(fields, body=False, up=False)
@@ -128,11 +110,6 @@ def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoi
 
 
 def decode_attitude(fields: Any, here: Whereabouts, now_us: int) -> AttitudeSetpoint:
-    """Decode a SET_ATTITUDE_TARGET.
-
-    Raises:
-        Refused: It cannot be flown.
-    """
     del here
     mask = fields.type_mask
     masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
@@ -148,7 +125,6 @@ def decode_attitude(fields: Any, here: Whereabouts, now_us: int) -> AttitudeSetp
 
 
 def _position_from(place: Vector, frame: Frame, here: Whereabouts) -> Vector:
-    """Return a position of a local frame in ENU from the origin."""
     if frame.turned_position:
         x, y, z = _along_heading(place if frame.up else frd_from_flu(place), frame, here)
     else:
@@ -160,7 +136,7 @@ def _position_from(place: Vector, frame: Frame, here: Whereabouts) -> Vector:
 
 
 def _along_heading(flu: Vector, frame: Frame, here: Whereabouts) -> Vector:
-    """Return a position along the heading in ENU; one of two horizontal axes that is masked stays where it is."""
+    """Return a position along the heading in ENU; a masked horizontal axis keeps its place."""
     ahead, left, up = flu
     if isnan(ahead) != isnan(left):
         c, s = cos(here.yaw_rad), sin(here.yaw_rad)
@@ -171,7 +147,7 @@ def _along_heading(flu: Vector, frame: Frame, here: Whereabouts) -> Vector:
 
 
 def _position_of(fields: Any, here: Whereabouts) -> Vector:
-    """Return the position of a SET_POSITION_TARGET_GLOBAL_INT: masked are latitude, longitude, altitude."""
+    """Return the position of a SET_POSITION_TARGET_GLOBAL_INT, nan if masked."""
     no_latitude, no_longitude, no_altitude = (bool(fields.type_mask >> axis & 1) for axis in range(3))
     latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * DEGREES
     longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * DEGREES
@@ -186,7 +162,7 @@ def _position_of(fields: Any, here: Whereabouts) -> Vector:
 
 
 def _counted_from_m(frame: int, here: Whereabouts) -> float:
-    """Return what altitudes of a global frame count from, m, ENU."""
+    """Return the zero of a global frame's altitudes, m, ENU."""
     if frame in AMSL_FRAMES:
         return -here.origin.altitude_m
     if here.home is None:
@@ -195,10 +171,10 @@ def _counted_from_m(frame: int, here: Whereabouts) -> float:
 
 
 def group(wire: Vector, masked: int, maximum: float) -> Vector:
-    """Return a group's fields, nan where masked (bit n of `masked`); the others have a length of at most `maximum`.
+    """Return a group's fields, nan if masked (bit n of `masked`); the others are at most `maximum` long.
 
     Raises:
-        Refused: A field that is not masked cannot be flown, unless all of them are NaN.
+        Refused: An unmasked field is invalid, unless all are NaN.
     """
     given = [value for axis, value in enumerate(wire) if not masked >> axis & 1]
     if all(map(isnan, given)):
@@ -212,7 +188,7 @@ def group(wire: Vector, masked: int, maximum: float) -> Vector:
 
 
 def single(wire: float, masked: int, maximum: float) -> float:
-    """Return the one field of a group of its own, likewise."""
+    """Return the field of a one-field group, see `group`."""
     value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), maximum)
     return value
 
@@ -231,7 +207,7 @@ def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
 
 
 def _whole(flu: Vector) -> Vector:
-    """Return a vector of which one horizontal axis is masked with zero there."""
+    """Return a vector with a single masked horizontal axis set to zero."""
     ahead, left, up = flu
     if isnan(ahead) == isnan(left):
         return flu
@@ -239,7 +215,7 @@ def _whole(flu: Vector) -> Vector:
 
 
 def _yaw(fields: Any, zero_rad: float, *, up: bool) -> tuple[float, float]:
-    """Return yaw, which the frame counts from `zero_rad`, and its rate, both counter-clockwise."""
+    """Return yaw, relative to `zero_rad` on the wire, and its rate, both counter-clockwise."""
     yaw = single(fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
     rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
     turn = 1.0 if up else -1.0
@@ -257,11 +233,6 @@ def _attitude(q: Any) -> Quaternion:
 
 
 def _checked(setpoint: PositionSetpoint) -> PositionSetpoint:
-    """Return a setpoint that asks for something.
-
-    Raises:
-        Refused: It does not.
-    """
     asked = (
         *setpoint.position_enu_m,
         *setpoint.velocity_m_s,
@@ -282,21 +253,18 @@ _DECODERS: dict[str, Callable[[Any, Whereabouts, int], OffboardSetpoint]] = {
 
 
 class Offboard(StreamedService[OffboardSetpoint]):
-    """Keeps the latest offboard setpoint of each client; see `arbitration` for which client is obeyed."""
+    """Keeps each client's latest offboard setpoint; see `arbitration` for the one that is obeyed."""
 
     handles = frozenset(_DECODERS)
 
     def __init__(self) -> None:
-        """Begin with the vehicle at the origin and without home."""
         super().__init__()
         self._here = Whereabouts()
 
     def update(self, position_enu_m: Vector, yaw_rad: float, origin: Geodetic, home: Home | None) -> None:
-        """Set the vehicle's position and yaw, and the origin and home that heights and places count from."""
         self._here = Whereabouts(position_enu_m, yaw_rad, origin, home)
 
     def latest(self, now_us: int, timeout_us: int) -> OffboardSetpoint | None:
-        """Return the latest setpoint of the client that is obeyed, if it is no older than `timeout_us`."""
         return self._latest(now_us, timeout_us)
 
     def _decode(self, message: Message, peer: Peer, now_us: int) -> OffboardSetpoint:

@@ -1,4 +1,4 @@
-"""What clients ask a vehicle to do from moment to moment: setpoints, sticks, a target to follow; in SI, ENU and FLU."""
+"""Clients' setpoints, sticks and follow targets in SI, ENU and FLU."""
 
 from math import isnan, nan
 from typing import NamedTuple, TypeAlias
@@ -11,17 +11,15 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class PositionSetpoint(NamedTuple):
-    """A setpoint of position and its derivatives; nan where nothing is asked for.
+    """A setpoint of position and its derivatives; nan if not given.
 
-    An axis that has neither position nor velocity nor acceleration is the vehicle's own to hold; so is yaw without
-    angle and rate.
+    An axis without position, velocity and acceleration is held by the vehicle; so is yaw without angle and rate.
 
     Attributes:
-        position_enu_m: From the origin, m.
-        velocity_m_s: ENU; where `body`, FLU of a level vehicle that looks along its heading.
-        acceleration_m_s2: In the same axes: feed-forward, or all there is.
+        position_enu_m: From the origin.
+        velocity_m_s: ENU; with `body`, FLU of a level vehicle along its heading.
+        acceleration_m_s2: In the same axes: feed-forward, or the only demand.
         yaw_rad: Counter-clockwise from east, -pi..pi.
-        body: Whether velocity and acceleration turn with the vehicle: see `in_enu`.
     """
 
     position_enu_m: Vector = NOWHERE
@@ -33,7 +31,7 @@ class PositionSetpoint(NamedTuple):
     time_us: int = 0
 
     def in_enu(self, heading_rad: float) -> "PositionSetpoint":
-        """Return it with velocity and acceleration in ENU, for a vehicle that now looks along `heading_rad`."""
+        """Return the setpoint with velocity and acceleration in ENU, for the present heading."""
         if not self.body:
             return self
         return self._replace(
@@ -47,9 +45,9 @@ class AttitudeSetpoint(NamedTuple):
     """A setpoint of attitude or body rates, and thrust.
 
     Attributes:
-        attitude: Unit quaternion, FLU to ENU; None where only rates are asked for.
-        rate_flu_rad_s: Body rates, nan on the axes that are not given; beside an attitude they are feed-forward.
-        thrust: Part of the largest, 0..1; nan where it is not given.
+        attitude: FLU to ENU; `None` if only rates are given.
+        rate_flu_rad_s: nan on axes without a rate; feed-forward beside an attitude.
+        thrust: 0..1 of the largest; nan if not given.
     """
 
     attitude: Quaternion | None
@@ -62,29 +60,17 @@ OffboardSetpoint: TypeAlias = PositionSetpoint | AttitudeSetpoint
 
 
 class Sticks(NamedTuple):
-    """The sticks of a remote control.
+    """The sticks of a remote control."""
 
-    Attributes:
-        pitch: Forward, -1..1: positive flies forward.
-        roll: To the right, -1..1.
-        thrust: 0..1, the middle is 0.5.
-        yaw: To the right, -1..1: positive turns clockwise seen from above.
-    """
-
-    pitch: float
-    roll: float
-    thrust: float
-    yaw: float
+    pitch: float  # forward, -1..1
+    roll: float  # right, -1..1
+    thrust: float  # 0..1, centre 0.5
+    yaw: float  # clockwise from above, -1..1
     time_us: int = 0
 
 
 class TargetState(NamedTuple):
-    """Where what is to be followed is.
-
-    Attributes:
-        velocity_enu_m_s, acceleration_enu_m_s2: Zero where they are not known.
-        time_us: What it is the state at.
-    """
+    """State of a target to follow; unknown derivatives are zero."""
 
     position_enu_m: Vector
     velocity_enu_m_s: Vector
@@ -93,7 +79,7 @@ class TargetState(NamedTuple):
     time_us: int = 0
 
     def at(self, now_us: int, max_us: int) -> "TargetState":
-        """Return it at `now_us`: it goes on at its velocity until `max_us` after it was received, then it stands."""
+        """Return the state extrapolated at constant velocity until `max_us` after reception, then standing still."""
         after_s = max(min(now_us, self.received_us + max_us) - self.time_us, 0) * 1e-6
         (x, y, z), (vx, vy, vz) = self.position_enu_m, self.velocity_enu_m_s
         there = self._replace(position_enu_m=(x + after_s * vx, y + after_s * vy, z + after_s * vz), time_us=now_us)
@@ -103,7 +89,7 @@ class TargetState(NamedTuple):
 
 
 def turned(flu: Vector, heading_rad: float) -> Vector:
-    """Return a vector of axes along `heading_rad`, to its left and up, in ENU; nan where both of the first are."""
+    """Return a vector ahead, left and up of `heading_rad` in ENU; unchanged if both horizontal parts are nan."""
     ahead, left, up = flu
     if isnan(ahead) and isnan(left):
         return flu

@@ -1,1 +1,1 @@
-"""Which message goes to which channel how often, and the heartbeat."""
+"""Message rates per channel, and the heartbeat."""

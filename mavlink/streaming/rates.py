@@ -1,4 +1,4 @@
-"""How often each message is streamed where nobody has asked for another rate."""
+"""Default rate of each message."""
 
 HZ = 1_000_000
 
@@ -46,11 +46,10 @@ _RATES_HZ = {
     "DEBUG_FLOAT_ARRAY": (1.0, 1.0),
     "NAMED_VALUE_FLOAT": (1.0, 1.0),
 }
-"""On channels to SDKs, and to ground stations; 0 for not at all.
+"""On channels to SDKs, and to ground stations; 0 is off.
 
-SDKs ask for nothing, so what they can show must come on its own: PX4's rates on its port for SDKs, measured; the
-simulator's truth at 10 Hz; the controller once a second. A ground station gets what it shows, at rates that an eye can
-follow and a radio could carry.
+SDKs request little, so all they can show is streamed: PX4's measured rates on its SDK port; the simulator's truth at
+10 Hz; the controller once a second. A ground station gets rates for the eye and for a radio link.
 """
 
 
@@ -71,6 +70,7 @@ GROUPS: dict[int, tuple[str, ...]] = {
     11: ("VFR_HUD", "ALTITUDE"),
     12: ("SYSTEM_TIME", "ESTIMATOR_STATUS", "WIND_COV", "VIBRATION", "DISTANCE_SENSOR", "ESC_STATUS"),
 }
-"""The messages of each MAV_DATA_STREAM, as ArduPilot groups them: raw sensors, extended status, radio channels, raw
-controller, position, extra 1 to 3. MAV_DATA_STREAM_ALL (0) means all groups."""
+"""The messages of each MAV_DATA_STREAM, grouped as by ArduPilot: raw sensors, extended status, radio channels, raw
+controller, position, extra 1 to 3. MAV_DATA_STREAM_ALL (0) means all groups.
+"""
 ALL_GROUPS = tuple(name for names in GROUPS.values() for name in names)

@@ -1,4 +1,4 @@
-"""When each message is due on each channel: a grid of simulated time for each, without drift and without bursts."""
+"""Due times of messages per channel: a grid of simulated time for each, without drift and bursts."""
 
 from heapq import heapify, heappop, heappush
 from typing import TypeAlias
@@ -7,7 +7,7 @@ Key: TypeAlias = tuple[int, str]
 """Number of a channel, name of a message."""
 
 GOLDEN = 0.6180339887498949
-"""Multiples of it, without their whole part, spread evenly however many there are."""
+"""The fractional parts of its multiples are evenly spread."""
 STALE_ALLOWED = 64
 
 
@@ -21,22 +21,20 @@ class _Entry:
         self.live = True
 
     def after(self, now_us: int) -> int:
-        """Return the first time on the grid that is later than `now_us`."""
         return now_us + self.interval_us - (now_us - self.phase_us) % self.interval_us
 
 
 class Schedule:
-    """Which keys are due. Keys of the same interval and phase are due together, whenever they were set."""
+    """Due keys; those of the same interval and phase are due together, whenever they were set."""
 
     def __init__(self) -> None:
-        """Begin with nothing due ever."""
         self._entries: dict[Key, _Entry] = {}
         self._heap: list[tuple[int, int, _Entry]] = []
         self._count = 0
         self._now_us = 0
 
     def set(self, key: Key, interval_us: int, spread: int, now_us: int) -> None:
-        """Have `key` due every `interval_us` (> 0); `spread` numbers the phases."""
+        """Make `key` due every `interval_us` (> 0); `spread` numbers the phases."""
         entry = self._entries.get(key)
         if entry is not None and entry.interval_us == interval_us:
             return
@@ -48,18 +46,16 @@ class Schedule:
             self._rebuild(now_us)
 
     def drop(self, key: Key) -> None:
-        """Have `key` due no more."""
         entry = self._entries.pop(key, None)
         if entry is not None:
             entry.live = False
 
     def interval_us(self, key: Key) -> int | None:
-        """Return how often `key` is due; None if never."""
         entry = self._entries.get(key)
         return None if entry is None else entry.interval_us
 
     def due(self, now_us: int) -> list[Key]:
-        """Return the keys due since the last call, each once however often it was; in order of their times."""
+        """Return the keys due since the last call, each once, in order of their times."""
         heap = self._heap
         if now_us < self._now_us:  # a new flight has begun
             self._rebuild(now_us)

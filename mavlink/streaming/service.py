@@ -1,4 +1,4 @@
-"""Streams: which message goes to which channel how often, and messages on request.
+"""Streams: messages at each channel's rates, and on request.
 
 Specification: mavlink.io/en/mavgen_python/howto_requestmessages.html; MAV_CMD_SET_MESSAGE_INTERVAL (511),
 MAV_CMD_GET_MESSAGE_INTERVAL (510), MAV_CMD_REQUEST_MESSAGE (512) and the older REQUEST_DATA_STREAM (66).
@@ -17,17 +17,17 @@ from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
 
 Provider: TypeAlias = Callable[[Command], list[Send] | Refusal]
-"""Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or refuses."""
+"""Answers or refuses REQUEST_MESSAGE for another service's message, by the command's param2 to param6."""
 
 MIN_INTERVAL_US = 1_000
 MIN_GROUP_INTERVAL_US = 20_000
-"""All groups at the rate of the frames would take a good part of the time that the control law needs."""
+"""All groups at frame rate would take computing time from the control law."""
 MAX_INTERVAL_US = 2**31 - 1
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
 MAX_WAITING = 256
-"""Messages on request between two frames of the plant; further requests are rejected temporarily."""
+"""Limit of requested messages between two frames of the plant; more are rejected temporarily."""
 
 _OLD_REQUESTS = {
     "MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES": "AUTOPILOT_VERSION",
@@ -36,20 +36,18 @@ _OLD_REQUESTS = {
     "MAV_CMD_REQUEST_PROTOCOL_VERSION": "PROTOCOL_VERSION",
     "MAV_CMD_REQUEST_STORAGE_INFORMATION": "STORAGE_INFORMATION",
 }
-"""Commands that REQUEST_MESSAGE has replaced."""
+"""Predecessors of REQUEST_MESSAGE."""
 
 
 class StreamService:
     """Streams telemetry to every channel at its own rates, and sends messages on request.
 
-    The owner sets each frame's snapshot by `update` before `poll`. Each command and message about streams has a
-    method of its own, so it has more than most classes.
+    The owner sets each frame's snapshot by `update` before `poll`.
     """
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
     def __init__(self, telemetry: Mapping[str, Encoder]) -> None:
-        """Stream the messages of `telemetry`."""
         self._telemetry = dict(telemetry)
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
@@ -63,30 +61,26 @@ class StreamService:
         self._now_us = 0
 
     def provide(self, name: str, provider: Provider) -> None:
-        """Have `provider` answer requests of message `name`, which the dialect must have."""
         message_id = _message_id(name)
         assert message_id >= 0, name
         self._providers[message_id] = provider
 
     def update(self, snapshot: Snapshot) -> None:
-        """Take in the vehicle as it is now."""
         self._snapshot = snapshot
         if self._encoded:
             self._encoded = {}
 
     def use(self, channel: int, kind: str) -> None:
-        """Stream to `channel` what its `kind` (of `rates.DEFAULTS`) gets unless it asks for other rates."""
+        """Stream the defaults of a `kind` of `rates.DEFAULTS` to `channel`."""
         self._kinds[channel] = kind
         if channel in self._open:
             self._restart(channel, self._now_us)
 
     def opened(self, channel: int, now_us: int) -> None:
-        """Begin to stream to `channel`: as `use` has said, else as to a ground station."""
         self._open.add(channel)
         self._restart(channel, now_us)
 
     def closed(self, channel: int) -> None:
-        """Stream to `channel` no more."""
         self._open.discard(channel)
         self._kinds.pop(channel, None)
         for name in self._telemetry:
@@ -94,11 +88,10 @@ class StreamService:
         self._waiting = [send for send in self._waiting if send.channel != channel]
 
     def interval_us(self, channel: int, name: str) -> int | None:
-        """Return how often `channel` gets message `name`; None if never."""
         return self._schedule.interval_us((channel, name))
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """REQUEST_DATA_STREAM: a group of messages, how many a second; none where it is to stop."""
+        """Handle REQUEST_DATA_STREAM: the rate of a group of messages, or its end."""
         fields = message.fields
         names = ALL_GROUPS if fields.req_stream_id == mav.MAV_DATA_STREAM_ALL else GROUPS.get(fields.req_stream_id, ())
         rate_hz = fields.req_message_rate if fields.start_stop else 0
@@ -108,7 +101,6 @@ class StreamService:
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Send what is due, and what was asked for."""
         self._now_us = now_us
         due = self._schedule.due(now_us)
         if not due and not self._waiting:
@@ -119,7 +111,6 @@ class StreamService:
         return sends
 
     def handlers(self) -> dict[int, Handler]:
-        """Return who obeys the commands of this service."""
         commands: dict[int, Handler] = {
             mav.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
             mav.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
@@ -130,7 +121,7 @@ class StreamService:
         return commands
 
     def _set_message_interval(self, command: Command) -> Refusal | None:
-        """511: param1 message id, param2 interval in µs: -1 none, 0 the default."""
+        """Set the interval, µs: -1 off, 0 default."""
         message_id, interval_us = _whole(command.p1), command.p2
         name = self._names.get(message_id)
         if name is None:
@@ -147,15 +138,13 @@ class StreamService:
         return None
 
     def _get_message_interval(self, command: Command) -> Refusal | None:
-        """510: param1 message id; answered by MESSAGE_INTERVAL."""
         return self._report_interval(_whole(command.p1), command.peer)
 
     def _interval_requested(self, command: Command) -> list[Send] | Refusal:
-        """REQUEST_MESSAGE of MESSAGE_INTERVAL: param2 is the message whose interval is asked for."""
         return self._report_interval(_whole(command.p2), command.peer) or []
 
     def _report_interval(self, message_id: int, peer: Peer) -> Refusal | None:
-        """Send the interval: -1 means that the message is not streamed."""
+        """Send MESSAGE_INTERVAL; -1 if the message is not streamed."""
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
             interval_us = HEARTBEAT_US
         elif message_id in self._names:
@@ -167,7 +156,6 @@ class StreamService:
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 
     def _request_message(self, command: Command) -> Refusal | None:
-        """512: param1 message id, the rest is the message's. It goes to whoever asks."""
         return self._request(_whole(command.p1), command)
 
     def _request_of(self, name: str) -> Handler:
@@ -186,14 +174,14 @@ class StreamService:
         return self._post(sends) if sends else Refusal(result=TEMPORARILY_REJECTED)
 
     def _post(self, sends: list[Send]) -> Refusal | None:
-        """Send behind the COMMAND_ACK: with what is due next."""
+        """Queue messages behind the COMMAND_ACK, until the next poll."""
         if len(self._waiting) + len(sends) > MAX_WAITING:
             return Refusal(result=TEMPORARILY_REJECTED)
         self._waiting.extend(sends)
         return None
 
     def _encode(self, name: str) -> list[Fields]:
-        """Return the fields of the messages `name` of this frame, worked out once however many channels want them."""
+        """Return the fields of a message for this frame, encoded once for all channels."""
         encoded = self._encoded.get(name)
         if encoded is None:
             fields = None if self._snapshot is None else self._telemetry[name](self._snapshot)
@@ -222,11 +210,11 @@ class StreamService:
 
 
 def _message_id(name: str) -> int:
-    """Return the id of a message; -2, which nobody can ask for, of one that the dialect lacks."""
+    """Return the id of a message; -2, which cannot be requested, if the dialect lacks it."""
     number: int = getattr(mav, f"MAVLINK_MSG_ID_{name}", -2)
     return number
 
 
 def _whole(number: float) -> int:
-    """Return a message id that came as a float; -1 for what is none."""
+    """Return a message id sent as a float; -1 if invalid."""
     return int(number) if 0.0 <= number < 2**24 and number == int(number) else -1

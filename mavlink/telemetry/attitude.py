@@ -1,4 +1,4 @@
-"""Messages of how the vehicle is oriented and turns, and of its whole state."""
+"""Messages of attitude, rates and the full state."""
 
 from math import nan
 
@@ -45,7 +45,7 @@ def odometry(s: Snapshot) -> Fields:
 
 
 def hil_state_quaternion(s: Snapshot) -> Fields:
-    """HIL_STATE_QUATERNION (115), the ground truth: acceleration is that of the body's motion, mG, FRD."""
+    """HIL_STATE_QUATERNION (115), the ground truth: coordinate acceleration, mG, FRD."""
     place = place_of(s)
     where = (*degrees_e7(place), 1e3 * place.altitude_m, *velocity_ned_cm_s(s))
     air = 100.0 * airspeed_m_s(s)

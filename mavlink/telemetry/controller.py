@@ -1,4 +1,4 @@
-"""Messages of the control law: what it steers to, and how its model predictive control comes to a decision."""
+"""Messages of the control law: setpoint, plan and solver."""
 
 from math import degrees, hypot, isnan
 
@@ -12,9 +12,9 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 POINTS = 5
-"""That TRAJECTORY_REPRESENTATION_WAYPOINTS holds."""
+"""Capacity of TRAJECTORY_REPRESENTATION_WAYPOINTS."""
 FLOATS = 58
-"""That DEBUG_FLOAT_ARRAY holds."""
+"""Capacity of DEBUG_FLOAT_ARRAY."""
 ARRAY_NAME = b"lpv_mpc"
 
 
@@ -29,7 +29,7 @@ def attitude_target(s: Snapshot) -> Fields:
 
 
 def position_target_local_ned(s: Snapshot) -> Fields:
-    """POSITION_TARGET_LOCAL_NED (85): nan, and a bit of the mask, for what is not steered to."""
+    """POSITION_TARGET_LOCAL_NED (85): nan, and a bit of the mask, where there is no setpoint."""
     position = ned_from_enu(s.setpoint.position_enu_m)
     moving = _moving_ned(s.setpoint)
     return (boot_ms(s), mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
@@ -49,7 +49,7 @@ def position_target_global_int(s: Snapshot) -> Fields:
 
 
 def nav_controller_output(s: Snapshot) -> Fields:
-    """NAV_CONTROLLER_OUTPUT (62): degrees and m to where the way leads; distance zero where it leads nowhere."""
+    """NAV_CONTROLLER_OUTPUT (62): degrees and m to the destination; distance zero without one."""
     roll, pitch, yaw = euler_from_quaternion(s.setpoint.attitude)
     target = s.setpoint.position_enu_m if any(map(isnan, s.target_enu_m)) else s.target_enu_m
     east, north, up = (0.0, 0.0, 0.0) if any(map(isnan, target)) else minus(target, s.position_enu_m)
@@ -61,7 +61,7 @@ def nav_controller_output(s: Snapshot) -> Fields:
 
 
 def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
-    """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon, its end the last; local NED."""
+    """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon up to its end; local NED."""
     points = _spread(s.solver.horizon)
     if not points:
         return None
@@ -73,7 +73,8 @@ def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
 def debug_float_array(s: Snapshot) -> Fields:
     """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: eleven figures of the solver, then its plan.
 
-    The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and how many bounds are active on rotors,
+    The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and the numbers of active bounds on
+    rotors,
     increments, angles, rates (codes are those of `SolverState`). The plan: squared rotor speeds as parts of the
     largest, four a step.
     """
@@ -116,7 +117,6 @@ def _row(point: Forecast) -> tuple[float, ...]:
 
 
 def _spread(horizon: tuple[Forecast, ...]) -> list[Forecast]:
-    """Return up to five points, evenly spread over the horizon's steps."""
     count = min(POINTS, len(horizon))
     return [horizon[(number + 1) * len(horizon) // count - 1] for number in range(count)]
 
@@ -132,6 +132,6 @@ def _moving_ned(setpoint: Setpoint) -> tuple[float, ...]:
 
 
 def _ignored(values: tuple[float, ...]) -> int:
-    """POSITION_TARGET_TYPEMASK: bits 0 to 8 for position, velocity, acceleration; 10 and 11 for yaw and its rate."""
+    """Return POSITION_TARGET_TYPEMASK; bit 9 is not a field but the force flag."""
     force_bit = 9
     return sum(1 << (bit + (bit >= force_bit)) for bit, value in enumerate(values) if isnan(value))

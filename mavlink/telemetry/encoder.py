@@ -1,4 +1,4 @@
-"""Numbers -> what a message's fields can hold; and the quantities that several messages hold in the same wire units."""
+"""Conversion of numbers to message fields, and quantities common to several messages."""
 
 from collections.abc import Callable, Sequence
 from math import degrees, hypot, isfinite, pi
@@ -13,7 +13,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 Encoder: TypeAlias = Callable[[Snapshot], Fields | list[Fields] | None]
-"""Snapshot -> fields of a message: None where there is nothing to send, a list where it takes several messages."""
+"""Returns a message's fields, a list for several messages, or `None` if there is nothing to send."""
 
 UNKNOWN_U8 = 0xFF
 UNKNOWN_U16 = 0xFFFF
@@ -25,9 +25,9 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:
-    """Return `encoder` of message `name`, its numbers rounded and clamped to what the fields hold.
+    """Return `encoder` of message `name` with numbers rounded and clamped to the fields' types.
 
-    Integers that are no number, and places that are nowhere on earth, leave nothing to send: the whole message is None.
+    A message with a non-finite integer or an invalid place is omitted: `None`.
     """
     kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
@@ -77,65 +77,56 @@ for _bits in (8, 16, 32, 64):
 
 
 def boot_ms(s: Snapshot) -> int:
-    """Time since the start in ms, which a uint32 holds: it wraps after 49 days."""
+    """Return the time since the start, ms, wrapped to a uint32 (49 days)."""
     return s.time_us // 1000 % 2**32
 
 
 def place_of(s: Snapshot) -> Geodetic:
-    """Where the vehicle is."""
     return geodetic_of(s.position_enu_m, s.origin)
 
 
 def degrees_e7(place: Geodetic) -> tuple[float, float]:
-    """Latitude and longitude in 1e-7 degrees."""
     return (place.latitude_deg * 1e7, place.longitude_deg * 1e7)
 
 
 def velocity_ned_cm_s(s: Snapshot) -> Vector:
-    """Velocity in cm/s, NED."""
     return times(100.0, ned_from_enu(s.velocity_enu_m_s))
 
 
 def rate_frd(s: Snapshot) -> Vector:
-    """Body rates in rad/s, FRD."""
     return frd_from_flu(s.rate_flu_rad_s)
 
 
 def in_body_frd(q: Quaternion, vector_enu: Vector) -> Vector:
-    """Return an earth vector as the body sees it, FRD."""
     w, x, y, z = q
     return frd_from_flu(earth_from_body((w, -x, -y, -z), vector_enu))
 
 
 def height_above_home_m(s: Snapshot) -> float:
-    """Height above home, or above the origin while home is not known."""
     home: Home | None = s.home
     return s.position_enu_m[2] - (home.position_enu_m[2] if home else 0.0)
 
 
 def yaw_ned(yaw_enu_rad: float) -> float:
-    """Yaw clockwise from north, rad in (-pi, pi]; nan of what is no number."""
+    """Return yaw clockwise from north, rad in (-pi, pi]; nan stays nan."""
     turned = (pi / 2 - yaw_enu_rad) % (2.0 * pi)
     return turned - 2.0 * pi if turned > pi else turned
 
 
 def compass_cdeg(angle_rad: float) -> int:
-    """Return a direction, counter-clockwise from east, as a compass shows it: 0 to 35999 centidegrees."""
+    """Return the compass direction, 0 to 35999 centidegrees, of an angle counter-clockwise from east."""
     return round(100.0 * degrees(pi / 2 - angle_rad)) % FULL_TURN_CDEG
 
 
 def airspeed_m_s(s: Snapshot) -> float:
-    """Speed through the air; through still air where no wind is known."""
     wind = s.wind_enu_m_s if all(map(isfinite, s.wind_enu_m_s)) else (0.0, 0.0, 0.0)
     return hypot(*minus(s.velocity_enu_m_s, wind))
 
 
 def times(factor: float, vector: Sequence[float]) -> Vector:
-    """Scale a vector."""
     x, y, z = vector
     return (factor * x, factor * y, factor * z)
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """Subtract vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -1,4 +1,4 @@
-"""Messages of where the vehicle is, how it moves, and where it came from."""
+"""Messages of position, velocity and home."""
 
 from math import hypot, isfinite, nan
 
@@ -22,7 +22,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_from_enu
 
 SATELLITES = 12
-"""As many as a receiver in the open sees; there is none: the position is the state itself."""
+"""Under open sky, for a vehicle without a receiver: its position is the state itself."""
 DILUTION_E2 = 70
 RANGE_CM = (0, 10_000)
 PERCENT = 100
@@ -57,7 +57,7 @@ def gps_global_origin(s: Snapshot) -> Fields:
 
 
 def gps_raw_int(s: Snapshot) -> Fields:
-    """GPS_RAW_INT (24): what the receiver measured, or a good one would; or no fix. Course is unknown at rest."""
+    """GPS_RAW_INT (24): the receiver's fix, or a simulated good one; or no fix. Course is unknown at rest."""
     if not s.gps_ok:
         nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
         return (s.time_us, mav.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *nothing, 0)
@@ -90,14 +90,14 @@ def vfr_hud(s: Snapshot) -> Fields:
 
 
 def distance_sensor(s: Snapshot) -> Fields:
-    """DISTANCE_SENSOR (132): height above the ground, cm, as a sensor that looks down would see it."""
+    """DISTANCE_SENSOR (132): height above the ground, cm, as measured by a downward sensor."""
     height_cm = max(0.0, 100.0 * (s.position_enu_m[2] - s.ground_m))
     sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, 0)
     return (boot_ms(s), *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
 
 
 def wind_cov(s: Snapshot) -> Fields | None:
-    """WIND_COV (231): where the wind blows to, NED, m/s; None while it is not known."""
+    """WIND_COV (231): direction of the wind's motion, NED, m/s; sent once it is known."""
     if not all(map(isfinite, s.wind_enu_m_s)):
         return None
     altitude_m = s.position_enu_m[2] + s.origin.altitude_m
@@ -105,6 +105,5 @@ def wind_cov(s: Snapshot) -> Fields | None:
 
 
 def heading_cdeg(s: Snapshot) -> int:
-    """Heading on the compass, 0 to 35999; UINT16_MAX where it is not known."""
     _, _, yaw = euler_from_quaternion(s.attitude)
     return compass_cdeg(yaw) if isfinite(yaw) else UNKNOWN_U16

@@ -1,4 +1,4 @@
-"""Messages of the battery, the rotors and their speed controllers."""
+"""Messages of battery, rotors and speed controllers."""
 
 from math import isfinite, pi
 
@@ -9,7 +9,7 @@ from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
 from colibri.mavlink.wire.dialect import mav
 
 CELLS = 10
-"""That BATTERY_STATUS holds; four more go into its extension."""
+"""Capacity of BATTERY_STATUS; four more cells go into its extension."""
 CELLS_EXTENDED = 4
 HECTOJOULES_PER_WH = 36.0
 RPM = 60.0 / (2.0 * pi)
@@ -35,7 +35,7 @@ def battery_status(s: Snapshot) -> Fields | None:
 
 
 def esc_status(s: Snapshot) -> Fields:
-    """ESC_STATUS (291): rpm, V, A; the current is shared as the power of a rotor goes, by the cube of its speed."""
+    """ESC_STATUS (291): rpm, V, A; the current is shared in proportion to a rotor's power, the cube of its speed."""
     cubes = [speed * speed * speed for speed in s.rotor_speeds_rad_s]
     total = sum(cubes) or 1.0
     voltage, current = (s.battery.voltage_v, s.battery.current_a) if s.battery else (0.0, 0.0)
@@ -44,7 +44,7 @@ def esc_status(s: Snapshot) -> Fields:
 
 
 def esc_info(s: Snapshot) -> Fields:
-    """ESC_INFO (290): four, all there, without faults, of no known temperature."""
+    """ESC_INFO (290): four healthy controllers of unknown temperature."""
     packets = s.time_us // 1_000_000 % 2**16
     healthy = ((0,) * ROTORS, (0,) * ROTORS, (UNKNOWN_I16,) * ROTORS)
     return (0, s.time_us, packets, ROTORS, ESC_CONNECTION_TYPE_DSHOT, ALL_ROTORS, *healthy)
@@ -61,7 +61,7 @@ def actuator_output_status(s: Snapshot) -> Fields:
 
 
 def actuator_control_target(s: Snapshot) -> Fields:
-    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust that the rotors' controls amount to.
+    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotors' controls.
 
     The rotors are those of a plus: front, right, rear, left. The first turns counter-clockwise, the body so clockwise.
     """
@@ -89,7 +89,7 @@ def _pulses_us(controls: FourRotors) -> tuple[float, ...]:
 
 
 def _cells_mv(battery: BatteryState) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the voltages of the first ten cells and of the next four; unused ones as BATTERY_STATUS wants them."""
+    """Return the voltages of the first ten cells and of the next four, with BATTERY_STATUS's fillers."""
     if not 1 <= battery.cells <= CELLS + CELLS_EXTENDED:
         return (1e3 * battery.voltage_v, *(UNKNOWN_U16,) * (CELLS - 1)), (0,) * CELLS_EXTENDED
     cell_mv = 1e3 * battery.voltage_v / battery.cells

@@ -1,4 +1,4 @@
-"""Messages of the sensors: what they measure; with state feedback, what they would measure."""
+"""Messages of the sensors; under state feedback, of ideal ones."""
 
 from colibri.common.earth.atmosphere import pressure_pa, temperature_c
 from colibri.common.types import Vector
@@ -10,8 +10,9 @@ from colibri.mavlink.wire.ned import frd_from_flu
 
 GRAVITY_M_S2 = 9.81
 EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
-"""The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:
-nothing in here steers by it."""
+"""The earth's field at Zurich: 0.482 gauss, 63.4° below the horizon, 3.3° east of true north. Used everywhere, as it is
+only displayed.
+"""
 
 UPDATED = bits(
     "HIGHRES_IMU_UPDATED_",
@@ -32,7 +33,7 @@ def scaled_imu(s: Snapshot) -> Fields:
 
 
 def raw_imu(s: Snapshot) -> Fields:
-    """RAW_IMU (27): counts of a sensor whose units are those of SCALED_IMU."""
+    """RAW_IMU (27): the counts equal SCALED_IMU's units."""
     return (s.time_us, *_thousandths(s), 0, _temperature_cdeg(s))
 
 
@@ -42,12 +43,11 @@ def scaled_pressure(s: Snapshot) -> Fields:
 
 
 def vibration(s: Snapshot) -> Fields:
-    """VIBRATION (241): a state that is fed back does not shake."""
+    """VIBRATION (241): zeros."""
     return (s.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
 def specific_force_frd(s: Snapshot) -> Vector:
-    """What accelerometers measure: acceleration without gravity's, m/s², in the body's FRD."""
     if s.sensed is not None:
         return frd_from_flu(s.sensed.specific_force_flu_m_s2)
     east, north, up = s.acceleration_enu_m_s2
@@ -55,7 +55,6 @@ def specific_force_frd(s: Snapshot) -> Vector:
 
 
 def field_frd(s: Snapshot) -> Vector:
-    """What magnetometers measure, gauss, in the body's FRD."""
     if s.sensed is not None:
         return frd_from_flu(s.sensed.magnetic_field_flu_gauss)
     north, east, down = EARTH_FIELD_NED_GAUSS
@@ -63,22 +62,18 @@ def field_frd(s: Snapshot) -> Vector:
 
 
 def measured_rate_frd(s: Snapshot) -> Vector:
-    """What gyroscopes measure, rad/s, in the body's FRD."""
     return frd_from_flu(s.rate_flu_rad_s if s.sensed is None else s.sensed.rate_flu_rad_s)
 
 
 def static_hpa(s: Snapshot) -> float:
-    """What a barometer measures."""
     return (pressure_pa(altitude_amsl_m(s)) if s.sensed is None else s.sensed.pressure_pa) / 100.0
 
 
 def air_c(s: Snapshot) -> float:
-    """Temperature of the air, degrees Celsius."""
     return temperature_c(altitude_amsl_m(s)) if s.sensed is None else s.sensed.temperature_c
 
 
 def altitude_amsl_m(s: Snapshot) -> float:
-    """Altitude above the sea."""
     return s.origin.altitude_m + s.position_enu_m[2]
 
 

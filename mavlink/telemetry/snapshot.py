@@ -1,4 +1,4 @@
-"""The vehicle as its telemetry sees it at one instant: plain values in SI, ENU and FLU."""
+"""The vehicle's state for telemetry at one instant, in SI, ENU and FLU."""
 
 from collections.abc import Mapping
 from math import nan
@@ -16,47 +16,36 @@ CHARGE_OK = 1
 
 
 class Home(NamedTuple):
-    """Where the vehicle returns to; yaw is counter-clockwise from east."""
+    """The place of return; yaw is counter-clockwise from east."""
 
     position_enu_m: Vector
     yaw_rad: float
 
 
 class BatteryState(NamedTuple):
-    """The battery, as the autopilot estimates it.
-
-    Attributes:
-        remaining: Part of the charge that is left, 0..1.
-        remaining_s: Time until it is empty at this current; nan while none flows.
-        charge_state: MAV_BATTERY_CHARGE_STATE.
-    """
+    """The estimated battery."""
 
     cells: int
     voltage_v: float
     current_a: float
     used_ah: float
-    remaining: float
-    remaining_s: float
+    remaining: float  # 0..1
+    remaining_s: float  # at this current; nan if none flows
     used_wh: float
-    charge_state: int = CHARGE_OK
+    charge_state: int = CHARGE_OK  # MAV_BATTERY_CHARGE_STATE
 
 
 class Setpoint(NamedTuple):
-    """What the control law steers to now; nan where it steers to nothing.
-
-    Attributes:
-        yaw_rad: Counter-clockwise from east.
-        thrust: Part of the largest, 0..1.
-    """
+    """The control law's setpoint; nan if not given."""
 
     position_enu_m: Vector = NOWHERE
     velocity_enu_m_s: Vector = NOWHERE
     acceleration_enu_m_s2: Vector = NOWHERE
-    yaw_rad: float = nan
+    yaw_rad: float = nan  # counter-clockwise from east
     yaw_rate_rad_s: float = nan
     attitude: Quaternion = LEVEL
     rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
-    thrust: float = 0.0
+    thrust: float = 0.0  # 0..1 of the largest
 
 
 class Forecast(NamedTuple):
@@ -71,17 +60,17 @@ class Forecast(NamedTuple):
 
 
 class SolverState(NamedTuple):
-    """How the control law's last decision came about.
+    """Result of the control law's last decision.
 
     Attributes:
         status: Code of `colibri.autopilot.control.qp.QpStatus`, 0 is solved; -1 without a QP.
-        fallback: Code of `colibri.autopilot.control.interface.Fallback`; -1 is none.
-        iterations: Of the solver; -1 where it reports none.
-        slack: By how much soft limits are exceeded, in parts of each: the largest.
-        active: Constraints that bind: rotors, increments, angles, rates.
+        fallback: Code of `colibri.autopilot.control.interface.Fallback`, or -1.
+        iterations: Of the solver; -1 if not reported.
+        slack: Largest excess of a soft limit, in parts of it.
+        active: Active constraints: rotors, increments, angles, rates.
         planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
-        mass_kg: That the vehicle moves like; nan where the control law estimates none.
-        path_lag_s: By which the path time is behind the clock; nan where the control law keeps to the clock.
+        mass_kg: Estimate; nan for a law without one.
+        path_lag_s: Lag of the path time behind the clock; nan for a law that follows the clock.
     """
 
     status: int = -1
@@ -99,14 +88,14 @@ class SolverState(NamedTuple):
 
 
 class EstimatorState(NamedTuple):
-    """How well the vehicle knows its state.
+    """Quality of the estimate.
 
     Attributes:
         flags: ESTIMATOR_STATUS_FLAGS.
         ratios: Of the last tests of velocity, horizontal position, height, magnetic field, height above the ground and
-            airspeed: above 1 one was rejected.
-        sensors: MAV_SYS_STATUS_SENSOR bits of those that it reads.
-        failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are rejected.
+            airspeed: rejected above 1.
+        sensors: MAV_SYS_STATUS_SENSOR bits of its sensors.
+        failed_sensors: Bits of the rejected ones.
     """
 
     flags: int
@@ -122,71 +111,45 @@ NOT_SOLVED = SolverState()
 
 
 class Snapshot(NamedTuple):
-    """Everything that telemetry sends.
+    """All values that telemetry sends."""
 
-    Attributes:
-        time_us: Simulated time since the autopilot began, µs.
-        armed: Whether the rotors may turn.
-        base_mode: MAV_MODE_FLAG bits of the HEARTBEAT, but for the armed one.
-        custom_mode: The mode in the layout of the identity that is flown under.
-        intended_custom_mode: What was last asked for.
-        standard_mode: MAV_STANDARD_MODE of the mode, 0 where it is none.
-        landed_state: MAV_LANDED_STATE.
-        failsafe: Whether the vehicle acts on its own to save itself.
-        emergency: Whether it comes down for that.
-        armable: Whether every check before arming passes.
-        attitude: Unit quaternion, FLU to ENU.
-        rotor_speeds_rad_s: As the autopilot estimates them.
-        controls: Commanded, parts of the largest speed.
-        delay_us: Of commands, compensated.
-        sticks: Of the last MANUAL_CONTROL: pitch, roll, thrust, yaw, -1..1 (thrust 0..1); None without one.
-        flight_started_us, takeoff_us, landing_us: Of the last arming, take-off and landing; 0 before.
-        ground_m: Height of the ground below, over the origin.
-        target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
-        fence_breached: Whether the vehicle is where it must not be.
-        load: Part of the time between two frames that the autopilot computes, 0..1.
-        sensed: What was measured on board last; None with state feedback.
-        latest: The last value of each sensor with a message of its own, by the field of `SensorFrame`.
-        estimator: How well the state is known; None with state feedback.
-    """
-
-    time_us: int
+    time_us: int  # simulated, since the autopilot's start
     armed: bool = False
-    base_mode: int = 0
-    custom_mode: int = 0
-    intended_custom_mode: int = 0
-    standard_mode: int = 0
-    landed_state: int = 1
-    failsafe: bool = False
-    emergency: bool = False
-    armable: bool = True
+    base_mode: int = 0  # MAV_MODE_FLAG bits except the armed one
+    custom_mode: int = 0  # in the identity's layout
+    intended_custom_mode: int = 0  # last requested
+    standard_mode: int = 0  # MAV_STANDARD_MODE or 0
+    landed_state: int = 1  # MAV_LANDED_STATE
+    failsafe: bool = False  # acting on a failsafe
+    emergency: bool = False  # descending for it
+    armable: bool = True  # all arming checks pass
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     velocity_enu_m_s: Vector = (0.0, 0.0, 0.0)
     acceleration_enu_m_s2: Vector = (0.0, 0.0, 0.0)
-    attitude: Quaternion = LEVEL
+    attitude: Quaternion = LEVEL  # FLU to ENU
     rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
     origin: Geodetic = DEFAULT_ORIGIN
     home: Home | None = None
-    rotor_speeds_rad_s: FourRotors = (0.0, 0.0, 0.0, 0.0)
-    controls: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    rotor_speeds_rad_s: FourRotors = (0.0, 0.0, 0.0, 0.0)  # estimated
+    controls: FourRotors = (0.0, 0.0, 0.0, 0.0)  # commanded, parts of the largest
     battery: BatteryState | None = None
     setpoint: Setpoint = NO_SETPOINT
     solver: SolverState = NOT_SOLVED
     wind_enu_m_s: Vector = NOWHERE
-    delay_us: int = 0
-    sticks: FourRotors | None = None
-    flight_started_us: int = 0
+    delay_us: int = 0  # compensated delay of commands
+    sticks: FourRotors | None = None  # of MANUAL_CONTROL: pitch, roll, thrust, yaw
+    flight_started_us: int = 0  # last arming; 0 before, as the next two
     takeoff_us: int = 0
     landing_us: int = 0
     flights: int = 0
     terminated: bool = False
-    ground_m: float = 0.0
-    target_enu_m: Vector = NOWHERE
+    ground_m: float = 0.0  # ground height above the origin
+    target_enu_m: Vector = NOWHERE  # next waypoint; nan for the setpoint itself
     gps_ok: bool = True
     fence_enabled: bool = False
     fence_breached: bool = False
-    load: float = 0.0
-    sensed: SensorFrame | None = None
+    load: float = 0.0  # computing time, part of the frame interval
+    sensed: SensorFrame | None = None  # None under state feedback
     fix: GpsFix | None = None
-    latest: Mapping[str, Any] = MappingProxyType({})
-    estimator: EstimatorState | None = None
+    latest: Mapping[str, Any] = MappingProxyType({})  # last values of own-message sensors, by field of `SensorFrame`
+    estimator: EstimatorState | None = None  # None under state feedback

@@ -1,4 +1,4 @@
-"""Messages of the system's state: what works, which mode is flown, what time it is."""
+"""Messages of the system: health, mode, time."""
 
 from math import isfinite
 
@@ -25,7 +25,7 @@ ESTIMATED = bits(
 def sys_status(s: Snapshot) -> Fields:
     """SYS_STATUS (1): present, enabled and healthy parts; load in thousandths, mV, cA, percent.
 
-    The geofence is healthy while it is not breached, whether it is watched or not: consoles cry out at the bit alone.
+    The geofence is healthy until breached, even if disabled: consoles alarm at this bit alone.
     """
     parts = SENSORS | CONTROLS | mav.MAV_SYS_STATUS_PREARM_CHECK
     if s.battery:
@@ -57,17 +57,17 @@ def current_mode(s: Snapshot) -> Fields:
 
 
 def system_time(s: Snapshot, boot_unix_us: int = 0) -> Fields:
-    """SYSTEM_TIME (2): Unix time µs, 0 where it is not known; ms since the start."""
+    """SYSTEM_TIME (2): Unix time µs, 0 if unknown; ms since the start."""
     return (boot_unix_us + s.time_us if boot_unix_us else 0, boot_ms(s))
 
 
 def flight_information(s: Snapshot) -> Fields:
-    """FLIGHT_INFORMATION (264): times since the start in µs (their names lie) and ms; the number of the flight."""
+    """FLIGHT_INFORMATION (264): times since the start in µs (despite their names) and ms; the number of the flight."""
     return (boot_ms(s), s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
 
 
 def estimator_status(s: Snapshot) -> Fields:
-    """ESTIMATOR_STATUS (230). With state feedback every state is known, and all test ratios are 0."""
+    """ESTIMATOR_STATUS (230). Under state feedback all states are known, and test ratios are 0."""
     if s.estimator is not None:
         e = s.estimator
         return (

@@ -1,4 +1,4 @@
-"""Every message of telemetry, by name."""
+"""All telemetry messages by name."""
 
 from functools import partial
 
@@ -10,9 +10,9 @@ from colibri.mavlink.telemetry.snapshot import Snapshot
 
 
 def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
-    """Return the encoder of each message, by name; `boot_unix_us`: Unix time at the start, 0 where it is not known.
+    """Return the encoder of each message by name; `boot_unix_us`: Unix time at the start, 0 if unknown.
 
-    An encoder raises nothing, whatever the snapshot holds; its fields fit their types.
+    An encoder never raises, and its fields fit their types.
     """
     encoders: dict[str, Encoder] = {encoder.__name__.upper(): encoder for encoder in _ENCODERS}
     encoders["SYSTEM_TIME"] = partial(status.system_time, boot_unix_us=boot_unix_us)
@@ -23,7 +23,7 @@ def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
 
 
 def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
-    """Return the encoder of a message as a sensor sent it; `otherwise` where there is no such sensor."""
+    """Return the encoder of a sensor's own message; `otherwise` for a vehicle without that sensor."""
 
     def encoder(s: Snapshot) -> Fields | list[Fields] | None:
         value = s.latest.get(row.field)
@@ -74,4 +74,4 @@ _ENCODERS: tuple[Encoder, ...] = (
     sensors.scaled_imu,
     sensors.raw_imu,
 )
-"""Each is called as the message that it encodes."""
+"""Named like their messages."""

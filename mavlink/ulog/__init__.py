@@ -1,1 +1,1 @@
-"""ULog, the log format of PX4: its messages, the topics that this vehicle has, control samples and truth as topics."""
+"""ULog, PX4's log format: messages, topics, rows of a flight."""

@@ -1,4 +1,4 @@
-"""What a ULog file begins with: formats of all topics, facts about vehicle and software, parameters, subscriptions."""
+"""The beginning of a ULog file: formats of all topics, facts, parameters, subscriptions."""
 
 from collections.abc import Mapping
 from importlib.metadata import version as version_of_package
@@ -10,7 +10,7 @@ from colibri.mavlink.ulog.topics import NUMBERS, PARTS, TOPICS
 
 
 def beginning(vehicle: str, parameters: Mapping[str, int | float]) -> bytes:
-    """Return the definitions of a file of `vehicle`, and its subscriptions: whoever goes on with it needs no others."""
+    """Return the definitions and subscriptions of a file, valid for all its writers."""
     own = {topic.name: topic.fields for topic in FLIGHT_TOPICS} | {INPUT: INPUT_FIELDS}
     numbers = NUMBERS | {topic.name: topic.number for topic in FLIGHT_TOPICS} | {INPUT: INPUT_NUMBER}
     formats = [messages.format_of(name, fields) for name, fields in {**PARTS, **TOPICS, **own}.items()]

@@ -1,4 +1,4 @@
-"""Rows of numbers that become messages a block at a time, and the vehicle's motion in PX4's frames."""
+"""Blocks of rows as messages, and conversion to PX4's frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -15,31 +15,30 @@ from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 BLOCK_ROWS = 16
 """Of PX4's topics: 0.64 s."""
 EVERY_US = 40_000
-"""Interval of PX4's topics, which serve viewers: as PX4 logs them, or more often."""
+"""Interval of PX4's topics, for viewers: PX4's own or shorter."""
 
 
 class Thinning:
-    """Picks the first of the samples of each `EVERY_US` of simulated time: the same in every log of a flight."""
+    """Picks the first sample of each `EVERY_US` of simulated time: the same in every log of a flight."""
 
     def __init__(self) -> None:
         self._before_us: int | None = None
 
     def is_due(self, time_us: int) -> bool:
-        """Whether the sample of a time, which comes next, is picked."""
         before_us, self._before_us = self._before_us, time_us
         return time_us % EVERY_US == 0 if before_us is None else time_us // EVERY_US != before_us // EVERY_US
 
 
 Turn: TypeAlias = Callable[[Vector], Vector]
-"""To other axes: components permuted, and some of them negated."""
+"""Change of axes: a permutation with signs."""
 
 
 class Blocks(ABC):
-    """Encodes rows of some topics, a block at a time.
+    """Encoder of rows of some topics.
 
     Attributes:
         block_rows: Rows of a block.
-        pack: Packs a row as doubles: fewer bytes and objects than numbers of Python.
+        pack: Packs a row as doubles, smaller and with fewer objects than Python's numbers.
     """
 
     block_rows = BLOCK_ROWS
@@ -53,14 +52,14 @@ class Blocks(ABC):
 
 
 class Turned:
-    """Columns of a table in other frames: picked, and with their signs, all at once.
+    """Columns of a table in other frames, converted together.
 
     Attributes:
-        places: By which names they are picked, where they will be.
+        places: Slice of each named result.
     """
 
     def __init__(self, columns: Sequence[str], **vectors: tuple[Turn, str]) -> None:
-        """Turn vectors of three columns each of a table, `POSITION=(ned_from_enu, "x y z")`; several are one name."""
+        """Convert vectors of three columns each: `POSITION=(ned_from_enu, "x y z")`; several may share a name."""
         picked: list[int] = []
         signs: list[float] = []
         self.places: dict[str, slice] = {}
@@ -75,18 +74,16 @@ class Turned:
         self._picked, self._signs = np.array(picked), np.array(signs)
 
     def __call__(self, table: Array) -> Array:
-        """Return all of them, (rows, columns)."""
         turned: Array = table[:, self._picked] * self._signs
         return turned
 
 
 def put_valid(records: Records, position: str) -> None:
-    """Assign, once for all, that a position is known."""
     records[position, "xy_valid"][:] = True
 
 
 def attitude_ned(attitude: Array) -> Array:
-    """Return attitudes of FRD in NED, wxyz, (n, 4), of those of FLU in ENU, (n, 4)."""
+    """Convert attitudes from FLU/ENU to FRD/NED, wxyz, (n, 4)."""
     qw, qx, qy, qz = attitude.T
     return np.array(ned_frd_from_enu_flu((qw, qx, qy, qz))).T
 

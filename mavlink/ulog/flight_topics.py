@@ -1,6 +1,6 @@
-"""The topics of a flight that are Colibri's own: tables in SI, ENU and FLU, every bit of which is kept.
+"""Colibri's own topics of a flight: tables in SI, ENU and FLU, kept to the last bit.
 
-The format in the file, packing, reading, CSV columns and `docs/files.md` are derived from these tables.
+The file's format, packing, reading, CSV columns and `docs/files.md` are derived from these tables.
 """
 
 from collections.abc import Iterator
@@ -20,32 +20,24 @@ _US_PER_S = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Columns of one meaning.
-
-    Attributes:
-        names: Separated by spaces.
-        unit: Empty for none.
-        help: What they are.
-        kind: Type in the file; integers and single floats are used only where a column holds no more.
-    """
+    """Columns of one meaning; `names` separated by spaces."""
 
     names: str
     unit: str
     help: str
-    kind: str = "double"
+    kind: str = "double"  # in the file; smaller than double only if lossless
 
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A topic as a table: one row an instant, `t` (s) first.
+    """A topic as a table: one row per instant, `t` (s) first.
 
     Attributes:
-        name: In the file.
-        number: In the file; the same for all processes that write to it.
+        number: In the file, for all processes that write to it.
         table: Name of the CSV table.
-        rows: What a row is.
-        columns: All but the time.
-        block_rows: Rows that are written at once.
+        rows: Meaning of a row.
+        columns: All except the time.
+        block_rows: Rows written at once.
     """
 
     name: str
@@ -57,23 +49,19 @@ class Topic:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns, the time first."""
         return ("t", *chain.from_iterable(each.names.split() for each in self.columns))
 
     @cached_property
     def pack(self) -> Struct:
-        """Packs a row as doubles."""
         return Struct(f"<{len(self.names)}d")
 
     @cached_property
     def fields(self) -> str:
-        """The format of its messages in the file."""
         fields = (f"{each.kind} {name};" for each in self.columns for name in each.names.split())
         return "uint64_t timestamp;" + "".join(fields)
 
     @cached_property
     def layout(self) -> np.dtype[np.void]:
-        """Its messages, with their heads."""
         return message_layout(self.fields)
 
     def encode(self, rows: Array) -> bytes:
@@ -86,7 +74,7 @@ class Topic:
         return encoded.tobytes()
 
     def decode(self, encoded: NDArray[np.void]) -> Array:
-        """Return the rows of messages (n,), (n, columns)."""
+        """Return the rows (n, columns) of messages (n,)."""
         rows = np.empty((len(encoded), len(self.names)))
         rows[:, :1] = encoded["timestamp"] / _US_PER_S
         for name, place in self._runs:
@@ -95,7 +83,7 @@ class Topic:
 
     @cached_property
     def _runs(self) -> list[tuple[str, slice]]:
-        """Columns of one type that follow each other, by the name of the first."""
+        """Consecutive columns of one type, by the name of the first."""
         return list(self._found_runs())
 
     def _found_runs(self) -> Iterator[tuple[str, slice]]:
@@ -157,7 +145,7 @@ DECISION = Topic(
     ),
 )
 MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")
-"""Kinds of measurements that an estimator may fuse, in the order of the columns of `FILTER`."""
+"""Kinds of measurements of an estimator, in the order of the columns of `FILTER`."""
 ESTIMATE = Topic(
     "colibri_estimate",
     103,

@@ -1,4 +1,4 @@
-"""What an autopilot receives, as a topic: records of any length in chunks of one size."""
+"""The autopilot's input as a topic: records of any length in chunks of one size."""
 
 from collections.abc import Iterator
 from enum import IntEnum
@@ -9,7 +9,7 @@ from colibri.mavlink.ulog import messages
 
 INPUT, INPUT_NUMBER = "colibri_input", 106
 CHUNK_BYTES = 88
-"""A frame of state or sensor feedback fits into one chunk."""
+"""Fits a frame of state or sensor feedback."""
 INPUT_FIELDS = f"uint64_t timestamp;uint8_t what;bool goes_on;uint8_t size;uint8_t[{CHUNK_BYTES}] data;"
 _CHUNK = Struct(f"<HQB?B{CHUNK_BYTES}s")
 CONTENT_BYTES = _CHUNK.size
@@ -17,18 +17,18 @@ CONTENT_BYTES = _CHUNK.size
 
 
 class Kind(IntEnum):
-    """What a record is."""
+    """The kind of a record."""
 
     SETUP = 1
-    """How the autopilot began, as JSON."""
+    """The autopilot's setup, as JSON."""
     DATAGRAM = 2
-    """A datagram of a ground station, as JSON."""
+    """A ground station's datagram, as JSON."""
     FRAME = 3
     """A datagram of the plant."""
 
 
 class InputRecord(NamedTuple):
-    """A record, and the simulated time of its frame."""
+    """A record, at the simulated time of its frame."""
 
     time_us: int
     kind: int
@@ -36,7 +36,6 @@ class InputRecord(NamedTuple):
 
 
 def encode_input(time_us: int, kind: Kind, content: bytes) -> bytes:
-    """Return the messages of a record."""
     encoded = b""
     for begin in range(0, max(len(content), 1), CHUNK_BYTES):
         chunk = content[begin : begin + CHUNK_BYTES]
@@ -46,7 +45,7 @@ def encode_input(time_us: int, kind: Kind, content: bytes) -> bytes:
 
 
 def decode_inputs(chunks: Iterator[bytes]) -> Iterator[InputRecord]:
-    """Yield the records of data messages, each without its head; one that is cut off is left out."""
+    """Yield the records of data messages without heads; a truncated one is omitted."""
     content = b""
     for chunk in chunks:
         _, time_us, kind, goes_on, size, data = _CHUNK.unpack(chunk)

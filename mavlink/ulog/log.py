@@ -1,4 +1,4 @@
-"""The log of a flight: topics as rows, a block at a time to a file, or kept in memory."""
+"""The log of a flight: topics as rows, written in blocks or kept in memory."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -14,30 +14,30 @@ from colibri.mavlink.ulog.blocks import Blocks
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
 
 ROWS_AT_ONCE = 4096
-"""Rows that are read at once: some seconds of a flight."""
+"""Rows read at once: some seconds of a flight."""
 _QUEUED = 64
 
 RowEncoder: TypeAlias = Topic | Blocks
-"""Encodes rows of a topic, or of several of PX4's."""
+"""Encoder of a topic's rows, or of several of PX4's."""
 
 
 class TopicReader(Protocol):
-    """What a flight has left, by topic."""
+    """A flight's log, by topic."""
 
     def blocks(self, topic: Topic) -> Iterator[Array]:
-        """Yield the rows of a topic in their order, in blocks (n, columns), n > 0."""
+        """Yield a topic's rows in order, in blocks (n, columns), n > 0."""
         ...
 
     def encoded(self) -> Iterator[bytes]:
-        """Yield a file with all topics, part by part."""
+        """Yield a file with all topics, in parts."""
         ...
 
 
 class TopicLog(ABC):
-    """Takes the topics of a flight.
+    """A log of a flight's topics; its methods raise `LogError` if writing fails.
 
     Attributes:
-        for_viewers: Whether PX4's topics are recorded, too, and what it takes to replay the flight.
+        for_viewers: Whether to record PX4's topics and the inputs for replay.
     """
 
     for_viewers = True
@@ -48,15 +48,10 @@ class TopicLog(ABC):
         self._beginning = b""
 
     def begin(self, beginning: bytes) -> None:
-        """Note the beginning of a file, where one may be written of this later."""
+        """Note the beginning of a file, in case one is written later."""
         self._beginning = beginning
 
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:
-        """Add a row.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         waiting = self._waiting.get(encoder)
         if waiting is None:
             waiting = self._waiting[encoder] = []
@@ -65,36 +60,22 @@ class TopicLog(ABC):
             self._take(encoder)
 
     def queue(self, encoded: bytes) -> None:
-        """Have messages written before the next block.
-
-        Raises:
-            LogError: They cannot be written.
-        """
+        """Write messages before the next block."""
         self._queued.append(encoded)
         if len(self._queued) >= _QUEUED:
             self._append_queued()
 
     def flush(self) -> None:
-        """Write what waits.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self._append_queued()
         for encoder, waiting in self._waiting.items():
             if waiting:
                 self._take(encoder)
 
     @abstractmethod
-    def append(self, encoded: bytes) -> None:
-        """Append messages.
-
-        Raises:
-            LogError: They cannot be written.
-        """
+    def append(self, encoded: bytes) -> None: ...
 
     def close(self) -> None:
-        """Write what waits, if that can be done, and close."""
+        """Write pending rows if possible, and close."""
         with suppress(LogError):
             self.flush()
 
@@ -113,7 +94,7 @@ class TopicLog(ABC):
 
 
 class FileLog(TopicLog):
-    """A log in a file, which is opened with the first message."""
+    """A log in a file, opened with the first message, also after `close`."""
 
     def __init__(self, opened: Callable[[], LogFile]) -> None:
         super().__init__()
@@ -121,13 +102,11 @@ class FileLog(TopicLog):
         self._file: LogFile | None = None
 
     def append(self, encoded: bytes) -> None:
-        """Append messages."""
         if self._file is None:
             self._file = self._opened()
         self._file.append(encoded)
 
     def close(self) -> None:
-        """Write what waits, if that can be done, and close; the next message opens the file again."""
         super().close()
         if self._file is not None:
             self._file.close()
@@ -135,7 +114,7 @@ class FileLog(TopicLog):
 
 
 class MemoryLog(TopicLog):
-    """A log in memory, of rows as they came."""
+    """A log in memory, as rows."""
 
     def __init__(self, *, for_viewers: bool = False) -> None:
         super().__init__()
@@ -144,11 +123,9 @@ class MemoryLog(TopicLog):
         self._messages = bytearray()
 
     def append(self, encoded: bytes) -> None:
-        """Append messages."""
         self._messages += encoded
 
     def blocks(self, topic: Topic) -> Iterator[Array]:
-        """Yield the rows of a topic in their order, in blocks (n, columns), n > 0."""
         self.flush()
         rows = self._rows[topic]
         step = ROWS_AT_ONCE * topic.pack.size
@@ -156,7 +133,6 @@ class MemoryLog(TopicLog):
             yield _table(topic, bytes(rows[begin : begin + step]))
 
     def encoded(self) -> Iterator[bytes]:
-        """Yield a file with all topics, part by part."""
         self.flush()
         yield self._beginning
         yield bytes(self._messages)
@@ -172,7 +148,7 @@ class MemoryLog(TopicLog):
 
 
 def _encoded(encoder: RowEncoder, table: Array) -> bytes:
-    """Return the messages of a block, behind a mark for readers that have lost their place."""
+    """Return a block's messages behind a mark for resynchronising readers."""
     with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a single float
         return messages.SYNC + encoder.encode(table)
 

@@ -22,26 +22,24 @@ HEAD_BYTES = _HEAD.size
 
 
 def message(kind: str, content: bytes) -> bytes:
-    """Return a message of a type, a letter."""
     return _HEAD.pack(len(content), ord(kind)) + content
 
 
 SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))
-"""What a reader looks for behind bytes that it cannot read."""
+"""Mark for readers after unreadable bytes."""
 
 
 def header(start_us: int = 0) -> bytes:
-    """Return the beginning of a file whose log starts at a time, µs, with no flag set."""
+    """Return a file's header with start time, µs, and flag bits."""
     return MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
 
 
 def format_of(name: str, fields: str) -> bytes:
-    """Return the definition of a type: `fields` are "type name;" each."""
+    """Return the definition of a type; `fields` are "type name;" each."""
     return message("F", f"{name}:{fields}".encode())
 
 
 def information(facts: Mapping[str, str | int]) -> bytes:
-    """Return texts and numbers (uint32_t) by name."""
     return b"".join(_information(name, fact) for name, fact in facts.items())
 
 
@@ -53,7 +51,7 @@ def _information(name: str, fact: str | int) -> bytes:
 
 
 def parameters(values: Mapping[str, int | float]) -> bytes:
-    """Return parameters by name: among the definitions those at the start, later what has changed."""
+    """Return parameters: initial values in the definitions, changes in the data."""
     return b"".join(_parameter(name, value) for name, value in values.items())
 
 
@@ -67,10 +65,9 @@ def _keyed(kind: str, key: str, value: bytes) -> bytes:
 
 
 def subscription(topic: str, number: int) -> bytes:
-    """Return that messages of a number are of a topic."""
     return message("A", _SUBSCRIPTION.pack(0, number) + topic.encode())
 
 
 def logged_string(time_us: int, severity: int, text: str) -> bytes:
-    """Return a line that was said; `severity` as of STATUSTEXT, 0 (emergency) to 7 (debug)."""
+    """Return a logged text; `severity` as in STATUSTEXT."""
     return message("L", _LOGGED.pack(ord("0") + severity, time_us) + text.encode()[:_MAX_TEXT_BYTES])

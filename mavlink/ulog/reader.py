@@ -1,4 +1,4 @@
-"""Reader of flight logs: the own topics of a ULog, block by block, and its inputs."""
+"""Reader of flight logs: Colibri's topics and inputs, block by block."""
 
 from collections.abc import Iterator
 from mmap import ACCESS_READ, MADV_DONTNEED, mmap
@@ -13,27 +13,27 @@ from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
 from colibri.mavlink.ulog.inputs import CONTENT_BYTES, INPUT_NUMBER, InputRecord, decode_inputs
 
 FILE = "flight.ulg"
-"""In the folder of a flight."""
+"""In a flight's folder."""
 ROWS_AT_ONCE = 4096
 _BLOCK_ROWS = 128
 _MAPPED_BYTES = 1 << 23
-"""So much of a file is in memory at once, however long the flight was."""
+"""Memory limit, independent of the flight's length."""
 _KINDS = frozenset(b"BFIMPASDLCORQ")
 
 
 class LogFormatError(MavlinkError):
-    """A file is no flight log; the message is the one line that a user needs."""
+    """The file is not a flight log; the message is the line for the user."""
 
 
 class FlightFile:
-    """A flight log that is read by topic; of a process that was killed, the last message may be cut off."""
+    """A flight log; after a killed process, its last message may be truncated."""
 
     def __init__(self, path: Path) -> None:
-        """Read where its messages are.
+        """Index the messages.
 
         Raises:
-            OSError: It cannot be read.
-            LogFormatError: It is no ULog, or one without the topics of this version.
+            OSError: The file cannot be read.
+            LogFormatError: It is not a ULog, or lacks this version's topics.
         """
         self._path = path
         with path.open("rb") as file:
@@ -45,7 +45,6 @@ class FlightFile:
         self._index()
 
     def blocks(self, topic: Topic) -> Iterator[Array]:
-        """Yield the rows of a topic in their order, in blocks (n, columns), n > 0."""
         waiting: list[Array] = []
         for begin, count in self._runs[topic.number]:
             encoded = np.frombuffer(self._log, topic.layout, count, begin)
@@ -58,11 +57,9 @@ class FlightFile:
             yield np.concatenate(waiting)
 
     def encoded(self) -> Iterator[bytes]:
-        """Yield the file."""
         yield self._log[:]
 
     def inputs(self) -> Iterator[InputRecord]:
-        """Yield what the autopilot began with and received."""
         yield from decode_inputs(self._chunks())
 
     def _chunks(self) -> Iterator[bytes]:
@@ -96,7 +93,7 @@ class FlightFile:
                 raise LogFormatError(f"{self._path}: no log of a flight of this version")
 
     def _add_run(self, at: int, head: bytes, size: int) -> int:
-        """Add messages of one topic that follow each other; return how many."""
+        """Index consecutive messages of one topic; return their number."""
         runs = self._runs.get(int.from_bytes(head[3:], "little"))
         if runs is None:
             return 1
@@ -111,7 +108,7 @@ class FlightFile:
         return count
 
     def _release(self) -> None:
-        """Let the system have the memory of what was read."""
+        """Release the memory of pages read so far."""
         if isinstance(self._log, mmap):
             self._log.madvise(MADV_DONTNEED)
 

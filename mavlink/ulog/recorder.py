@@ -1,4 +1,4 @@
-"""A vehicle that ground stations fly, as a ULog: its snapshots, what it says, its parameters."""
+"""A recorder of the vehicle's snapshots, texts and parameters as ULog."""
 
 from collections.abc import Mapping
 from math import nan
@@ -21,14 +21,14 @@ _NO_REFERENCE = (nan,) * 3
 
 
 class Recorder:
-    """Writes snapshots to a log."""
+    """Writes snapshots to a log; raises `LogError` if writing fails."""
 
     def __init__(
         self, log: TopicLog, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool
     ) -> None:
-        """Record `vehicle`; its battery not where the plant writes of it to the same file.
+        """Record `vehicle`, without battery if the plant records it in the same file.
 
-        Snapshots are thinned, but for changes of the status.
+        Snapshots are thinned, except changes of the status.
         """
         self._log, self._vehicle, self._system_id, self._parameters = log, vehicle, system_id, parameters
         self._with_battery = with_battery
@@ -39,17 +39,11 @@ class Recorder:
         self._thinning = Thinning()
 
     def begin(self) -> bytes:
-        """Return the beginning of a file."""
         self._status, self._thinning = None, Thinning()
         self._revision, self._values = self._parameters.revision, dict(self._parameters.values)
         return beginning(self._vehicle, self._values)
 
     def update(self, snapshot: Snapshot) -> None:
-        """Record a snapshot.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self._record_parameters()
         self._record_status(snapshot)
         if not self._thinning.is_due(snapshot.time_us):
@@ -60,11 +54,6 @@ class Recorder:
             self._log.add(self._sensings, row)
 
     def say(self, time_us: int, severity: int, text: str) -> None:
-        """Record a status text.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self._log.append(messages.SYNC + messages.logged_string(time_us, severity, text))
 
     def _record_parameters(self) -> None:
@@ -76,7 +65,7 @@ class Recorder:
         self._log.append(messages.SYNC + messages.parameters(changed))
 
     def _record_status(self, snapshot: Snapshot) -> None:
-        """Record the status where it has changed, and every second; with it the battery, and what waits."""
+        """Record a new status, or every second; with it the battery, and flush the log."""
         now_us, status = snapshot.time_us, status_of(snapshot)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
             return
@@ -104,19 +93,16 @@ def sample_row(s: Snapshot) -> tuple[float, ...]:
 
 
 def sensing_row(s: Snapshot) -> tuple[float, ...] | None:
-    """Return the row of `sensing.COLUMNS`; None where the state is not estimated."""
     if s.sensed is None or s.estimator is None:
         return None
     return sensing_numbers(s.time_us, s.sensed, s.estimator)
 
 
 def status_of(s: Snapshot) -> Status:
-    """Return the status."""
     return Status(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
 
 
 def battery_message(time_us: int, battery: BatteryState) -> bytes:
-    """Return the battery at a time."""
     taken = (battery.voltage_v, battery.current_a, 1e3 * battery.used_ah, battery.remaining, battery.remaining_s)
     warning = max(battery.charge_state - CHARGE_OK, 0)
     return messages.SYNC + record(topics.BATTERY, time_us, *taken, True, battery.cells, warning)

@@ -1,4 +1,4 @@
-"""Control samples as topics: the state that a control law is given, what it steers to, commands, how it decided."""
+"""Control samples as topics: state, setpoint, commands, solver."""
 
 import numpy as np
 
@@ -20,11 +20,11 @@ COLUMNS = (
     *("active_rotors", "active_increments", "active_angles", "active_rates"),
     *("delay_us", "mass_kg", "path_lag_s", "iterations"),
 )
-"""What a row of a control sample has, in SI, ENU and FLU; nan for what there is not.
+"""Columns of a control sample, in SI, ENU and FLU; nan if missing.
 
 Time (µs); position, velocity, attitude (wxyz, FLU to ENU), rates; commanded rotor speeds in parts of the largest, nan
 unless armed; references of position, velocity, acceleration, yaw (counter-clockwise from east) and its rate; attitude
-steered to; and how it was decided, from the attitude on as in `autopilot.csv`.
+setpoint; and the decision, as in `autopilot.csv`.
 """
 
 _TOPICS = (
@@ -58,7 +58,6 @@ class SampleBlocks(Blocks):
     """Encodes rows of `COLUMNS`."""
 
     def __init__(self) -> None:
-        """Have room for a block. What is compiled is loaded here."""
         super().__init__(len(COLUMNS))
         _quaternions(np.zeros((1, 3)))
         self._records = Records(BLOCK_ROWS, *_TOPICS)
@@ -66,7 +65,6 @@ class SampleBlocks(Blocks):
         self._records[topics.MOTORS, "control"][:] = np.nan
 
     def encode(self, table: Array) -> bytes:
-        """Return the messages of rows."""
         count, records, turned = len(table), self._records, _turned(table)
         for topic in _TOPICS:
             records[topic, "timestamp"][:count] = table[:, :1]

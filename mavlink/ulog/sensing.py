@@ -1,4 +1,4 @@
-"""What sensors measure, and how good the estimate of them is, as topics."""
+"""Sensor measurements and estimation quality as topics."""
 
 from colibri.common.types import Array
 from colibri.mavlink.hil.sensors import SensorFrame
@@ -12,14 +12,14 @@ COLUMNS = (
     *("time_us", "fx", "fy", "fz", "p", "q", "r", "flags", "horizontal_accuracy_m", "vertical_accuracy_m"),
     *("heading_ratio", "velocity_ratio", "position_ratio", "height_ratio", "above_ground_ratio"),
 )
-"""What a row has: time (µs), specific force (m/s², FLU), rates (rad/s, FLU); ESTIMATOR_STATUS_FLAGS; standard
-deviations of the position; and of the last tests their ratios, above 1 where one was rejected."""
+"""Time (µs), specific force (m/s², FLU), rates (rad/s, FLU); ESTIMATOR_STATUS_FLAGS; standard deviations of the
+position; and the last tests' ratios, rejected above 1.
+"""
 
 _turned = Turned(COLUMNS, INERTIAL=(frd_from_flu, "p q r fx fy fz"))
 
 
 def sensing_numbers(time_us: int, sensed: SensorFrame, estimator: EstimatorState) -> tuple[float, ...]:
-    """Return a row."""
     velocity, position, height, heading, above_ground, *_ = estimator.ratios
     return (
         *(time_us, *sensed.specific_force_flu_m_s2, *sensed.rate_flu_rad_s, estimator.flags),
@@ -32,12 +32,10 @@ class SensingBlocks(Blocks):
     """Encodes rows of `COLUMNS`."""
 
     def __init__(self) -> None:
-        """Have room for a block."""
         super().__init__(len(COLUMNS))
         self._records = Records(BLOCK_ROWS, topics.SENSORS, topics.ESTIMATOR)
 
     def encode(self, table: Array) -> bytes:
-        """Return the messages of rows."""
         count, records = len(table), self._records
         for topic in (topics.SENSORS, topics.ESTIMATOR):
             records[topic, "timestamp"][:count] = table[:, :1]

@@ -1,4 +1,4 @@
-"""The vehicle's status as a topic: armed or not, its mode by PX4's numbers."""
+"""The vehicle's status as a topic, with PX4's mode numbers."""
 
 from typing import NamedTuple
 
@@ -26,29 +26,23 @@ _NAV_STATES = {
 
 
 class Status(NamedTuple):
-    """The status of a vehicle.
-
-    Attributes:
-        custom_mode: In PX4's layout.
-        armed_us: When it was last armed, µs; 0 before.
-        takeoff_us: When it last took off; 0 before.
-    """
+    """The status of a vehicle."""
 
     armed: bool
-    custom_mode: int
+    custom_mode: int  # in PX4's layout
     failsafe: bool = False
     armable: bool = True
-    armed_us: int = 0
-    takeoff_us: int = 0
+    armed_us: int = 0  # last arming; 0 before
+    takeoff_us: int = 0  # last take-off; 0 before
 
 
 def nav_state(custom_mode: int) -> int:
-    """Return PX4's number of a mode; 31, which is none, for one that has no number."""
+    """Return PX4's nav_state of a mode, or 31."""
     return _NAV_STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF), 31)
 
 
 def status_message(time_us: int, status: Status, system_id: int) -> bytes:
-    """Return the status at a time, behind a mark for readers that have lost their place."""
+    """Return the status behind a mark for resynchronising readers."""
     mode = nav_state(status.custom_mode)
     who = (_ROTARY_WING, mav.MAV_TYPE_QUADROTOR, system_id, AUTOPILOT_COMPONENT)
     times_us, arming = (time_us, status.armed_us, status.takeoff_us), _ARMED if status.armed else _DISARMED

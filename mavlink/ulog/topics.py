@@ -1,7 +1,6 @@
-"""The topics of our logs: names, fields, units and frames (NED, FRD) are those of PX4, of whose fields each has a part.
+"""Topics of viewers: names, units and frames (NED, FRD) of PX4, each with part of its fields.
 
-https://docs.px4.io/main/en/msg_docs/ has what each field of PX4's is. `mpc_status` is our own: how a control sample was
-decided, as in `autopilot.csv`.
+Fields: https://docs.px4.io/main/en/msg_docs/. `mpc_status` is Colibri's: the decision as in `autopilot.csv`.
 """
 
 from collections.abc import Callable, Mapping
@@ -67,12 +66,12 @@ TOPICS: Mapping[str, str] = {
         "uint8_t component_id;bool failsafe;bool is_vtol;bool in_transition_mode;bool pre_flight_checks_pass;"
     ),
 }
-"""Their fields."""
+"""Fields by topic."""
 
 PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}
-"""Types that are fields of topics."""
+"""Nested types."""
 NUMBERS = {name: number for number, name in enumerate(TOPICS)}
-"""Of a topic in the file: the same for all that write to one."""
+"""Topic numbers, for all writers of a file."""
 _CODES = {
     "uint64_t": "Q",
     "uint32_t": "I",
@@ -84,11 +83,11 @@ _CODES = {
     "float": "f",
     "bool": "?",
 }
-"""Of the types, as `struct` and NumPy have them."""
+"""Types as in `struct` and NumPy."""
 
 
 def record(topic: str, *numbers: float) -> bytes:
-    """Return a data message of the numbers of all fields of a topic, in their order."""
+    """Return a data message of all fields of a topic, in order."""
     return messages.message("D", _packer(topic)(NUMBERS[topic], *numbers))
 
 
@@ -98,7 +97,7 @@ def _packer(topic: str) -> Callable[..., bytes]:
 
 
 def _fields(text: str) -> list[tuple[str, str, int]]:
-    """Return name, type and count of fields; of one type that follow each other as one array, by the first's name."""
+    """Return name, type and count of fields; consecutive ones of one type as one array, by the first's name."""
     fields: list[tuple[str, str, int]] = []
     for field in text.split(";")[:-1]:
         kind, name = field.split()
@@ -119,23 +118,20 @@ def _layout(text: str) -> list[tuple[str, Any, tuple[int]]]:
 
 
 def message_layout(fields: str) -> "np.dtype[np.void]":
-    """Return the layout of data messages whose topic has these fields."""
     return np.dtype([("size", "<u2"), ("kind", "u1"), ("number", "<u2"), *_layout(fields)])
 
 
 def head(layout: "np.dtype[np.void]", number: int) -> tuple[int, int, int]:
-    """Return size, kind and topic number of data messages of a layout."""
     return layout.itemsize - messages.HEAD_BYTES, messages.DATA, number
 
 
 class Records:
-    """Data messages of some topics, one of each a row, whose fields are assigned for many rows at once.
+    """Data messages of some topics, one of each per row, with fields assigned for many rows at once.
 
-    Fields of one type that follow each other are assigned together, by the name of the first: (rows, fields).
+    Consecutive fields of one type are assigned together, by the name of the first: (rows, fields).
     """
 
     def __init__(self, rows: int, *topics: str) -> None:
-        """Have room for so many rows; all fields are 0."""
         self._rows = np.zeros(rows, [(topic, message_layout(TOPICS[topic])) for topic in topics])
         for topic in topics:
             of_topic = self._rows[topic]
@@ -145,9 +141,7 @@ class Records:
         }
 
     def __getitem__(self, topic_and_field: tuple[str, str]) -> Any:
-        """Return what is assigned to by the name of its first field, (rows, fields)."""
         return self._assigned[topic_and_field]
 
     def first(self, count: int) -> bytes:
-        """Return the messages of the first rows."""
         return self._rows[:count].tobytes()

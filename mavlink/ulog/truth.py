@@ -21,22 +21,16 @@ _RATES, _POSITION = _turned.places.values()
 
 
 class TruthVehicle(NamedTuple):
-    """What of a vehicle gives numbers of the truth their units.
+    """Units of a vehicle's truth."""
 
-    Attributes:
-        rad_s_per_speed_unit: The unit of its rotor speeds.
-        capacity_ah: Of its battery; 0 without one.
-    """
-
-    rad_s_per_speed_unit: float
-    capacity_ah: float
+    rad_s_per_speed_unit: float  # of its rotor speeds
+    capacity_ah: float  # of its battery; 0 without one
 
 
 class TruthBlocks(Blocks):
     """Encodes rows of `TRUTH`."""
 
     def __init__(self, vehicle: TruthVehicle) -> None:
-        """Encode for a vehicle."""
         super().__init__(len(TRUTH.names))
         self._capacity_ah = vehicle.capacity_ah
         self._rpm_per_unit = vehicle.rad_s_per_speed_unit * 30.0 / pi
@@ -48,7 +42,6 @@ class TruthBlocks(Blocks):
         self._records[topics.ESCS, "esc_count"][:] = (_ROTORS, _ALL_OF_THEM, _ALL_OF_THEM)
 
     def encode(self, table: Array) -> bytes:
-        """Return the messages of rows."""
         count, records, turned = len(table), self._records, _turned(table)
         time_us = np.rint(1e6 * table[:, :1])
         for topic in (topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS):
@@ -65,7 +58,7 @@ class TruthBlocks(Blocks):
         return records.first(count) + self._battery(*table[-1, [0, 18, 19]].tolist())
 
     def _battery(self, time_s: float, voltage_v: float, charge_ah: float) -> bytes:
-        """Return a message of the battery, whose current is the mean since the one before."""
+        """Return a battery message with the mean current since the previous one."""
         if not self._capacity_ah:
             return b""
         elapsed_s, used_ah = time_s - self._charge_s, charge_ah - self._charge_ah
@@ -77,7 +70,7 @@ class TruthBlocks(Blocks):
 
 
 def _rotated(attitude: Array, vector: Array) -> tuple[Array, Array, Array]:
-    """Return vectors of the body, (3, n), in the earth's frame, by attitudes (4, n): v + w t + q x t, t = 2 q x v."""
+    """Rotate body vectors, (3, n), to earth by attitudes (4, n): v + w t + q x t, t = 2 q x v."""
     w, x, y, z = attitude
     u, v, s = vector
     tx, ty, tz = 2.0 * (y * s - z * v), 2.0 * (z * u - x * s), 2.0 * (x * v - y * u)

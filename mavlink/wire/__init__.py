@@ -1,1 +1,1 @@
-"""Bytes to MAVLink messages and back: dialect, framing, signing, telemetry-log format, the only NED/FRD."""
+"""Bytes ⇄ MAVLink messages: dialect, framing, signing, telemetry logs, NED/FRD."""

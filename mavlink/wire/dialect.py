@@ -1,4 +1,4 @@
-"""Bytes ⇄ MAVLink 2 messages; the one place that imports pymavlink. Nothing malformed ever raises: it is counted."""
+"""Bytes ⇄ MAVLink 2 messages, and the only import of pymavlink. Malformed input is counted, never raised."""
 
 from collections import Counter, namedtuple
 from collections.abc import Callable, Iterator, Sequence
@@ -13,12 +13,12 @@ from colibri.mavlink.wire import missing_messages
 
 missing_messages.add_to(development)
 mav: Any = development
-"""The dialect: its enumerations, for who speaks it."""
+"""The dialect with its enumerations."""
 
 AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
 TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2
-"""Sends the true state, for whoever stands between plant and autopilot."""
+"""Sends the true state, for programs between plant and autopilot."""
 
 TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
 TYPE_GENERIC: int = mav.MAV_TYPE_GENERIC
@@ -38,12 +38,12 @@ RESULT_DENIED: int = mav.MAV_RESULT_DENIED
 RESULT_UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 
 MARKER = 0xFD
-"""What a frame of MAVLink 2 begins with."""
+"""First byte of a MAVLink 2 frame."""
 SIGNED = 0x01
-"""The incompatibility flag of a frame that a signature follows, https://mavlink.io/en/guide/serialization.html."""
+"""Incompatibility flag of a signed frame, https://mavlink.io/en/guide/serialization.html."""
 SIGNATURE_BYTES: int = mav.MAVLINK_SIGNATURE_BLOCK_LEN
 UNKNOWN = "UNKNOWN"
-"""Name of a message that the dialect has not."""
+"""Name of messages outside the dialect."""
 
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
@@ -56,18 +56,18 @@ CRC_START = 0xFFFF
 
 
 def bits(prefix: str, names: str) -> int:
-    """Return the sum of enumeration members that begin with `prefix` and go on as `names` do, parted by blanks."""
+    """Return the sum of enumeration members `prefix` + name, for names separated by spaces."""
     return sum(getattr(mav, prefix + name) for name in names.split())
 
 
 class Message(NamedTuple):
-    """A decoded message: whose CRC holds, whose values nobody has checked yet.
+    """A decoded message with a valid CRC; its values are unchecked.
 
     Attributes:
-        name: Message name as MAVLink has it, "HEARTBEAT".
-        source: System and component id of the sender.
-        fields: The fields as attributes, in wire units and frames; text is a str, an array a tuple or a list.
-        frame: The bytes it came in, with its signature if it has one.
+        name: In MAVLink's spelling, "HEARTBEAT".
+        source: System and component id.
+        fields: Attributes in wire units and frames; text is a str, an array a tuple or a list.
+        frame: The received bytes, including a signature.
     """
 
     name: str
@@ -77,33 +77,33 @@ class Message(NamedTuple):
 
 
 class Bits(NamedTuple):
-    """A float field by its bits: a Python float would change those of a signalling NaN."""
+    """The bits of a float field: a Python float would change a signalling NaN."""
 
     pattern: int
 
 
 def param_bits(message: Message) -> int:
-    """Return the 32 bits of `param_value` of a PARAM_SET or PARAM_VALUE, as an unsigned integer.
+    """Return the 32 bits of `param_value` of a PARAM_SET or PARAM_VALUE.
 
-    Parameters that are integers travel bytewise in that float (https://mavlink.io/en/services/parameter.html,
-    parameter encoding): its value in `message.fields` is another one where the bits are those of a signalling NaN.
+    Integers are copied bytewise into that float (https://mavlink.io/en/services/parameter.html); `message.fields` has
+    another value if they form a signalling NaN.
     """
     return int.from_bytes(payload(message.frame)[: _PARAM_VALUE.size], "little")
 
 
 def payload(frame: bytes) -> bytes:
-    """Return the payload of a whole frame of MAVLink 1 or 2; zeros at its end may be missing."""
+    """Return the payload of a frame of MAVLink 1 or 2; trailing zeros may be missing."""
     start = _header_bytes(frame)
     return frame[start : start + frame[1]]
 
 
 def sequence_of(frame: bytes) -> int:
-    """Return the sequence number of a whole frame of MAVLink 1 or 2."""
+    """Return the sequence number of a frame of MAVLink 1 or 2."""
     return frame[4] if frame[0] == MARKER else frame[2]
 
 
 def intact(frame: bytes) -> bool | None:
-    """Whether the CRC of a whole frame of MAVLink 1 or 2 holds; None where the dialect has no such message."""
+    """Whether a frame's CRC holds; `None` for a message outside the dialect."""
     start = _header_bytes(frame)
     layout = _layout(int.from_bytes(frame[7:start], "little") if start == HEADER_BYTES else frame[start - 1])
     if layout is None:
@@ -113,22 +113,23 @@ def intact(frame: bytes) -> bool | None:
 
 
 class Codec:
-    """Encodes as one component, decodes from anybody.
+    """Encoder for one component, decoder for any.
 
-    Whole MAVLink 2 frames, which is all that a flight sends, are read and written here: pymavlink takes several times
-    as long. MAVLink 1 is left to pymavlink, as is every judgement on bad input. Signatures are read over.
+    MAVLink 2 frames, the only ones in flight, are read and written here, several times as fast as by pymavlink. MAVLink
+    1
+    and malformed input are left to pymavlink. Signatures are not checked.
 
     Attributes:
-        source: System and component id that it speaks as.
-        seal: Returns the signature of a frame that is whole but for that; None to sign nothing.
-        dropped: How many pieces of input were no message of this dialect, by reason.
+        source: Own system and component id.
+        seal: Signs a frame; `None` to send unsigned.
+        dropped: Invalid input, counted by reason.
     """
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
-        """Speak as component `component_id` of system `system_id`.
+        """Encode as a component.
 
-        With `keep_unknown`, decoding returns messages that the dialect has not, too, as their frames with no fields and
-        the name `UNKNOWN`: nobody can have checked their CRC.
+        With `keep_unknown`, messages outside the dialect are returned as `UNKNOWN`, without fields and with unchecked
+        CRC.
         """
         self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
@@ -140,16 +141,15 @@ class Codec:
         self.dropped: Counter[str] = Counter()
 
     def encode(self, name: str, *fields: Any) -> bytes:
-        """Encode message `name` with its fields in the order of the MAVLink definition, in wire units and frames.
+        """Encode message `name` with fields in the order of the MAVLink definition, in wire units and frames.
 
-        Text is bytes, or a str that goes out as UTF-8; what is too long is cut. `param_value` of PARAM_VALUE and of
-        PARAM_SET may be `Bits`.
+        Text is bytes, or a str that is sent as UTF-8; longer text is cut. `param_value` may be `Bits`.
         """
         layout = _layout_named(name)
         return self.framed(layout.payload(fields), layout.message_id, layout.crc_extra)
 
     def framed(self, payload: bytes, message_id: bytes, crc_extra: bytes) -> bytes:
-        """Return the next frame, with this payload; zeros at its end are left out."""
+        """Return the next frame with this payload, without trailing zeros."""
         if not payload[-1]:
             payload = payload.rstrip(b"\0") or b"\0"
         sequence, seal = self._sequence, self.seal
@@ -160,12 +160,11 @@ class Codec:
         return frame if seal is None else frame + seal(frame)
 
     def decode(self, datagram: bytes) -> list[Message]:
-        """Return the messages of one datagram. A datagram holds whole frames: none continues the one before."""
+        """Return the messages of a datagram of whole frames."""
         messages = _whole_messages(datagram)
         return self._parsed(datagram) if messages is None else messages
 
     def _parsed(self, datagram: bytes) -> list[Message]:
-        """Return what pymavlink makes of a datagram; count what it cannot."""
         self._mav.buf = bytearray()
         self._mav.buf_index = 0
         self._mav.expected_length = _HEADER_BYTES_V1 + CRC_BYTES
@@ -190,10 +189,9 @@ class Codec:
 
 
 class _Layout:
-    """How a message lies in a frame."""
+    """Layout of a message in a frame."""
 
     def __init__(self, definition: Any) -> None:
-        """Take the layout from pymavlink's class of the message."""
         definition = missing_messages.with_later_fields(definition)
         self.name: str = definition.msgname
         self.message_id: bytes = definition.id.to_bytes(3, "little")
@@ -213,7 +211,7 @@ class _Layout:
         self._texts = [i for i, kind in enumerate(definition.fieldtypes) if kind == "char"]
 
     def payload(self, fields: Sequence[Any]) -> bytes:
-        """Return the payload; fields of extensions may be missing."""
+        """Return the payload; extension fields may be omitted."""
         missing = len(self._fields._fields) - len(fields)
         if missing:
             fields = (*fields, *self._defaults[-missing:])
@@ -225,17 +223,16 @@ class _Layout:
         return self._pack(*values)
 
     def crc(self, header_and_payload: bytes) -> bytes:
-        """Return the checksum behind a header and a payload."""
         return crc16(header_and_payload[1:] + self.crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
 
     def read(self, payload: bytes) -> Any:
-        """Return the fields of a payload, of which zeros at the end, and what a later dialect added, may be missing."""
+        """Return the fields of a payload, which may lack trailing zeros or have later extensions."""
         size = self._size
         values = self._in_order_of_fields(self._unpack(payload.ljust(size, b"\0")[:size]))
         return self._fields._make(self._with_text(values) if self._texts else values)
 
     def _with_text(self, values: Sequence[Any]) -> list[Any]:
-        """Return the fields with text as pymavlink reads it: up to the first NUL; what is not ASCII is replaced."""
+        """Return the fields with text up to the first NUL, non-ASCII replaced, as pymavlink does."""
         fields = list(values)
         for i in self._texts:
             fields[i] = fields[i].split(b"\0", 1)[0].decode("ascii", "replace")
@@ -243,10 +240,9 @@ class _Layout:
 
 
 class _ParameterLayout(_Layout):
-    """Of PARAM_VALUE and PARAM_SET, whose float is the first of the wire and may be `Bits`."""
+    """Layout of PARAM_VALUE and PARAM_SET: their float is first on the wire and may be `Bits`."""
 
     def __init__(self, definition: Any) -> None:
-        """Take the layout from pymavlink's class of the message."""
         super().__init__(definition)
         self._pack_floats = self._pack
         self._pack = self._pack_bits_or_floats
@@ -258,7 +254,7 @@ class _ParameterLayout(_Layout):
 
 
 def _whole_messages(datagram: bytes) -> list[Message] | None:
-    """Return the messages of a datagram made of nothing but whole MAVLink 2 frames; None for any other."""
+    """Return the messages of a datagram of whole MAVLink 2 frames; `None` for any other."""
     messages, end, after = [], len(datagram), 0
     while after < end:
         at = after
@@ -291,11 +287,10 @@ def _slow_crc16(data: bytes, _start: int) -> int:
 
 
 crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc16
-"""The compiled checksum that pymavlink found, without the object that it puts around it."""
+"""pymavlink's compiled checksum without its wrapper object."""
 
 
 def definition_of(name: str) -> Any:
-    """Return pymavlink's class of a message."""
     return getattr(mav, f"MAVLink_{name.lower()}_message")
 
 
@@ -305,13 +300,13 @@ def _layout_named(name: str) -> _Layout:
 
 
 def _layout(message_id: int) -> _Layout | None:
-    """Return the layout of a message, None of an unknown one: of those, which anybody may send, none is kept."""
+    """Return the layout of a message; unknown ids, which anyone may send, are not cached."""
     definition = mav.mavlink_map.get(message_id)
     return None if definition is None else _layout_named(definition.msgname)
 
 
 def _places(lengths: Sequence[int]) -> Iterator[int | slice]:
-    """Yield where each field's number, or numbers where it has a length, are among all of a payload's."""
+    """Yield the position of each field's numbers in a payload."""
     at = 0
     for length in lengths:
         yield slice(at, at + length) if length else at
@@ -319,14 +314,13 @@ def _places(lengths: Sequence[int]) -> Iterator[int | slice]:
 
 
 def _getter(places: Sequence[int | slice]) -> Callable[[Sequence[Any]], Sequence[Any]]:
-    """Return what reads several places of a sequence, as a sequence even if it is one place."""
+    """Return a reader of several places, with a sequence as result even for one."""
     if len(places) == 1:
         return lambda values: (values[places[0]],)
     return itemgetter(*places)
 
 
 def _flat(values: Sequence[Any], lengths: Sequence[int]) -> list[Any]:
-    """Return the numbers of all fields; those with a length are arrays."""
     flat: list[Any] = []
     for value, length in zip(values, lengths, strict=True):
         if length:

@@ -1,8 +1,7 @@
-"""The messages of every frame of a flight, written and read several times as fast as all others.
+"""Fast encoding and decoding of the messages in every frame of a flight.
 
-Such a message comes unsigned from one component, and ends with a field that is hardly ever zero: its frame has one
-length. Its header and payload are read by one `Struct` then, made of the dialect's definition, and fields need no
-object: they are numbers in the order of the wire. The bytes are those of `Codec`, which reads all other forms.
+Such a message is unsigned, from one component, and its last field is hardly ever zero, so its frame has a fixed length.
+One `Struct` reads header and payload, and fields are a tuple in wire order. Other forms are left to `Codec`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,17 +13,14 @@ from colibri.mavlink.wire.dialect import CRC_BYTES, CRC_START, HEADER_BYTES, MAR
 
 
 class FixedFrame:
-    """A message up to one of its fields.
-
-    Attributes:
-        size: Bytes of its frame.
-    """
+    """A message up to one of its fields; `size` is the frame's length."""
 
     def __init__(self, name: str, fields: str) -> None:
-        """Lay out message `name` with `fields`, in the order of the wire, parted by blanks; what follows them is zero.
+        """Lay out the first fields of message `name`, in wire order, separated by spaces; the rest is zero.
 
-        "controls[4]" is the first four numbers of an array, whose others are zero. "fields_updated:H" is a number of
-        another size, by its letter in `struct`: bytes at the end that are zero are not sent.
+        "controls[4]" is the first four numbers of an array. "fields_updated:H" has another size, by its `struct`
+        letter:
+        trailing zero bytes are not sent.
 
         Raises:
             ValueError: The dialect has other fields there.
@@ -41,14 +37,10 @@ class FixedFrame:
         self.size = self._crc_at + CRC_BYTES
 
     def encode(self, codec: Codec, numbers: Sequence[Any]) -> bytes:
-        """Encode as `codec`."""
         return codec.framed(self._pack(*numbers), self._id, self._crc_extra)
 
     def read(self, datagram: bytes, at: int, source: bytes) -> tuple[Any, ...] | None:
-        """Return the numbers of the frame that begins at byte `at` of a datagram that is long enough.
-
-        None if it is not this message, unsigned, of this size and of `source`, with a checksum that holds.
-        """
+        """Return the numbers of the frame at byte `at`; `None` unless it is an intact, unsigned one of `source`."""
         values = self._unpack_from(datagram, at)
         if values[0] != self._begins or values[2] != source or values[3] != self._id:
             return None
@@ -57,7 +49,6 @@ class FixedFrame:
 
 
 def _formats(definition: Any, fields: str) -> Iterator[str]:
-    """Yield the format of each field, as `struct` has it."""
     of_dialect = zip(definition.ordered_fieldnames, findall(r"\d*\w", definition.unpacker.format), strict=True)
     for field, (name, code) in zip(fields.split(), of_dialect, strict=False):
         ((wanted, count, letter),) = findall(r"^(\w+)(?:\[(\d+)\])?(?::(\w))?$", field)

@@ -1,4 +1,4 @@
-"""Cuts a stream of bytes, which keeps no borders, into whole MAVLink frames."""
+"""Splitting of a byte stream into MAVLink frames."""
 
 import re
 
@@ -7,24 +7,24 @@ from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED, intact
 _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_V1 = 0xFE
 _PREFIX_BYTES = 3
-"""What determines the length of a frame: marker, payload length, incompatibility flags (of MAVLink 2)."""
+"""Determine a frame's length: marker, payload length, incompatibility flags (of MAVLink 2)."""
 _OTHER_BYTES_V1 = 8
 _OTHER_BYTES = 12
 
 
 class Framer:
-    """Takes chunks of a stream in, gives whole frames out; never keeps more than one frame's bytes.
+    """Splitter of a stream; buffers at most one frame.
 
-    A frame is one whose CRC holds. Of a message that the dialect has not nobody can know; that is taken for a frame if
-    another begins behind it, or nothing has come yet.
+    A frame needs a valid CRC. A message outside the dialect, with unverifiable CRC, counts as a frame if it is followed
+    by
+    another one or by silence.
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._rest = b""
 
     def take(self, chunk: bytes) -> list[bytes]:
-        """Return the frames that are whole with `chunk`; the bytes of a half one wait for the next."""
+        """Return the frames completed by `chunk`."""
         frames: list[bytes] = []
         data, at = self._rest + chunk, 0
         while marker := _MARKERS.search(data, at):
@@ -43,7 +43,7 @@ class Framer:
 
 
 def frame_length(data: bytes, at: int) -> int | None:
-    """Return the length of the frame that may begin at `at`; 0 if none can, None where too little has come."""
+    """Return the length of a frame at `at`; 0 if impossible, `None` if more bytes are needed."""
     if at + _PREFIX_BYTES > len(data):
         return None
     marker, payload_bytes, incompatible = data[at : at + _PREFIX_BYTES]

@@ -1,10 +1,8 @@
-"""Messages of MAVLink's common set that pymavlink's dialects leave out, defined as its generator would, to be read.
+"""Messages and fields of MAVLink's common set that pymavlink lacks, as its generator would define them.
 
-Source: mavlink.io/en/messages/common.html. A message's CRC_EXTRA follows from its definition, so that a mistake here
-makes every peer drop the message: mavlink.io/en/guide/serialization.html.
-
-And extension fields that the specification gained later. The checksum of a message does not cover those, and receivers
-cut off or fill with zeros what they know differently (…/serialization.html#message-extensions): anybody may get them.
+Source: mavlink.io/en/messages/common.html. CRC_EXTRA follows from the definition, so a mistake makes peers drop the
+message. Extension fields are not part of it: receivers cut or zero-fill them
+(mavlink.io/en/guide/serialization.html#message-extensions).
 """
 
 from re import findall
@@ -18,7 +16,7 @@ _CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d"}
 
 
 class Field(NamedTuple):
-    """A field of a message; a `length` of 0 is that of no array."""
+    """A field of a message; `length` 0 is a scalar."""
 
     kind: str
     name: str
@@ -34,7 +32,7 @@ class Definition(NamedTuple):
 
 
 def _defined(number: int, name: str, fields: str) -> Definition:
-    """Return a message whose fields stand behind each other as MAVLink writes one: "uint16_t[4] failure_flags"."""
+    """Return a message from its fields in MAVLink's notation: "uint16_t[4] failure_flags"."""
     found = findall(r"(\w+)(?:\[(\d+)\])? (\w+)", fields)
     return Definition(number, name, tuple(Field(kind, field, int(length or 0)) for kind, length, field in found))
 
@@ -59,11 +57,11 @@ LATER: dict[str, tuple[tuple[str, str], ...]] = {
     "MISSION_ACK": (("opaque_id", "uint32_t"),),
     "MISSION_CURRENT": (("mission_id", "uint32_t"), ("fence_id", "uint32_t"), ("rally_points_id", "uint32_t")),
 }
-"""Names and types of the fields, by message, in the order of their definition, which is that of the wire."""
+"""Extension fields by message, in the order of definition and wire."""
 
 
 def add_to(dialect: Any) -> None:
-    """Give pymavlink's module `dialect` the messages that it lacks."""
+    """Add the missing messages to pymavlink's module `dialect`."""
     for definition in MISSING:
         if definition.id not in dialect.mavlink_map:
             kind = _class_of(definition, dialect)
@@ -124,7 +122,7 @@ def _crc_extra(name: str, ordered: list[Field], dialect: Any) -> int:
 
 
 def with_later_fields(definition: Any) -> Any:
-    """Return pymavlink's class of a message with the extension fields that it lacks."""
+    """Return pymavlink's class of a message with its missing extension fields."""
     later = [field for field in LATER.get(definition.msgname, ()) if field[0] not in definition.fieldnames]
     if not later:
         return definition

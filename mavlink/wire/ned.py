@@ -1,4 +1,4 @@
-"""NED and FRD, MAVLink's axes: the only place where they are."""
+"""Conversions between ENU/FLU and MAVLink's NED/FRD, used nowhere else; each is its own inverse."""
 
 from math import sqrt
 from typing import TypeVar
@@ -6,18 +6,18 @@ from typing import TypeVar
 from colibri.common.types import Array
 
 _Number = TypeVar("_Number", float, Array)
-"""One vector, or many at once: a column a component."""
+"""One vector, or a column of many per component."""
 _HALF_SQRT2 = sqrt(0.5)
 
 
 def ned_from_enu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Number, _Number]:
-    """Convert an earth vector from ENU to NED, or from NED to ENU: the map is its own inverse."""
+    """Convert an earth vector from ENU to NED, or back."""
     x, y, z = vector
     return (y, x, -z)
 
 
 def frd_from_flu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Number, _Number]:
-    """Convert a body vector from FLU to FRD, or from FRD to FLU: the map is its own inverse."""
+    """Convert a body vector from FLU to FRD, or back."""
     x, y, z = vector
     return (x, -y, -z)
 
@@ -25,9 +25,6 @@ def frd_from_flu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Nu
 def ned_frd_from_enu_flu(
     q: tuple[_Number, _Number, _Number, _Number],
 ) -> tuple[_Number, _Number, _Number, _Number]:
-    """Convert an attitude from ENU/FLU to NED/FRD, or back: the map is its own inverse.
-
-    In Euler angles: roll stays, pitch changes its sign, yaw becomes pi/2 - yaw.
-    """
+    """Convert an attitude from ENU/FLU to NED/FRD, or back: pitch changes its sign, yaw becomes pi/2 - yaw."""
     w, x, y, z = q
     return (_HALF_SQRT2 * (w + z), _HALF_SQRT2 * (x + y), _HALF_SQRT2 * (x - y), _HALF_SQRT2 * (w - z))

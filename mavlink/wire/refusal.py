@@ -1,4 +1,4 @@
-"""A refusal: why a request is not carried out, in words and as a MAV_RESULT."""
+"""A refusal of a request, in words and as a MAV_RESULT."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,7 @@ from colibri.mavlink.wire.dialect import RESULT_DENIED
 
 
 class Refusal(NamedTuple):
-    """Why something is not done. What is done returns None, or what came of it, instead.
-
-    Attributes:
-        reason: In words, as a ground station shows them; empty where the result suffices.
-        result: MAV_RESULT.
-    """
+    """Reason of a refusal; `reason` is for ground stations, and empty if the result suffices."""
 
     reason: str = ""
-    result: int = RESULT_DENIED
+    result: int = RESULT_DENIED  # MAV_RESULT

@@ -1,7 +1,7 @@
-"""Message signing of MAVLink 2: which frames to accept, how to sign our own.
+"""MAVLink 2 message signing.
 
 Specification: https://mavlink.io/en/guide/message_signing.html. All components of a network share one key. A signature
-is 13 bytes behind the frame: link id, timestamp, and the first 48 bits of a SHA-256 over key and all that went before.
+is 13 bytes after the frame: link id, timestamp, and the first 48 bits of the SHA-256 of key and all preceding bytes.
 """
 
 from hashlib import sha256
@@ -12,12 +12,12 @@ from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED
 
 KEY_BYTES = 32
 TICK_US = 10
-"""What timestamps count, since `EPOCH_S`."""
+"""Unit of timestamps, since `EPOCH_S`."""
 EPOCH_S = 1_420_070_400
-"""1 January 2015 in seconds of Unix time."""
+"""1 January 2015, Unix time."""
 LAST_TICK = (1 << 48) - 1
 NEW_STREAM_TICKS = 6_000_000
-"""By how much, one minute, the first frame of a stream may be behind our own timestamp."""
+"""One minute: greatest lag of a new stream behind the own timestamp."""
 STREAMS = 1024
 
 _TIMESTAMP_BYTES = 6
@@ -25,18 +25,18 @@ _DIGEST_BYTES = 6
 _FLAGS_AT, _SYSTEM_AT, _COMPONENT_AT = 2, 5, 6
 _NO_KEY = bytes(KEY_BYTES)
 _NEVER_SIGNED = frozenset({"RADIO_STATUS"})
-"""Radios put these in by themselves and have no key: "always accepted without signing"."""
+"""Sent by radios without a key: "always accepted without signing"."""
 
 
 class SigningError(MavlinkError):
-    """A key that is none; the message is what a user needs."""
+    """An invalid key; the message is for the user."""
 
 
 def parse_key(content: bytes) -> bytes:
-    """Return the key in a key file: 32 bytes, or 64 hexadecimal digits with white space around them.
+    """Return the key of a key file: 32 bytes, or 64 hexadecimal digits with surrounding white space.
 
     Raises:
-        SigningError: It is neither, or all zeros, which means no signing at all.
+        SigningError: It is neither, or all zeros, which means unsigned.
     """
     if len(content) == KEY_BYTES:
         key = content
@@ -53,23 +53,23 @@ def parse_key(content: bytes) -> bytes:
 
 
 def tick_at(unix_s: float) -> int:
-    """Return the timestamp of a wall-clock time, for the start."""
+    """Return the timestamp of a wall-clock time."""
     return min(max(round((unix_s - EPOCH_S) * 1e6 / TICK_US), 0), LAST_TICK)
 
 
 class Signing:
-    """Judges and signs frames; without a key it accepts all and signs nothing.
+    """Verifies and signs frames; without a key, accepts all and signs none.
 
-    Our own timestamp advances with the simulated time, with every frame signed and with every later one accepted, and
-    never goes back.
+    The own timestamp advances with simulated time, with each signed frame and each later accepted one; it never
+    decreases.
 
     Attributes:
-        timestamp: Our own, ticks since 2015: to be stored now and then, and handed in at the next start.
-        key_changed: Whether SETUP_SIGNING has changed the key; the owner may store it and reset this.
+        timestamp: Ticks; to be stored, and passed at the next start.
+        key_changed: Set by SETUP_SIGNING; the owner may store the key and reset this.
     """
 
     def __init__(self, key: bytes | None, start: int, now_us: int = 0) -> None:
-        """Begin with a `key`, at timestamp `start`: the later one of the wall clock's and the one stored last."""
+        """Begin at timestamp `start`: the later of the wall clock's and the stored one."""
         self._key = _NO_KEY if key is None else key
         start = min(max(start, 0), LAST_TICK)
         self._start = start - now_us // TICK_US
@@ -80,23 +80,21 @@ class Signing:
 
     @property
     def active(self) -> bool:
-        """Whether there is a key."""
         return self._key != _NO_KEY
 
     @property
     def key(self) -> bytes | None:
-        """The key; None if there is none."""
         return self._key if self.active else None
 
     def sign(self, frame: bytes, link_id: int, now_us: int) -> bytes:
-        """Return the signature of `frame`, which is whole but for that, its flag set."""
+        """Return the signature of `frame`, which already has the flag."""
         self._advance(now_us)
         self.timestamp = min(self.timestamp + 1, LAST_TICK)
         head = bytes([link_id & 0xFF]) + self.timestamp.to_bytes(_TIMESTAMP_BYTES, "little")
         return head + self._digest(frame + head)
 
     def refusal(self, name: str, frame: bytes, now_us: int) -> str | None:
-        """Return why message `name` in `frame` is not accepted; None if it is."""
+        """Return the reason to reject a frame, or `None`."""
         if not self.active:
             return None
         if frame[0] != MARKER or not frame[_FLAGS_AT] & SIGNED:
@@ -113,11 +111,7 @@ class Signing:
         return None
 
     def set_up(self, key: bytes, initial_timestamp: int, now_us: int) -> bool:
-        """Obey SETUP_SIGNING, which the caller must have accepted: zeros switch signing off.
-
-        Returns:
-            Whether key and timestamp were such as can be.
-        """
+        """Apply SETUP_SIGNING (zeros turn signing off); return whether its values are valid."""
         if len(key) != KEY_BYTES or not 0 <= initial_timestamp < LAST_TICK:
             return False
         self._advance(now_us)
@@ -133,7 +127,7 @@ class Signing:
         return max(self.timestamp - NEW_STREAM_TICKS, self._forgotten + 1)
 
     def _remember(self, stream: tuple[int, int, int], timestamp: int) -> None:
-        """Keep when a stream was received last; of too many forget the oldest, and accept no new one that is so old."""
+        """Store a stream's last timestamp; of too many, forget the oldest and reject new ones as old as it."""
         self._streams[stream] = timestamp
         if len(self._streams) > STREAMS:
             oldest = min(self._streams, key=self._streams.__getitem__)

@@ -1,4 +1,4 @@
-"""Telemetry logs as ground stations write them: each frame behind its time, µs, as a big-endian integer."""
+"""Telemetry logs of ground stations: each frame preceded by its time, µs, a big-endian integer."""
 
 import struct
 from collections.abc import Iterator
@@ -12,21 +12,21 @@ STAMP = struct.Struct(">Q")
 
 
 class Logged(NamedTuple):
-    """A frame of a log; the time of a flight's log is simulated, or Unix time where it was dated."""
+    """A frame of a log, at simulated or Unix time."""
 
     time_us: int
     frame: bytes
 
 
 class TlogError(MavlinkError):
-    """What is no telemetry log; the message has the byte where it ceases to be one."""
+    """The file is not a telemetry log; the message has the first invalid byte."""
 
 
 def decode(log: bytes) -> Iterator[Logged]:
-    """Yield the frames of a log; of a process that was killed, the last may be cut off.
+    """Yield the frames of a log, the last of which may be truncated.
 
     Raises:
-        TlogError: This is no log.
+        TlogError: A frame is malformed.
     """
     at = 0
     while at + STAMP.size < len(log):
@@ -41,14 +41,9 @@ def decode(log: bytes) -> Iterator[Logged]:
 
 
 class TlogWriter(BlockLog):
-    """A telemetry log that is written block by block."""
+    """A telemetry log written in blocks."""
 
     def write(self, time_us: int, frames: list[bytes]) -> None:
-        """Append frames, all of time `time_us`.
-
-        Raises:
-            LogError: They cannot be written.
-        """
         if frames:
             stamp = STAMP.pack(time_us)
             self.add(stamp + stamp.join(frames))
