@@ -1,4 +1,1 @@
-"""Decisions put into effect.
-
-The pilot, his supervisor, commands and missions of ground stations, the task of each mode.
-"""
+"""Modes, failsafes, commands and missions: decisions on what the vehicle flies next."""

@@ -1,4 +1,4 @@
-"""MAVLink commands to the vehicle, each checked and handed to the pilot: arming, modes, speed, home."""
+"""MAVLink commands to arm, change mode or speed, and set home."""
 
 from collections.abc import Mapping
 from math import isfinite, isnan
@@ -14,13 +14,13 @@ from colibri.mavlink.wire.refusal import Refusal
 
 FORCE_MAGIC = 21196
 _OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
-"""SPEED_TYPE: without an airspeed sensor one is as good as the other."""
+"""SPEED_TYPE: equivalent without an airspeed sensor."""
 _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 class Commands:
-    """Handlers of a ground station's commands: a method a command."""
+    """Handlers of the commands of ground stations."""
 
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         self._pilot = pilot
@@ -29,7 +29,6 @@ class Commands:
         self.motion = MotionCommands(pilot, fence, needs)
 
     def handlers(self) -> Mapping[int, Handler]:
-        """Return the handlers of all commands, those to move with them."""
         return {
             **self.motion.handlers(),
             mav.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
@@ -46,7 +45,7 @@ class Commands:
         }
 
     def select(self, mode: Mode | None) -> Refusal | None:
-        """Change the mode, None being one that this vehicle does not have; return why not."""
+        """Select a mode; None stands for a mode that this vehicle does not have."""
         if mode is None:
             return Refusal("this vehicle has no such mode", UNSUPPORTED)
         return self._pilot.select(mode, self._needs.missing())
@@ -70,7 +69,6 @@ class Commands:
         return self.select(mode_of(main, sub))
 
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
-        """Change the mode by a SET_MODE message; return why not."""
         return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
 
     def _pause_or_go_on(self, command: Command) -> Refusal | None:
@@ -79,7 +77,7 @@ class Commands:
         return self.select(Mode.MISSION) if command.p1 == 1.0 else Refusal("pause with 0, go on with 1")
 
     def _change_speed(self, command: Command) -> Refusal | None:
-        """Set the speed over ground; -1 leaves it, -2 is the parameters'."""
+        """Set the ground speed; -1 keeps it, -2 selects the parameters' speed."""
         kind, speed, _, relative = command[1:5]
         if kind not in _OVER_GROUND and not isnan(kind):
             return Refusal("speed refused: only that over ground can be set", UNSUPPORTED)
@@ -105,7 +103,6 @@ class Commands:
         return self.move_home(Geodetic(command.x, command.y, command.z))
 
     def move_home(self, place: Geodetic) -> Refusal | None:
-        """Set home to a place on earth; return why not."""
         home = enu_of(place, self._home.origin)
         refusal = self.motion.unreachable(home)
         if refusal is not None:

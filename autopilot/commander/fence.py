@@ -1,4 +1,4 @@
-"""The fence in flight: the geofence that was uploaded, and the one around home that parameters draw."""
+"""The uploaded geofence and the fence around home set by parameters."""
 
 from collections.abc import Sequence
 
@@ -24,22 +24,18 @@ class Fence:
         self._breach_due_us = 0
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Adopt other numbers."""
         self._behaviour = behaviour
 
     def load(self, items: Sequence[MissionItem]) -> None:
-        """Replace the geofence by one of valid items; none where there are none."""
         self._items = tuple(items)
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Build the geofence about the origin as it is now."""
         self._geofence = Geofence(self._items, self._home.origin)
         self._breach, self._breach_due_us = None, 0
 
     @property
     def exists(self) -> bool:
-        """Whether there is a fence, uploaded or around home."""
         behaviour = self._behaviour
         return bool(self._items) or behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
 
@@ -49,15 +45,14 @@ class Fence:
         return AroundHome(self._home.position_enu_m, behaviour.max_distance_m, behaviour.max_height_m)
 
     def refusal(self, place: Vector) -> Refusal | None:
-        """Return why the vehicle may not fly to a place; None if it may."""
         return self._geofence.refusal(place) or self._around_home.refusal(place)
 
     def margin_m(self, place: Vector) -> float:
-        """Return how far a place is inside of every fence, m; negative outside."""
+        """Return the distance to the nearest edge, m; negative outside."""
         return min(self._geofence.margin_m(place), self._around_home.margin_m(place))
 
     def breach(self, place: Vector, now_us: int) -> Refusal | None:
-        """Return why the vehicle may not be where it is; judged ten times a second, fences take time."""
+        """Check the current position, at 10 Hz because polygons are slow."""
         if not self.exists:
             self._breach = None
         elif now_us >= self._breach_due_us:

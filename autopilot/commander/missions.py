@@ -1,4 +1,4 @@
-"""Missions in flight: the plans that were uploaded, and the task that flies a mission."""
+"""Missions in flight: the uploaded plans, and the task that flies a mission."""
 
 from collections.abc import Mapping, Sequence
 
@@ -23,10 +23,10 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Missions:
-    """The mission of one vehicle, and the fence that it must keep to.
+    """The mission of one vehicle, checked against its fence.
 
     Attributes:
-        changes: How often a plan was replaced.
+        changes: Number of plan uploads.
     """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
@@ -41,30 +41,25 @@ class Missions:
 
     @property
     def has_mission(self) -> bool:
-        """Whether there is something to fly."""
         return bool(self._executor.items)
 
     @property
     def leaves_fence(self) -> bool:
-        """Whether the mission goes to a place where the geofence does not let the vehicle be."""
         return bool(self._outside)
 
     @property
     def leads_below_ground(self) -> bool:
-        """Whether the mission goes to a place below the ground."""
         return bool(self._below)
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Adopt other numbers."""
         self._behaviour = behaviour
         self._fence.adopt(behaviour)
 
     def progress(self) -> Progress:
-        """Return where the mission stands; the same object while nothing changes."""
+        """Return the progress; the same object until it changes."""
         return self._executor.progress
 
     def load(self, plan_type: int, plan: Plan) -> None:
-        """Replace a plan by one of valid items."""
         self.changes += 1
         items: Sequence[MissionItem] = plan.items
         if plan_type == MISSION:
@@ -76,21 +71,20 @@ class Missions:
         self._check_mission()
 
     def set_current(self, seq: int, reset: bool) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` resets the counts of jumps. Return why not."""
+        """Go to an item, -1 for the current one; `reset` resets the jump counters."""
         return self._executor.set_current(seq, reset)
 
     def moved_origin(self) -> None:
-        """Measure the fence and the mission from the origin as it is now."""
         self._fence.rebuild()
         self._check_mission()
 
     def task(self) -> "MissionTask":
-        """Start the mission, and return its task, from the current item on."""
+        """Start the mission at the current item."""
         self._executor.start()
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
-        """Return the task of a mission under way, `turns` and `legs` of its current item as before a restart."""
+        """Continue a mission after a restart; `turns` and `legs` are the progress of the current item."""
         behaviour = self._behaviour
         self._executor.adopt(
             Defaults(max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m)
@@ -98,37 +92,33 @@ class Missions:
         return MissionTask(self._executor, self, turns, legs)
 
     def record(self) -> MissionRecord:
-        """Return where the mission stands."""
         return self._executor.record()
 
     def resume(self, plans: Mapping[int, Plan], record: MissionRecord | None) -> None:
-        """Restore the plans, and the progress of the mission; without a record it begins with its first item."""
+        """Restore the plans and the progress; without a record, start at the first item."""
         self._fence.load(plans[FENCE].items)
         self._executor.load(plans[MISSION].items)
         if record is not None:
             self._executor.resume(record)
 
     def watch_mode(self, mode: Mode) -> None:
-        """Pause the mission once another mode flies."""
+        """Pause the mission when another mode flies."""
         if self._executor.active and mode is not Mode.MISSION:
             for event in self._executor.pause(item_flown=mode is Mode.RETURN):
                 if isinstance(event, Reached):
                     self._reached.append(event.seq)
 
     def flown(self, event: Reached | SetHome, state: VehicleState) -> None:
-        """Adopt an event of the mission."""
         if isinstance(event, Reached):
             self._reached.append(event.seq)
         else:
             self._home.move(event.position_enu_m or state.position_enu_m, state.euler[2])
 
     def take_reached(self) -> list[int]:
-        """Return the items that were reached since the last call."""
         reached, self._reached = self._reached, []
         return reached
 
     def mission_context(self, context: TaskContext, *, arrived: bool, turns: float) -> MissionContext:
-        """Return the inputs of the mission."""
         state = context.state
         return MissionContext(
             state.position_enu_m,
@@ -142,7 +132,7 @@ class Missions:
         )
 
     def _check_mission(self) -> None:
-        """Look for items that lead outside the fence or below the ground; the way between two is not checked."""
+        """Warn of items outside the fence or below the ground; the legs between items are not checked."""
         home, items, said = self._home, self._executor.items, (self._outside, self._below)
         found = list(places(items, home.position_enu_m, home.origin))
         outside = ((seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place)))
@@ -158,16 +148,16 @@ class Missions:
 
 
 class MissionTask:
-    """Flies the executor's orders, one task after another.
+    """Flies the executor's orders one by one.
 
     Attributes:
-        returns: Whether the mission leaves the rest of the flight to mode return.
+        returns: Whether the mission ends with mode return.
     """
 
     def __init__(
         self, executor: MissionExecutor, missions: Missions, turns: float = 0.0, legs: tuple[int, ...] = ()
     ) -> None:
-        """Begin with the current item, `turns` of which were flown before a restart, and `legs` are left."""
+        """Start with the current item, with its `turns` and remaining `legs` from before a restart."""
         self._executor = executor
         self._missions = missions
         self._order: Order | None = None
@@ -177,7 +167,6 @@ class MissionTask:
         self.returns = False
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return the output of the current order's task."""
         arrived = self._task.arrived(context)
         mission_context = self._missions.mission_context(context, arrived=arrived, turns=self.turns)
         step = self._executor.step(mission_context, context.now_us)
@@ -199,22 +188,21 @@ class MissionTask:
 
     @property
     def turns(self) -> float:
-        """How often the circle of the order was flown around."""
+        """Turns flown on the order's circle."""
         return self._turns_before + (self._task.turns if isinstance(self._task, OrbitTask) else 0.0)
 
     @property
     def legs(self) -> tuple[int, ...]:
-        """How many legs are left of the order that is flown."""
+        """Remaining legs of the current order."""
         return self._task.left if isinstance(self._task, TaskSequence) else ()
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether the mission is flown to its end."""
         del context
         return self._done
 
 
 def task_of(order: Order, context: TaskContext, takeoff_speed_m_s: float | None = None) -> FlightTask:
-    """Return how an order is flown; a take-off at `takeoff_speed_m_s`, or None: at the speed of climbs."""
+    """Return the task of an order; without `takeoff_speed_m_s`, take-off climbs at the usual climb speed."""
     match order:
         case GoTo():
             return GoToTask(order, context)

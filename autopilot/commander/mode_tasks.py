@@ -1,4 +1,4 @@
-"""How each mode begins to be flown, and how it goes on after the autopilot was killed in it."""
+"""The first task of each mode, and its continuation after a restart."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
@@ -33,17 +33,17 @@ from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.plant.vehicle.description import Vehicle
 
 TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
-"""Returns the task with which a mode begins."""
+"""First task of a mode."""
 
 
 class TaskRecord(NamedTuple):
     """State of a flight task as plain data, for the checkpoint.
 
     Attributes:
-        order: With which the task begins again; None if the mode alone determines it.
-        began_us: When the track that is flown began; None where none is.
-        turns: How often the mission's circle was flown around.
-        legs: How many legs are left of a sequence.
+        order: Order that restarts the task; None if the mode determines the task.
+        began_us: Start of the current track; None for other tasks.
+        turns: Turns flown on the mission's circle.
+        legs: Remaining legs of a sequence.
     """
 
     order: OrderRecord | None = None
@@ -53,7 +53,7 @@ class TaskRecord(NamedTuple):
 
 
 _ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask)
-"""Tasks that begin again with an order."""
+"""Tasks restarted by an order."""
 _AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
     Mode.HOLD: (GoTo, TakeOff),  # a take-off that has arrived settles in hold
     Mode.TAKEOFF: (TakeOff,),
@@ -63,7 +63,6 @@ _AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
 
 
 def task_record(task: FlightTask) -> TaskRecord:
-    """Return the state of a task."""
     if isinstance(task, MissionTask):
         return TaskRecord(turns=task.turns, legs=task.legs)
     if isinstance(task, TaskSequence):
@@ -76,7 +75,7 @@ def task_record(task: FlightTask) -> TaskRecord:
 
 
 class ModeTasks:
-    """Factory of one vehicle's flight tasks: a table of modes, and what each begins with."""
+    """Factory of one vehicle's flight tasks."""
 
     def __init__(
         self,
@@ -88,7 +87,7 @@ class ModeTasks:
         references: References,
         first: Track | None,
     ) -> None:
-        """`attitude` is None for a law that takes no attitude setpoints; `first` is a track flown from time 0 on."""
+        """`attitude` is None for a control law without attitude setpoints; `first` is a track flown from time 0."""
         self._missions = missions
         self._attitude = attitude
         self._gravity_m_s2 = vehicle.gravity_m_s2
@@ -112,28 +111,24 @@ class ModeTasks:
 
     @property
     def is_first(self) -> bool:
-        """Whether a track is to be flown from time 0 on."""
         return self._first is not None
 
     @property
     def first_yaw_rad(self) -> float:
-        """Heading of the vehicle at time 0."""
         return start_yaw(self._first, self._references) if self._first else 0.0
 
     def forget_first(self) -> None:
-        """Fly no track from time 0 on: something else has been flown since."""
+        """Drop the track of time 0: another mode has flown since."""
         self._first = None
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Adopt other numbers of the vehicle, from the next task on."""
         self._gravity_m_s2 = vehicle.gravity_m_s2
 
     def begin(self, mode: Mode, context: TaskContext) -> FlightTask:
-        """Return how a mode begins."""
         return self._factories[mode](context)
 
     def again(self, record: TaskRecord, mode: Mode, context: TaskContext) -> FlightTask:
-        """Return how a mode goes on after a restart in which `record` was flown."""
+        """Return the task that continues a mode after a restart."""
         if mode is Mode.TRACK and self._first is None and record.began_us is not None:
             chosen = track(context.behaviour.track)
             return TrackTask(self._plan(chosen), chosen.duration_s, record.began_us)
@@ -161,7 +156,6 @@ class ModeTasks:
 
 
 def climb(context: TaskContext) -> FlightTask:
-    """Return the task of a take-off to the parameter's height."""
     behaviour = context.behaviour
     return TakeoffTask(context.ground_m + behaviour.takeoff_height_m, None, context, behaviour.takeoff_speed_m_s)
 

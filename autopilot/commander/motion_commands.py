@@ -1,4 +1,4 @@
-"""MAVLink commands to move: take-off, reposition, orbit, turn; what is not finite or too large is denied."""
+"""MAVLink commands to move: take-off, reposition, orbit, turn."""
 
 from collections.abc import Mapping
 from math import hypot, isfinite, isnan, nan, pi, radians
@@ -22,30 +22,28 @@ from colibri.mavlink.wire.refusal import Refusal
 MAX_DISTANCE_M = 100_000.0
 MAX_HEIGHT_M = 10_000.0
 MIN_CLIMB_M = 0.2
-"""Less would not lift the feet for sure."""
+"""A lower climb might not lift the feet."""
 MIN_RADIUS_M = 1.0
 MAX_YAW_RAD = 4.0 * pi
 MAX_TURN_DEG = 360.0
 _YAW_BEHAVIOURS = range(mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED + 1)
 _POINTS = 72
-"""Of a circle, that must all be inside the fence."""
+"""Points of a circle checked against the fence."""
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 
 class Needs(Protocol):
-    """Judges which needs of modes are met."""
+    """Checks which needs of modes are met."""
 
-    def missing(self) -> tuple[Need, ...]:
-        """Return the needs that nothing meets now."""
-        ...
+    def missing(self) -> tuple[Need, ...]: ...
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Let `peer`, which requests a mode that is steered, be the one that steers."""
+        """Make `peer` the steering client because it requests a steered mode."""
         ...
 
 
 class MotionCommands:
-    """Handlers of the commands to move: a method a command."""
+    """Handlers of the commands to move."""
 
     def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         self._pilot = pilot
@@ -54,7 +52,6 @@ class MotionCommands:
         self._home = pilot.home
 
     def handlers(self) -> Mapping[int, Handler]:
-        """Return the handlers of the commands."""
         return {
             mav.MAV_CMD_NAV_TAKEOFF: self._take_off,
             mav.MAV_CMD_DO_REPOSITION: self._reposition,
@@ -63,15 +60,13 @@ class MotionCommands:
         }
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
-        """Fly to a place on earth, as DroneKit requests by a mission item outside a mission."""
+        """Fly to a place on earth; DroneKit requests this by a mission item outside a mission."""
         return self._go(latitude_deg, longitude_deg, altitude_m, frame, nan, nan)
 
     def may_fly_at(self, speed_m_s: float) -> bool:
-        """Whether a cruise speed is one that the parameters allow."""
         return 0.0 < speed_m_s <= self._pilot.behaviour.max_speed_m_s
 
     def unreachable(self, place: Vector) -> Refusal | None:
-        """Return why the vehicle may not fly to a place; None if it may."""
         away = hypot(place[0], place[1])
         if not isfinite(away) or away > MAX_DISTANCE_M or not -MAX_HEIGHT_M < place[2] < MAX_HEIGHT_M:
             return Refusal("too far away")
@@ -81,7 +76,7 @@ class MotionCommands:
         return self._pilot.fly(mode, task, self._needs.missing())
 
     def _take_off(self, command: Command) -> Refusal | None:
-        """Climb to z, or to the parameter's height: QGC sends it above sea level, others above home."""
+        """Climb to z, or to the parameter's height."""
         pilot = self._pilot
         height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
@@ -96,12 +91,12 @@ class MotionCommands:
         return self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
 
     def _height_of_takeoff(self, command: Command) -> float:
-        """Return the height, m: z is above home, but above sea level from QGC, which sends a pitch of -1."""
+        """Return the height, m, ENU: z is above home, but above sea level from QGC, which sends a pitch of -1."""
         above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
         return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
 
     def _reposition(self, command: Command) -> Refusal | None:
-        """Fly to a place, or stop where none is given. The flag that requests a mode change is not needed."""
+        """Fly to a place, or stop if all coordinates are nan. The mode-change flag is not required."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return denied("reposition", f"a flag of {command.p2:g} is not known")
         if not (isnan(command.p4) or abs(command.p4) <= MAX_YAW_RAD):
@@ -138,7 +133,7 @@ class MotionCommands:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
     def _orbit(self, command: Command) -> Refusal | None:
-        """Fly around; z is above sea level whatever the frame, as MAVSDK and PX4 take it."""
+        """Fly a circle; z is above sea level in every frame, as in MAVSDK and PX4."""
         pilot = self._pilot
         if not self._flies:
             return denied("orbit", "the vehicle is not flying")
@@ -172,7 +167,7 @@ class MotionCommands:
         return self._home.refusal(z) or next(filter(None, map(self.unreachable, around)), None)
 
     def _turn(self, command: Command) -> Refusal | None:
-        """Turn on the spot; the angle counts clockwise from north, or from the heading now where p4 is 1."""
+        """Turn on the spot; the angle is clockwise from north, or relative to the heading if p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):
             return denied("turn", "not an angle and a direction")
@@ -187,5 +182,4 @@ class MotionCommands:
 
 
 def denied(what: str, reason: str) -> Refusal:
-    """Return that a command is denied, with the status text."""
     return Refusal(f"{what} refused: {reason}")

@@ -14,19 +14,19 @@ _T = TypeVar("_T", covariant=True)
 
 
 class Latest(Protocol[_T]):
-    """A service that keeps the newest of what a client sends."""
+    """A service that keeps the latest input of a client."""
 
     def latest(self, now_us: int, timeout_us: int) -> _T | None:
-        """Return the newest, if it is no older than `timeout_us`."""
+        """Return the latest input if it is at most `timeout_us` old."""
         ...
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Let `peer` be the one whose messages count."""
+        """Accept the messages of `peer` from now on."""
         ...
 
 
 class ModeNeeds:
-    """Judges the needs of modes for one pilot."""
+    """Checks the needs of modes for one pilot."""
 
     def __init__(
         self,
@@ -44,16 +44,15 @@ class ModeNeeds:
         self._now_us = 0
 
     def at(self, now_us: int) -> None:
-        """Set the time of the messages that come next."""
+        """Set the time of the next messages."""
         self._now_us = now_us
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Let `peer`, which requests a mode that is steered, be the one that steers."""
+        """Make `peer` the steering client because it requests a steered mode."""
         for service in (self._offboard, self._manual, self._follow):
             service.engage(peer, now_us)
 
     def missing(self) -> tuple[Need, ...]:
-        """Return the needs that nothing meets now; any message may change that."""
         sticks, setpoint, _ = self.steered(self._now_us)
         met = {
             Need.ATTITUDE_CONTROL: self._takes_attitude,
@@ -69,7 +68,7 @@ class ModeNeeds:
         return tuple(need for need, there in met.items() if not there)
 
     def steered(self, now_us: int) -> Steered:
-        """Return the setpoints of clients that are not older than the parameters allow."""
+        """Return the client inputs within their timeouts."""
         behaviour = self._pilot.behaviour
         return Steered(
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),

@@ -1,4 +1,4 @@
-"""The pilot: modes, arming, take-off and landing; decides what the control law is given to follow."""
+"""The pilot: modes, arming, take-off and landing; decides which references the control law follows."""
 
 from collections.abc import Callable, Collection
 from typing import NamedTuple, TypeAlias
@@ -42,7 +42,7 @@ _SAVED_BY = {
     Action.TERMINATE: Event.TERMINATED,
 }
 _ENDS = {Mode.TAKEOFF: Event.ARRIVED, Mode.MISSION: Event.FINISHED, Mode.TRACK: Event.FINISHED}
-"""What has happened once the task of a mode has arrived."""
+"""Event when the task of a mode has arrived."""
 
 
 class Sensed(NamedTuple):
@@ -50,10 +50,10 @@ class Sensed(NamedTuple):
 
     Attributes:
         vehicle: None before the first state.
-        position_known: Whether the position is known well enough to fly to places.
-        delay_us: How far ahead of now the vehicle is: references are those of when commands take effect.
-        waited_us: By how much path time has fallen behind since the sample before.
-        path_speed: How fast path time passes, in parts of the clock's.
+        position_known: Whether the position is accurate enough to fly to places.
+        delay_us: Time until commands take effect: references are for that time.
+        waited_us: Path time lost since the previous sample.
+        path_speed: Rate of path time relative to the clock.
     """
 
     now_us: int = 0
@@ -66,7 +66,7 @@ class Sensed(NamedTuple):
 
 
 class PilotRecord(NamedTuple):
-    """State of a pilot for a restart, but for the task, as plain data: attributes of `Pilot` and its parts."""
+    """State of a pilot for a restart, without the task: attributes of `Pilot` and its parts as plain data."""
 
     state: State
     ground: GroundRecord
@@ -80,19 +80,18 @@ class PilotRecord(NamedTuple):
 
 
 class Pilot:
-    """Flies tasks, one mode after another: each method is an event of the state machine of mode, task and failsafe.
+    """State machine of mode, task and failsafe; each method is an event.
 
     Attributes:
-        lag_us: By how much path time lags behind the clock.
+        lag_us: Lag of path time behind the clock.
         speed_m_s: Cruise speed requested for this flight; None for the parameters'.
-        saving: The failsafe that is flown, until a mode is selected or the rotors stop.
+        saving: The active failsafe, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
     """
 
     def __init__(
         self, instants: Instants, behaviour: Behaviour, make_task: TaskFactory, home: Home, lines: StatusQueue
     ) -> None:
-        """Begin on the ground, or in the air: see `begin`. `make_task` returns the first task of a mode."""
         self._make_task = make_task
         self._lines = lines
         self.state = FIRST
@@ -112,9 +111,9 @@ class Pilot:
     def begin(
         self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False, delay_us: int = 0
     ) -> None:
-        """Take in the first state of a flight: the vehicle stands, or it is picked up in flight, in `mode` or in hold.
+        """Start a flight with the first state: standing, or airborne in `mode` or hold.
 
-        One that is estimated at rest (`rests`) stands at any height: an estimate of height is not exact.
+        A vehicle estimated at rest (`rests`) counts as standing at any height: estimated heights are inexact.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle, delay_us=delay_us)
         standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
@@ -126,7 +125,6 @@ class Pilot:
         self._engage(self.state.mode)
 
     def record(self) -> PilotRecord:
-        """Return the state for a restart, but for the task."""
         assert self.generator.reference is not None, "the vehicle has been seen"
         home = self.home
         return PilotRecord(
@@ -144,10 +142,10 @@ class Pilot:
     def resume(
         self, now_us: int, vehicle: VehicleState, record: PilotRecord, again: TaskFactory, *, seamless: bool
     ) -> None:
-        """Restore the state at the first frame after a restart; a vehicle that has come down meanwhile stays there.
+        """Restore the state after a restart; a vehicle that came down meanwhile stays on the ground.
 
-        `again` returns the task with which a mode goes on. A `seamless` restart took no time: the reference goes on as
-        recorded, else from the vehicle.
+        `again` creates the task that continues a mode. A `seamless` restart took no time: the recorded reference is
+        kept. Otherwise the reference starts from the vehicle.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
@@ -165,19 +163,17 @@ class Pilot:
         self._task_is_chosen = not came_down
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Adopt other numbers; without landing on three rotors, none counts as failed."""
+        """Apply new parameters; without landing on three rotors, no rotor counts as failed."""
         self.behaviour = behaviour
         if not behaviour.land_on_three:
             self.readiness.trust_rotors()
 
     def sense(self, sensed: Sensed) -> None:
-        """Take in the inputs of a control sample."""
         self.lag_us += sensed.waited_us
         self.generator.wait(sensed.waited_us * 1e-6, sensed.path_speed)
         self.sensed = sensed
 
     def context(self) -> TaskContext:
-        """Return the inputs of a task now."""
         now_us, vehicle, steered, position_known, delay_us, *_ = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
@@ -202,11 +198,9 @@ class Pilot:
 
     @property
     def flight(self) -> Flight:
-        """State of the flight that failsafes are weighed against."""
         return Flight(self.state.armed, self.ground.standing, self.state.mode, self.saving)
 
     def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
-        """Arm the rotors, or return why not; `missing` are the needs of modes that nothing meets now."""
         if self.state.armed:
             return None
         forced = force and self.sensed.vehicle is not None and not self.readiness.only_lands
@@ -226,7 +220,6 @@ class Pilot:
         return refusal
 
     def disarm(self, *, force: bool = False) -> Refusal | None:
-        """Stop the rotors, or return why not."""
         if not self.state.armed:
             return None
         standing = self.ground.standing
@@ -235,7 +228,7 @@ class Pilot:
         return self._stop_rotors(Event.DISARM, "rotors stopped" if standing else "rotors stopped in the air")
 
     def select(self, mode: Mode, missing: Collection[Need]) -> Refusal | None:
-        """Change the mode, or return why not; `missing` are the needs of modes that nothing meets now."""
+        """Change the mode; `missing` are the unmet needs of modes."""
         if mode is self.state.mode and mode is not Mode.HOLD:
             return None
         refusal = self._follow(Event.SELECT, "", mode, missing)
@@ -245,7 +238,7 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
-        """Change to `mode` and fly `task`, a circle among them, now or once the rotors are armed; or return why not."""
+        """Change to `mode` and fly `task`, now or once the rotors are armed."""
         refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
             self.saving = Action.NONE
@@ -253,7 +246,7 @@ class Pilot:
         return refusal
 
     def save(self, action: Action) -> None:
-        """Execute a failsafe's action, which the supervisor has weighed against the flight and reported."""
+        """Execute a failsafe's action, chosen and reported by the supervisor."""
         if not self.state.armed:
             return
         if action is Action.TERMINATE:
@@ -265,23 +258,22 @@ class Pilot:
         self._engage(self.state.mode)
 
     def fly_at(self, speed_m_s: float | None) -> None:
-        """Set the cruise speed of this flight; None for the parameters'."""
         self.speed_m_s = speed_m_s
 
     def happened(self, event: Event) -> None:
-        """Change the mode as an event demands: what is finished."""
+        """Change the mode when a task or mission item ends."""
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
     def touch_down(self) -> None:
-        """Stand, and stop the rotors: a landing that is detected by something else than the reference."""
+        """Register a landing that another detector reports, and stop the rotors."""
         self.ground.land(self.sensed.now_us)
         self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 
     def step(self) -> Guidance:
-        """Return the references from now on. Called once a control sample."""
+        """Return the references of this control sample."""
         if not self.state.armed:
             return self._rest()
         context = self.context()
@@ -339,7 +331,7 @@ class Pilot:
             self._task_is_chosen = False
 
     def _take(self, task: FlightTask) -> None:
-        """Fly a task from now on; a track that is picked up in mid-flight sets the reference."""
+        """Start a task; a track picked up in mid-flight sets the reference."""
         self.task = task
         if isinstance(task, TrackTask) and task.start is not None:
             self.generator.set(task.start)
@@ -347,7 +339,7 @@ class Pilot:
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
-        """Change the state by an event, and report `text` if that changes anything; or return why not."""
+        """Apply an event to the state, and report `text` if the state changes."""
         only_lands = self.readiness.only_lands
         if event is Event.SELECT and self.state.armed and only_lands:
             return Refusal(f"{selected} refused: {only_lands}")

@@ -1,4 +1,4 @@
-"""Status texts of the commander's parts for ground stations, queued until they are sent."""
+"""Status texts for ground stations, queued until they are sent."""
 
 
 class StatusQueue:
@@ -8,10 +8,9 @@ class StatusQueue:
         self._lines: list[tuple[int, str]] = []
 
     def say(self, severity: int, text: str) -> None:
-        """Add a line."""
         self._lines.append((severity, text))
 
     def take(self) -> list[tuple[int, str]]:
-        """Return the lines, and empty the queue."""
+        """Return the lines, and clear the queue."""
         lines, self._lines = self._lines, []
         return lines

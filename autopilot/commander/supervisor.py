@@ -1,4 +1,4 @@
-"""The supervisor: decides on failsafes by their table, and reports them to ground stations."""
+"""The supervisor: decides on failsafes by their table, and reports them."""
 
 from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, position_known
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
@@ -17,10 +17,10 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
 
 
 class Supervisor:
-    """The supervisor of one vehicle.
+    """Supervisor of one vehicle.
 
     Attributes:
-        memory: Conditions that hold, and the failsafes they began.
+        memory: Holding conditions and the failsafes they began.
     """
 
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
@@ -31,19 +31,17 @@ class Supervisor:
         self.adopt(parameters)
 
     def adopt(self, parameters: Parameters) -> None:
-        """Go by the parameters as they are now."""
         self.limits, self._settings = limits(parameters), settings(parameters)
 
     def resume(self, memory: Memory) -> None:
-        """Restore the memory after a restart in flight."""
         self.memory = memory
 
     def position_known(self, estimate: Estimate | None) -> bool:
-        """Whether the position is known well enough to fly to places; without an `estimate`, from states, it is."""
+        """Whether the position is accurate enough to fly to places; always without an `estimate`."""
         return position_known(estimate, self.limits)
 
     def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
-        """Return what is to begin at this control sample, before the pilot's step; NONE to go on as before."""
+        """Return the action that begins at this sample, before the pilot's step; NONE to continue."""
         since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
         self.memory, action, lines = following(self.memory, inputs.now_us, since_us, self._settings, flight)
         for severity, text in lines:
@@ -51,12 +49,12 @@ class Supervisor:
         return action
 
     def holds(self, condition: Condition) -> bool:
-        """Whether a condition holds, beyond its delay."""
+        """Whether a condition holds beyond its delay."""
         return condition in self.memory.held_us
 
     @property
     def charge_state(self) -> int:
-        """MAV_BATTERY_CHARGE_STATE, as the failsafes take it."""
+        """MAV_BATTERY_CHARGE_STATE by the failsafes' conditions."""
         ok: int = mav.MAV_BATTERY_CHARGE_STATE_OK
         held = self.memory.held_us
         return next((state for condition, state in _CHARGE_STATES if condition in held), ok) if held else ok

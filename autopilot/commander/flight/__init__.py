@@ -1,1 +1,1 @@
-"""Parts of the pilot: contact with the ground, the reference, and readiness; each can be built alone."""
+"""Parts of the pilot: ground contact, reference generator, readiness."""

@@ -1,4 +1,4 @@
-"""Contact with the ground: whether the vehicle stands, and when it was armed, took off and landed."""
+"""Ground contact: standing or airborne, and the times of arming, take-off and landing."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from colibri.mavlink.services.statustext import INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
-    """Times of the last arming, take-off and landing, simulated time, 0 before; and how often the rotors were armed."""
+    """Simulated times of the last arming, take-off and landing, 0 before the first, and the number of armings."""
 
     armed_us: int = 0
     takeoff_us: int = 0
@@ -20,7 +20,7 @@ class FlightTimes(NamedTuple):
 
 
 class GroundRecord(NamedTuple):
-    """State of the ground contact as plain data; the fields are attributes of `GroundContact`."""
+    """Ground contact as plain data; the fields are attributes of `GroundContact`."""
 
     standing: bool
     idles: bool
@@ -29,11 +29,11 @@ class GroundRecord(NamedTuple):
 
 
 class GroundContact:
-    """Contact of one vehicle with the ground.
+    """Ground contact of one vehicle.
 
     Attributes:
         idles: Whether the rotors stand or idle.
-        height_m: Height of where it last stood, z of ENU, m.
+        height_m: Height of the last standing position, z of ENU, m.
     """
 
     def __init__(self, lines: StatusQueue) -> None:
@@ -44,56 +44,51 @@ class GroundContact:
         self.times = FlightTimes()
 
     def begin(self, now_us: int, *, standing: bool) -> None:
-        """Set whether the vehicle stands as it is first seen, at `now_us`; the count of flights stays."""
+        """Start a flight; the count of flights is kept."""
         self.times = FlightTimes(flights=self.times.flights)
         self.standing = self.idles = standing
         if not standing:
             self.take_off(now_us)
 
     def record(self) -> GroundRecord:
-        """Return the state for a restart."""
         return GroundRecord(self.standing, self.idles, self.height_m, self.times)
 
     def resume(self, record: GroundRecord, *, came_down: bool) -> None:
-        """Restore the state after a restart, standing if the vehicle `came_down` meanwhile."""
+        """Restore the state after a restart; a vehicle that `came_down` meanwhile stands."""
         self.standing, self.idles, self.height_m, self.times = record
         self.standing |= came_down
         self.idles |= came_down
 
     def clear(self, vehicle: VehicleState) -> bool:
-        """Whether a vehicle has left the ground and is clear of it."""
         return not self.standing and is_clear(self._landing, vehicle, self.height_m)
 
     def arm(self, now_us: int) -> None:
-        """Count a flight that begins with the arming at `now_us`."""
         self.times = self.times._replace(armed_us=now_us, flights=self.times.flights + 1)
 
     def spin_up(self) -> bool:
-        """Leave idle; return whether the rotors stood or idled until now."""
+        """Leave idle; return whether the rotors stood or idled before."""
         idled, self.idles = self.idles, False
         return idled
 
     def take_off(self, now_us: int) -> None:
-        """Leave the ground at `now_us`."""
         self.standing = False
         self._landing = Landing()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "take-off")
 
     def land(self, now_us: int) -> None:
-        """Stand from `now_us` on."""
         self.standing = True
         self.times = self.times._replace(landing_us=now_us)
         self._lines.say(NOTICE, "landing detected")
 
     def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
-        """Detect a landing of a vehicle in flight; `sinks` and `drifts` as of `landing_detector.watch`."""
+        """Detect a landing in flight; `sinks` and `drifts` as in `landing_detector.watch`."""
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self.land(now_us)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:
-        """Take in a sample of a vehicle that lies, or falls, with the rotors standing still or idle."""
+        """Process a sample with the rotors stopped or idling, on the ground or in a fall."""
         self.idles = True
         self._landing, lies = watch(self._landing, now_us, vehicle, sinks=True)
         self.standing = self.standing or lies
@@ -101,11 +96,10 @@ class GroundContact:
             self.height_m = vehicle.position_enu_m[2]
 
     def stop(self) -> None:
-        """Restart landing detection as the rotors stop."""
         self._landing = Landing()
 
     def end_of_idling(self, now_us: int, behaviour: Behaviour) -> Event | None:
-        """Return the event that stops rotors that idle on the ground; None while they may go on."""
+        """Return the event that stops idling rotors once the allowed time is over."""
         landed = self.times.landing_us > self.times.armed_us
         on_ground_us = now_us - max(self.times.armed_us, self.times.landing_us)
         allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s

@@ -1,4 +1,4 @@
-"""Readiness of the vehicle: the arming checks, and a failed rotor that rules out everything but landing."""
+"""Readiness to arm: the arming checks, and a failed rotor that allows landing only."""
 
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -9,9 +9,9 @@ class Readiness:
     """Readiness of one vehicle to fly.
 
     Attributes:
-        rotor_failed: The failed rotor in words; empty if none has failed.
-        error: The part that has raised an exception in flight, in words; empty if none has.
-        descends: Whether the last resort is flown: nothing but its landing is possible.
+        rotor_failed: The failed rotor as text; empty if all work.
+        error: The software part that raised an exception in flight; empty if all work.
+        descends: Whether the last-resort control law flies: only landing is possible.
     """
 
     def __init__(self, lines: StatusQueue) -> None:
@@ -21,32 +21,28 @@ class Readiness:
         self.descends = False
 
     def update(self, inputs: ArmingInputs) -> None:
-        """Set the inputs of the arming checks."""
         self._inputs = inputs
 
     def refusals(self) -> list[str]:
-        """Return why the rotors may not be armed; empty if they may."""
         return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error))]
 
     @property
     def may_arm(self) -> bool:
-        """Whether the rotors may be armed: nothing refuses it."""
         return not (self.rotor_failed or self.error) and next(refusals(self._inputs), None) is None
 
     @property
     def only_lands(self) -> str:
-        """Why nothing but a landing is possible any more; empty if more is."""
+        """Reason why only landing is possible; empty if other modes are."""
         return self.rotor_failed or (self.error if self.descends else "")
 
     def fail(self, error: str) -> None:
-        """Mark a part as failed: the rotors are not armed again."""
+        """Record a failed part: the rotors are not armed again."""
         self.error = self.error or error
 
     def lose_rotor(self, rotor: int) -> None:
-        """Mark rotor 0..3 as failed: no mode can be selected any more, and its failsafe lands."""
+        """Record the failure of rotor 0..3: modes can no longer be selected, and its failsafe lands."""
         self.rotor_failed = f"rotor {rotor + 1} failed"
         self._lines.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
 
     def trust_rotors(self) -> None:
-        """Mark all rotors as sound again."""
         self.rotor_failed = ""

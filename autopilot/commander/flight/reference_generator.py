@@ -1,4 +1,4 @@
-"""The reference generator: moves the reference towards a task's target, and previews it for the control law."""
+"""The reference generator: moves the reference to a task's target and previews it for the control law."""
 
 from typing import NamedTuple
 
@@ -23,13 +23,11 @@ from colibri.autopilot.guidance.trajectories.planner import carried
 
 
 class Led(NamedTuple):
-    """How a reference was last led to a target.
+    """A movement of the reference to a target, kept to skip repeating it while the reference rests.
 
     Attributes:
-        target, limits: By which it was.
-        horizon, for_law: From where it was before, and as the control law previews it.
-        reference: Where it was led to.
-        stays: Whether it was there before: the same target and limits lead it nowhere else.
+        horizon, for_law: From the previous reference, and at the control law's instants.
+        stays: Whether the reference is unchanged: the same target and limits give the same result.
     """
 
     target: Target
@@ -40,17 +38,15 @@ class Led(NamedTuple):
     stays: bool
 
     def is_again(self, reference: Reference, target: Target, limits: Limits) -> bool:
-        """Whether a reference that stays is to be led by the same again."""
         return self.stays and reference is self.reference and target is self.target and limits == self.limits
 
 
 class ReferenceGenerator:
-    """Generates the references of one vehicle.
+    """Reference generator of one vehicle.
 
     Attributes:
-        reference: State of the reference; None before the vehicle is first seen.
-        interval_s: From one planned instant to the next, s.
-        samples: How many instants are planned.
+        reference: State of the reference; None before the first vehicle state.
+        samples: Number of planned instants, `interval_s` apart.
     """
 
     def __init__(self, instants: Instants, limits: Limits) -> None:
@@ -66,22 +62,16 @@ class ReferenceGenerator:
         lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, self.samples), limits, self.interval_s)
 
     def set(self, reference: Reference) -> None:
-        """Set the reference."""
         self.reference, self._ahead = reference, None
 
     def follow(self, vehicle: VehicleState) -> None:
-        """Set the reference to the vehicle's motion."""
         self.set(moving_with(vehicle))
 
     def rest(self, vehicle: VehicleState) -> None:
-        """Set the reference to rest where the vehicle is."""
         self.set(at_rest(vehicle))
 
     def wait(self, waited_s: float, path_speed: float) -> None:
-        """Set the reference back on its way by path time that has not passed in the last sample.
-
-        Time passes at `path_speed` along it now.
-        """
+        """Move the reference back by the path time lost in the last sample; path time now passes at `path_speed`."""
         self._path_speed = path_speed
         if waited_s != 0.0 and self._ahead is not None:
             following = Horizon(*(column[1:2] for column in self._ahead))
@@ -90,7 +80,7 @@ class ReferenceGenerator:
             self._waited = True
 
     def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
-        """Move the reference on by one sample, and return the control law's preview of it."""
+        """Move the reference on by one sample, and return the control law's preview."""
         reference, waited = context.reference, self._waited
         if wanted.pace is Pace.CLOCK and self._path_speed != 1.0:
             reference = slowed(reference, self._path_speed)

@@ -1,1 +1,1 @@
-"""The tables that decide, and the pure rules over them: modes, arming, failsafes."""
+"""Tables and pure rules of modes, arming and failsafes."""

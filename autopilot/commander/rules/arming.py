@@ -1,4 +1,4 @@
-"""The arming checks: what must hold before the rotors may turn."""
+"""The arming checks."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,22 +12,22 @@ MAX_SPEED_M_S = 0.5
 MIN_CHARGE = 0.1
 """Part of the battery's charge."""
 VOLTAGE_OF = (0.5, 1.2)
-"""Of the voltages empty and full: a voltage outside of these bounds is not that of a sound battery."""
+"""Bounds of a healthy voltage, relative to the empty and the full voltage."""
 MAX_THRUST_STICK = 0.6
 _SURELY_LEVEL = 0.1
-"""x² + y² of a quaternion that is tilted by 37 degrees; below, the arc cosine, which is slow, need not be taken."""
+"""x² + y² of a quaternion tilted by 37 degrees: below, the slow arc cosine is skipped."""
 
 
 class ArmingInputs(NamedTuple):
     """Inputs of the arming checks.
 
     Attributes:
-        state: Of the vehicle; None before the first frame.
-        charge: Part of the battery's charge that is left; 1 without a battery.
-        thrust_stick: Of the pilot, 0..1; None if the mode takes none, or none is received.
-        outside_fence: Why the vehicle may not be where it is; None if it may.
-        not_known: What is not estimated accurately enough; empty if nothing.
-        battery: Why the battery is not to be flown on, apart from its charge; empty if it is.
+        state: None before the first frame.
+        charge: Remaining part of the charge; 1 without a battery.
+        thrust_stick: 0..1; None if the mode takes none, or none is received.
+        outside_fence: Fence breach at the current position, if any.
+        not_known: Inaccurate parts of the estimate; empty if all are accurate.
+        battery: Reason against this battery, apart from its charge; empty if healthy.
     """
 
     state: VehicleState | None
@@ -40,14 +40,12 @@ class ArmingInputs(NamedTuple):
 
 
 def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
-    """Return why a battery of these voltages is not healthy; empty if it is."""
     minimum, maximum = VOLTAGE_OF
     healthy = minimum * empty_v <= voltage_v <= maximum * full_v
     return "" if healthy else f"battery not healthy: {voltage_v:.1f} V"
 
 
 def refusals(inputs: ArmingInputs) -> Iterator[str]:
-    """Yield every reason why the rotors may not be armed."""
     state, stick = inputs.state, inputs.thrust_stick
     if state is None:
         yield "no telemetry from the plant"

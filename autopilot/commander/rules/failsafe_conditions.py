@@ -1,4 +1,4 @@
-"""Since when each condition of the failsafes holds; the only place where they are judged, by simulated time alone."""
+"""The conditions of the failsafes, judged by simulated time: when each began to hold."""
 
 from collections.abc import Callable, Container, Mapping
 from math import hypot, radians, sqrt
@@ -15,32 +15,30 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoi
 from colibri.mavlink.telemetry.snapshot import BatteryState
 
 NEVER_US = -(10**12)
-"""Since when clients could be received, where nothing was restarted."""
+"""Start of listening for clients without a restart."""
 PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
-"""Modes that need no position."""
+"""Modes without a need for position."""
 _FROZEN_M, _FROZEN_RAD = 0.05, 0.05
-"""How far a vehicle must have come by its own rates before an unchanged state is a fault, not rounding of a frame."""
+"""Motion expected from the rates before an unchanged state counts as a fault, not as rounding."""
 _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
-"""Fallbacks without a solved QP; recovery is none of them: it is how a vehicle turns upright."""
+"""Fallbacks without a solved QP; recovery, which turns the vehicle upright, is excluded."""
 
 
 class FailsafeInputs(NamedTuple):
-    """What the conditions are judged by.
+    """Inputs of the conditions.
 
     Attributes:
-        missed_us: When the last frame came before frames were missed; None if none were.
-        state: The vehicle, reported by the plant or estimated.
-        estimate: Accuracy of the state; None where the plant reports it.
-        setpoint: The companion's last, however old; None if it has ended its stream.
-        sticks_us: When sticks were last received; None if they were released.
-        listening_us: Since when clients could be received: since a restart in flight.
-        station_us: When a ground station was last received; None if there never was one.
-        battery: None without one.
-        fence: Returns how far a place is inside of every fence, m; None without any.
-        decided: Diagnostics of the last decision of the control law; None while it decides nothing.
-        late: Whether the declared solve time is longer than a control sample.
-        rotor_lost: A rotor that makes no thrust, counted from 0; None if all do.
-        pace: Limits by which the vehicle may brake.
+        missed_us: Time of the last frame before a gap; None without one.
+        estimate: Accuracy of the state; None if the plant reports the state.
+        setpoint: The companion's latest, of any age; None if it ended its stream.
+        sticks_us: Time of the latest sticks; None if they were released.
+        listening_us: Start of listening for clients: the restart, if in flight.
+        station_us: Time of the latest ground station heartbeat; None before the first.
+        fence: Margin of a place to every fence, m; None without a fence.
+        decided: Diagnostics of the control law's last decision; None while it is inactive.
+        late: Whether the declared solve time exceeds a control sample.
+        rotor_lost: Failed rotor, 0..3; None if all work.
+        pace: Limits for braking.
     """
 
     now_us: int
@@ -62,7 +60,7 @@ class FailsafeInputs(NamedTuple):
 
 
 class Conditions:
-    """Judges the conditions of one vehicle, sample after sample."""
+    """Tracks the conditions of one vehicle."""
 
     def __init__(self) -> None:
         self._since_us: dict[Condition, int] = {}
@@ -71,7 +69,7 @@ class Conditions:
         self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
-        """Return since when each condition holds; those that do not are not in it. `held` are lost already."""
+        """Return when each holding condition began; `held` conditions were lost before."""
         before, self._since_us = self._since_us, {}
         found: dict[Condition, int] = {}
         for condition, silent_since in SILENT_SINCE.items():
@@ -87,7 +85,7 @@ class Conditions:
         return found
 
     def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
-        """Return since when position and attitude stay the same though the rates are not zero; None if they do not."""
+        """Return the start of an unchanged position and attitude with non-zero rates."""
         state, now_us = inputs.state, inputs.now_us
         if state.position_enu_m != self._position or state.attitude != self._attitude or inputs.standing:
             self._position, self._attitude, self._pose_us = state.position_enu_m, state.attitude, now_us
@@ -99,17 +97,17 @@ class Conditions:
 
 
 def battery_below(battery: BatteryState | None, charge: float, voltage_v: float) -> bool:
-    """Whether a battery has less than a part of its charge, or than a voltage where that is not 0."""
+    """Whether charge or voltage is below its limit; a voltage limit of 0 is off."""
     return battery is not None and (battery.remaining < charge or battery.voltage_v < voltage_v)
 
 
 def needs_position(mode: Mode, setpoint: OffboardSetpoint | None) -> bool:
-    """Whether a vehicle that flies `mode`, by `setpoint` if that is offboard, must know where it is."""
+    """Whether the mode, or the setpoint in offboard, needs a position."""
     return mode not in PLACELESS and not (mode is Mode.OFFBOARD and isinstance(setpoint, AttitudeSetpoint))
 
 
 def position_known(estimate: Estimate | None, limits: Limits) -> bool:
-    """Whether position and velocity are within their accuracy limits; without an estimate they are."""
+    """Whether position and velocity are within their accuracy limits; always without an estimate."""
     if estimate is None:
         return True
     position_m, velocity_m_s = max(estimate.position_std_m[:2]), max(estimate.velocity_std_m_s[:2])
@@ -117,7 +115,7 @@ def position_known(estimate: Estimate | None, limits: Limits) -> bool:
 
 
 def resting_place(state: VehicleState, pace: Pace) -> Vector:
-    """Return where the vehicle comes to rest if it brakes from now on, as hard as it may, m, ENU."""
+    """Return the position after braking as hard as allowed, m, ENU."""
     (x, y, z), (vx, vy, vz) = state.position_enu_m, state.velocity_enu_m_s
     speed = hypot(vx, vy)
     along_s = stopping_m(speed, pace.acceleration_m_s2, pace.jerk_m_s3) / speed if speed > 0.0 else 0.0
@@ -126,9 +124,9 @@ def resting_place(state: VehicleState, pace: Pace) -> Vector:
 
 
 def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Return the distance to rest from a steady speed with acceleration and jerk bounded.
+    """Return the braking distance from a steady speed with acceleration and jerk bounded.
 
-    The acceleration rises to its bound and back, a trapezoid; at low speeds a triangle, that never comes to the bound.
+    The acceleration profile is a trapezoid; at low speed a triangle below the bound.
     """
     if speed_m_s >= acceleration_m_s2**2 / jerk_m_s3:
         return 0.5 * speed_m_s * (speed_m_s / acceleration_m_s2 + acceleration_m_s2 / jerk_m_s3)
@@ -176,7 +174,7 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.PLAN_FAILED: lambda inputs, _: inputs.decided is not None and inputs.decided.fallback in _PLANLESS,
     Condition.DEADLINE_MISSED: lambda inputs, _: inputs.late,
 }
-"""Whether a condition holds at a sample: it has held since the first of them."""
+"""Conditions that begin with the first sample at which they hold."""
 
 
 def _sticks_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
@@ -198,5 +196,4 @@ SILENT_SINCE: Mapping[Condition, Callable[[FailsafeInputs, bool], int | None]] =
     Condition.STICKS_LOST: _sticks_silent_since,
     Condition.SETPOINTS_LOST: _setpoints_silent_since,
 }
-"""Since when a source is silent, given whether it is lost already: a stream that no mode needs stays lost until it is
-received again."""
+"""Start of a source's silence, given whether it is already lost: an unneeded stream stays lost until received again."""

@@ -1,4 +1,4 @@
-"""The parameters of the failsafes: limits, delays and actions, under PX4's names where they mean what PX4 means."""
+"""Parameters of the failsafes: limits, delays and actions, under PX4's names where the meaning is the same."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
@@ -8,14 +8,14 @@ from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Actio
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
 
 Limits: TypeAlias = Mapping[str, float]
-"""Name of a parameter -> its value, in the parameter's unit."""
+"""Parameter name -> value, in the parameter's unit."""
 
 GROUP = "Failsafes"
 _US = 1e6
 
 
 class Number(NamedTuple):
-    """A limit or a delay: the fields of its parameter. A whole number as `default` makes it a switch."""
+    """A limit or delay, with the fields of its parameter; an int `default` makes a switch."""
 
     name: str
     default: float
@@ -26,7 +26,6 @@ class Number(NamedTuple):
     details: str = ""
 
     def parameter(self) -> Parameter:
-        """Return the parameter."""
         switch = isinstance(self.default, int)
         return Parameter(
             name=self.name,
@@ -71,7 +70,7 @@ NUMBERS = (
 )
 
 ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
-"""Delays that are parameters of the behaviour, as modes need what they speak of."""
+"""Delays defined with the behaviour, because modes use them."""
 
 _ACTIONS: Mapping[str, str] = {
     "COM_ATT_LOSS_ACT": "Attitude loss action",
@@ -97,12 +96,11 @@ _BATTERY_ACTIONS = (
 
 
 def failsafe_parameters() -> list[Parameter]:
-    """Return the parameters of limits, delays and actions."""
     return [*(number.parameter() for number in NUMBERS), *_actions()]
 
 
 def limits(parameters: Parameters) -> Limits:
-    """Return the values of limits and delays; numbers that nobody changed keep their 64 bits."""
+    """Return limits and delays; unchanged numbers keep 64 bits."""
     found: dict[str, float] = {}
     for number in NUMBERS:
         value = parameters[number.name]
@@ -113,7 +111,7 @@ def limits(parameters: Parameters) -> Limits:
 
 
 def settings(parameters: Parameters) -> dict[Condition, Setting]:
-    """Return what the parameters make of each row."""
+    """Return delay and action of each failsafe."""
     known = limits(parameters)
     return {
         row.condition: Setting(

@@ -1,7 +1,6 @@
-"""The rule of the failsafes: which action begins, given since when each condition holds.
+"""The failsafe rule: given when each condition began, decide which action begins.
 
-The actions are ranked; what is flown gives way to a higher one alone, until the pilot chooses a mode or the rotors
-stop.
+Actions are ranked: only a higher action replaces the active one, until the pilot selects a mode or the rotors stop.
 """
 
 from collections.abc import Mapping
@@ -12,7 +11,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
 CLEAR_AFTER_US = 1_000_000
-"""How long a condition must not hold before it is over: a link that comes and goes is lost once."""
+"""A condition is over after not holding this long, so that a flickering link is lost once."""
 
 _SEVERITIES: Mapping[Action, int] = {
     Action.WARN: WARNING,
@@ -26,14 +25,14 @@ _RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.L
 
 
 class Setting(NamedTuple):
-    """What the parameters make of a row: how long its condition must hold, and what is then done."""
+    """Delay and action of a failsafe."""
 
     delay_us: int
     action: Action
 
 
 class Flight(NamedTuple):
-    """State of the flight that the rule decides about; `saving` is the failsafe that is flown, NONE if none is."""
+    """State of the flight; `saving` is the active failsafe."""
 
     armed: bool
     standing: bool
@@ -42,15 +41,15 @@ class Flight(NamedTuple):
 
     @property
     def rank(self) -> Action:
-        """What the vehicle does anyway: who returns need not hold, who lands need not return."""
+        """Action that the mode already performs: returning includes holding, landing includes returning."""
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 
 class Memory(NamedTuple):
-    """Memory from one control sample to the next.
+    """Memory between control samples.
 
     Attributes:
-        held_us: When each condition that goes on, beyond its delay, last held.
+        held_us: When each ongoing condition, past its delay, last held.
         armed: Whether the rotors were armed.
     """
 
@@ -62,9 +61,8 @@ class Verdict(NamedTuple):
     """Decision of the rule.
 
     Attributes:
-        memory: For the next control sample.
-        action: To begin now; NONE to go on as before.
-        lines: MAV_SEVERITY and text of each line to report.
+        action: Action to begin now; NONE to continue.
+        lines: MAV_SEVERITY and text of each report.
     """
 
     memory: Memory
@@ -79,10 +77,10 @@ def following(
     settings: Mapping[Condition, Setting],
     flight: Flight,
 ) -> Verdict:
-    """Return what begins and what is over.
+    """Decide which failsafes begin and which end.
 
-    An action begins with its condition: a pilot who then chooses another mode is obeyed until another condition
-    begins. At each arming all that holds begins again. `since_us` has no entry for a condition that does not hold.
+    An action begins with its condition: a pilot who then selects another mode keeps it until another condition begins.
+    Arming restarts all holding conditions. `since_us` holds only the conditions that hold.
     """
     newly_armed = flight.armed and not memory.armed
     held_us: dict[Condition, int] = {
@@ -113,7 +111,7 @@ def following(
 
 
 def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, list[tuple[int, str]]]:
-    """Return the highest action that goes beyond what is flown, and the line to report of each condition."""
+    """Return the highest new action above the active one, and the line of each condition."""
     begins, lines = Action.NONE, []
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)

@@ -1,4 +1,4 @@
-"""The failsafes as data: each condition, and what the vehicle does then; `docs/failsafes.md` is written from it."""
+"""The failsafes as a table of conditions and actions; source of `docs/failsafes.md`."""
 
 from collections.abc import Mapping
 from enum import IntEnum, StrEnum
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Action(IntEnum):
-    """Action of a failsafe; the higher the number, the higher its rank."""
+    """Action of a failsafe, ranked by its number."""
 
     NONE = 0
     WARN = 1
@@ -38,7 +38,7 @@ MEANINGS: Mapping[Action, str] = {
 
 
 class Condition(StrEnum):
-    """What may be lost; the value is its text for ground stations."""
+    """Condition of a failsafe; the value is the text for ground stations."""
 
     ATTITUDE_LOST = "attitude lost"
     TILTED = "tilted too far"
@@ -59,20 +59,17 @@ class Condition(StrEnum):
 
 
 class Row(NamedTuple):
-    """A failsafe of the table.
+    """A failsafe.
 
     Attributes:
-        holds: When that holds, in words.
-        limits: Parameters of its limits.
-        delay: Parameter of how long it must hold; empty where that is no parameter.
-        parameter: Parameter of the action.
-        choices: Values of that parameter.
-        default: Of that parameter.
-        clears: When it is over, in words.
-        grounded: Whether it is watched with the rotors standing, too.
-        kept: Whether it holds, once it does, until the rotors stop.
-        warns: Text that a mere warning adds.
-        reported: Whether the supervisor reports it; not where its detector does, in more words.
+        holds, clears: When the condition begins and ends, as text.
+        limits: Parameters of the limits.
+        delay: Parameter of the delay; empty without one.
+        parameter, choices, default: Parameter of the action, its values and default.
+        grounded: Whether it is also watched on the ground.
+        kept: Whether it holds, once begun, until the rotors stop.
+        warns: Text added to a warning.
+        reported: Whether the supervisor reports it; False if its detector does.
     """
 
     condition: Condition
@@ -93,7 +90,7 @@ _NOTHING, _WARN = (0, Action.NONE), (0, Action.WARN)
 _HOLD, _RETURN, _LAND = (1, Action.HOLD), (2, Action.RETURN), (3, Action.LAND)
 _DESCEND, _TERMINATE = (4, Action.DESCEND), (5, Action.TERMINATE)
 _CLIMBING = (_HOLD, _RETURN, _LAND, _TERMINATE)
-"""As NAV_DLL_ACT and NAV_RCL_ACT number them; DESCEND in the gap."""
+"""Numbers of NAV_DLL_ACT and NAV_RCL_ACT; DESCEND is in the gap."""
 FLIGHT_TERMINATION_OFF = 121212
 _FULL_AGAIN = "never in flight"
 

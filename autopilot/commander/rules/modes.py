@@ -1,7 +1,6 @@
-"""Flight modes: what each needs, how one follows another, and the numbers they have on the wire.
+"""Flight modes: needs, transitions and numbers, as two tables; source of `docs/modes.md`.
 
-One table of modes and one of transitions decide; `docs/modes.md` is drawn from them. The layout of custom modes is
-PX4's (main mode << 16 | sub mode << 24), which every ground station reads.
+Custom modes are laid out as in PX4: main mode << 16 | sub mode << 24.
 """
 
 from collections.abc import Collection
@@ -44,7 +43,7 @@ class Need(Enum):
 
 
 class Event(StrEnum):
-    """What changes the mode, or whether the rotors may turn."""
+    """Events that change the mode or the arming."""
 
     SELECT = "selected"
     ARM = "armed"
@@ -61,15 +60,14 @@ class Event(StrEnum):
 
 
 class ModeRow(NamedTuple):
-    """A mode of the table.
+    """A mode.
 
     Attributes:
-        main: PX4's main mode.
-        sub: PX4's sub mode.
-        needs: What it needs to be entered in flight.
-        standard: MAV_STANDARD_MODE, 0 where it is none.
+        main, sub: PX4's main and sub mode.
+        needs: Needs to enter it in flight.
+        standard: MAV_STANDARD_MODE, 0 without one.
         to_arm: Whether the rotors may be armed in it.
-        selectable: Whether a ground station may choose it.
+        selectable: Whether a ground station may select it.
     """
 
     mode: Mode
@@ -148,13 +146,12 @@ ROWS = {row.mode: row for row in MODES}
 
 
 class Transition(NamedTuple):
-    """A change of the state.
+    """A transition.
 
     Attributes:
-        sources: Modes it begins in; empty for any.
-        event: What brings it about.
-        armed: Whether it needs the rotors armed.
-        target: The mode it leads to; None for the same, or the one that is selected.
+        sources: Modes it starts in; empty for any.
+        armed: Whether it requires armed rotors.
+        target: Next mode; None for the same, or the selected one.
         disarms: Whether the rotors stop.
     """
 
@@ -194,7 +191,7 @@ FIRST = State(Mode.HOLD, armed=False)
 
 
 def next_state(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
-    """Return the state after an event, or why there is none; `selected` is the mode of SELECT."""
+    """Return the state after an event, or the refusal; `selected` is the mode of SELECT."""
     for row in TRANSITIONS:
         if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
             break
@@ -214,26 +211,22 @@ def next_state(state: State, event: Event, selected: Mode | None, missing: Colle
 
 
 def first_missing(mode: Mode, missing: Collection[Need]) -> Need | None:
-    """Return the first need of a mode that nothing meets; None if all are met."""
     return next((need for need in ROWS[mode].needs if need in missing), None)
 
 
 _NUMBERS = {row.mode: row.main << 16 | row.sub << 24 for row in MODES}
 _BY_NUMBER = {number: mode for mode, number in _NUMBERS.items()}
 _ALIASES = {(1, 0): Mode.STABILIZED}
-"""PX4's manual mode flies a multicopter as its stabilized one does."""
+"""PX4's manual mode flies a multicopter like stabilized."""
 
 
 def mode_of(main: int, sub: int) -> Mode | None:
-    """Return the mode of PX4's main and sub mode; None if this vehicle has none such."""
     return _BY_NUMBER.get(main << 16 | sub << 24, _ALIASES.get((main, sub)))
 
 
 def custom_mode(mode: Mode) -> int:
-    """Return the number of a mode in a HEARTBEAT."""
     return _NUMBERS[mode]
 
 
 def mode_of_custom(number: int) -> Mode | None:
-    """Return the mode of a HEARTBEAT's number."""
     return mode_of(number >> 16 & 0xFF, number >> 24 & 0xFF) if number & 0xFFFF == 0 else None
