@@ -1,17 +1,15 @@
-"""Notices that the accelerometer is suddenly off, when GPS velocity contradicts what the filter makes of it.
+"""Detection of a sudden accelerometer bias from GPS velocity.
 
-A bias b that is there from one instant on makes the filter's velocity run away, and GPS velocity is rejected fix after
-fix, its innovations on a ramp: y = y₀ - ∫R dt · b. Where they are, b is fitted by least squares. That is no proof yet:
-a receiver that lies or is late makes ramps, too. So another sensor must agree:
+A sudden bias b makes the filter's velocity run away: GPS velocity is rejected fix after fix, with innovations on a ramp
+y = y₀ - ∫R dt · b. b is fitted by least squares. A faulty or late receiver also makes ramps, so a second sensor must
+agree:
 
-- across the body, the accelerometer itself. A multirotor's thrust is along its z axis; what it feels sideways is drag,
-  and a bias. If it is the latter, that has changed by b, however the vehicle was flown since;
-- along body z, the barometer: what its height differs by from the integral of the filter's velocity must follow the
-  integral of the ramp.
+- across the body, the accelerometer itself: thrust is along z, so the mean lateral specific force must have changed by
+  b;
+- along body z, the barometer: its height minus the integral of the filter's velocity must follow the ramp's integral.
 
-PX4's EKF2 checks for bad vertical acceleration likewise, by innovations of the same sign. The test of one against
-the other is by likelihood: A. Willsky, H. Jones, A generalized likelihood ratio approach to the detection and
-estimation of jumps in linear systems, IEEE TAC 21 (1976).
+PX4's EKF2 also checks for bad vertical acceleration. Likelihood test: A. Willsky, H. Jones, A generalized likelihood
+ratio approach to the detection and estimation of jumps in linear systems, IEEE TAC 21 (1976).
 """
 
 from collections import deque
@@ -31,42 +29,41 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.sensors import Sensors
 
 _Fix: TypeAlias = tuple[int, list[float], tuple[float, ...], int, float]
-"""Its time, µs; the nominal state (10,) that it met; the innovation of velocity, m/s ENU; when pressure was last
-tested, µs; which height that was, m."""
+"""Time, µs; nominal state (10,) before the test; velocity innovation, m/s ENU; time of the last pressure test, µs; its
+height, m."""
 
 TIME, POSITION, VELOCITY, ATTITUDE, INNOVATION, HEIGHT = 0, 1, 4, 7, 11, 14
 ROW = 15
-"""A fix as a row of numbers: s, the state (10,), innovation of velocity, m/s ENU, and the barometer's height, m."""
+"""Columns of a fix: time, s, state (10,), velocity innovation, m/s ENU, barometer height, m."""
 
 _FEWEST_FIXES = 3
 _MAX_WINDOW_US = 2_500_000
-"""Since the first rejected fix: what is not seen by then is no sudden bias, and left to the filter's patience."""
+"""Since the first rejected fix: a bias found later is not sudden, and left to the filter's forced acceptance."""
 _KEPT_S = 6.0
 _BEFORE_S, _FEWEST_BEFORE = 1.0, 4
-"""What is felt in flight is compared with that of so long before the fault, of so many fixes at least."""
+"""Window before the fault with the reference for the specific force, and its minimum of fixes."""
 _ONSET_S = 0.05
 _MAX_GAP_S = 0.35
 _ALONG_PART = 0.5
-"""The part of the bias along body z from which on the barometer must agree."""
+"""Part of the bias along body z that requires agreement of the barometer."""
 _ALIKE_PART = 0.5
-"""Two sensors agree whose figures differ by no more than this part of the larger."""
+"""Two sensors agree if their values differ by at most this part of the larger."""
 _CLEAR = 9.0
-"""How much two hypotheses must differ, σ², before a test can choose between them."""
+"""Minimum difference between two hypotheses, σ²."""
 _FOUR_SIGMA = 22.06
-"""χ² of three degrees of freedom: a bias beyond that is one. The velocity was rejected at five already."""
+"""χ² of three degrees of freedom."""
 _MIN_SIGMA = 1e-3
 _STEPS = 4
-"""Of the least squares: the rest falls by the square of the angle turned, and a few find it to what noise leaves."""
+"""Least-squares iterations: the error falls by the square of the angle turned."""
 
 
 class Found(NamedTuple):
-    """What the accelerometer has done to the filter.
+    """A detected bias.
 
     Attributes:
-        bias_m_s2: By how much its bias has changed, FLU.
-        variance: Of that, along each axis, (m/s²)².
-        velocity_m_s: What the filter's velocity lacks, ENU.
-        position_m: What its position lacks, ENU.
+        bias_m_s2: Change of the accelerometer bias, FLU.
+        variance: Variance along each axis, (m/s²)².
+        velocity_m_s, position_m: Errors of the filter, ENU, to be added.
     """
 
     bias_m_s2: Array
@@ -76,7 +73,7 @@ class Found(NamedTuple):
 
 
 class AccelerometerWatch:
-    """Looks at every fix after it was tested."""
+    """Checks every fix after its test."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
         self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _MIN_SIGMA))
@@ -89,10 +86,7 @@ class AccelerometerWatch:
         find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
     def look(self, time_us: int, state: list[float], velocity: Kind, barometer: Barometer) -> Found | None:
-        """Look at a fix of `time_us` after its test; return the bias that it shows, if it does.
-
-        `state` (10,) is the filter's nominal state before that test.
-        """
+        """Check a fix; `state` (10,) is the filter's nominal state before the test."""
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()
@@ -125,15 +119,13 @@ class AccelerometerWatch:
 def find_bias(
     rows: Array, first: int, velocity_variance: float, height_variance: float, gravity: float, found: Array
 ) -> float:
-    """Return the variance of a bias that is found, along each axis; 0 if none is.
+    """Detect a bias; return its variance along each axis, or 0.
 
     Args:
-        rows: Fixes, (n, 15); the height is nan where the barometer measured nothing new.
-        first: The first of them whose velocity was rejected, as were those behind it.
-        velocity_variance: Of the noise of GPS velocity, (m/s)².
-        height_variance: Of the barometer's, m².
-        gravity: m/s².
-        found: The bias, m/s² FLU; what the last row's velocity lacks, m/s ENU; and its position, m ENU.
+        rows: Fixes, (n, 15); the height is nan without a new pressure.
+        first: First fix of the rejected velocities at the end.
+        velocity_variance, height_variance: GPS velocity noise, (m/s)², and barometer noise, m².
+        found: Output: bias, m/s² FLU, and the last row's velocity and position errors, ENU.
     """
     n = len(rows) - first
     for k in range(1, len(rows)):
@@ -179,7 +171,7 @@ def find_bias(
 
 @compiled
 def _drifted(rows: Array, begin: int) -> Array:
-    """Return the integral of the filter's velocity from a fix to each one after it, m ENU."""
+    """Integrate the filter's velocity from fix `begin`, m ENU."""
     drifted = np.zeros((len(rows) - begin, 3))
     for k in range(1, len(drifted)):
         row = begin + k
@@ -194,9 +186,9 @@ def _drifted(rows: Array, begin: int) -> Array:
 def _is_seen(
     rows: Array, first: int, begin: int, last: int, moved: Array, drifted: Array, height_variance: float
 ) -> bool:
-    """Whether the barometer contradicts the filter's velocity as what position lacks (n, 3) does.
+    """Check that the barometer contradicts the filter's velocity like the position errors `moved` (n, 3).
 
-    Rows from `begin` to `last` are of before; `drifted` is from `begin` on.
+    Rows `begin` to `last` are from before the fault; `drifted` starts at `begin`.
     """
     rest = 0.0
     for k in range(begin, last + 1):
@@ -211,7 +203,7 @@ def _is_seen(
 
 @compiled
 def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
-    """Whether what is felt across the body has changed by the bias since the rows from `begin` to `last`."""
+    """Check that the lateral specific force has changed by the bias since the rows `begin` to `last`."""
     now, before = np.zeros(2), np.zeros(2)
     for k in range(first + 1, len(rows)):
         now += _felt(rows, k, gravity)
@@ -225,7 +217,7 @@ def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bia
 
 @compiled
 def _felt(rows: Array, k: int, gravity: float) -> Array:
-    """Return the mean specific force from the fix before to this, along body x and y, by the filter's velocity."""
+    """Return the mean specific force along body x and y since the previous fix, from the filter's velocity."""
     R, dt = _between(rows, k), rows[k, TIME] - rows[k - 1, TIME]
     force = np.zeros(2)
     for i in range(3):
@@ -237,7 +229,7 @@ def _felt(rows: Array, k: int, gravity: float) -> Array:
 
 @compiled
 def _turned(rows: Array, first: int) -> Array:
-    """Return ∫R dt from the first rejected fix to each one, (n, 3, 3)."""
+    """Return ∫R dt from the first rejected fix to each later fix, (n, 3, 3)."""
     A = np.zeros((len(rows) - first, 3, 3))
     for k in range(1, len(A)):
         dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
@@ -247,7 +239,7 @@ def _turned(rows: Array, first: int) -> Array:
 
 @compiled
 def _between(rows: Array, k: int) -> Array:
-    """Return the mean rotation from the body to the earth, from the fix before to this, (3, 3)."""
+    """Return the mean rotation from body to earth since the previous fix, (3, 3)."""
     R = np.empty((2, 3, 3))
     for j in range(2):
         w, x, y, z = rows[k - j, ATTITUDE : ATTITUDE + 4]
@@ -258,7 +250,7 @@ def _between(rows: Array, k: int) -> Array:
 
 @compiled
 def _centred(columns: Array) -> Array:
-    """Take from columns (n, 3) their means, in place, and return those."""
+    """Subtract the means of columns (n, 3) in place; return the means."""
     mean = np.zeros(3)
     for row in columns:
         mean += row
@@ -270,9 +262,9 @@ def _centred(columns: Array) -> Array:
 
 @compiled
 def _fitted(A: Array, d: Array) -> tuple[Array, float]:
-    """Return the bias that minimises |d + A b|², and how far A spreads, s².
+    """Return the bias that minimises |d + A b|², and the spread of A, s².
 
-    AᵀA is a multiple of the identity but for what the body has turned: each step takes the rest of that away.
+    AᵀA is nearly a multiple of the identity; the iterations correct for the vehicle's rotation.
     """
     spread = 0.0
     for k in range(len(A)):
@@ -291,7 +283,7 @@ def _fitted(A: Array, d: Array) -> tuple[Array, float]:
 
 @compiled
 def _moved(rows: Array, first: int, lacks: Array, began_s: float) -> Array:
-    """Return what position lacks at each fix, m ENU, where velocity has lacked since `began_s` before the first."""
+    """Integrate the velocity errors from `began_s` before the first fix: position errors, m ENU."""
     moved = np.empty((len(lacks), 3))
     moved[0] = 0.5 * began_s * lacks[0]
     for k in range(1, len(lacks)):

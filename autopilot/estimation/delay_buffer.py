@@ -1,4 +1,4 @@
-"""The inertial samples and measurements that the filter, which runs behind by the delay of GPS, has yet to take."""
+"""The ring of inertial samples and measurements that wait for the delayed filter."""
 
 from collections import deque
 from typing import NamedTuple
@@ -11,23 +11,23 @@ from colibri.autopilot.estimation.sensing.inertial import Reading, sample_betwee
 from colibri.common.types import Array
 
 _BRIDGED_S = 0.1
-"""A longer gap between two frames is crossed without what was measured at its ends."""
+"""Longer gaps between frames are crossed without the measurements at their ends."""
 
 
 class Waiting(NamedTuple):
-    """What each instrument measured at the end of a sample that the filter has not come to."""
+    """Measurements at the end of a waiting sample, one for each instrument."""
 
     time_us: int
     values: list[Value | None] | None
 
 
 class DelayBuffer:
-    """A ring of inertial samples, and beside it what was measured at the end of each that waits.
+    """A ring of inertial samples, with the measurements at their ends.
 
     Attributes:
         samples: The ring, (n, SAMPLE).
-        first: Row of the first sample that waits.
-        waiting: What was measured, oldest first.
+        first: Row of the oldest waiting sample.
+        waiting: Measurements, oldest first.
     """
 
     def __init__(self, samples: int) -> None:
@@ -36,11 +36,9 @@ class DelayBuffer:
         self.waiting: deque[Waiting] = deque()
 
     def is_full(self) -> bool:
-        """Whether a sample must be taken before the next is put in."""
         return len(self.waiting) == len(self.samples)
 
     def put(self, before: Reading, after: Reading, interval_s: float, measured: Waiting) -> None:
-        """Add the sample between two readings, and what was measured at its end."""
         if interval_s > _BRIDGED_S:
             before = before._replace(force_good=False, rate_good=False)
         last = (self.first + len(self.waiting)) % len(self.samples)
@@ -48,6 +46,6 @@ class DelayBuffer:
         self.waiting.append(measured)
 
     def take(self) -> Waiting:
-        """Remove the oldest sample; return what was measured at its end."""
+        """Remove the oldest sample; return the measurements at its end."""
         self.first = (self.first + 1) % len(self.samples)
         return self.waiting.popleft()

@@ -1,8 +1,8 @@
-"""The error-state Kalman filter: its state, its model of the sensors, and when it resets.
+"""The error-state Kalman filter: state, sensor models, resets.
 
-A kind of measurement that is rejected for long is accepted by force: the covariance of the part of the state that it
-measures is inflated first, which resets that part. For a magnetic field that is the field of the vehicle itself, and
-yaw stays; for pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
+A measurement rejected for long is accepted by force: first the covariance of the measured states is inflated, which
+resets them. For the magnetic field these are the vehicle's own field, so yaw stays; for pressure the barometer offset,
+so height stays; for GPS position or velocity.
 """
 
 from math import hypot, inf, isfinite, nan
@@ -42,30 +42,30 @@ from colibri.plant.vehicle.sensors import Sensors
 _FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
 _CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
-"""How well a vehicle that falls is known: it need not have been level."""
+"""Standard deviations at the start in a fall: the vehicle need not have been level."""
 _ITERATIONS = 4
 _UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
-"""Of P, where the upper triangle of position, velocity and attitude is."""
+"""Upper triangle of position, velocity and attitude in P."""
 _MIN_NOISE = 1e-6
-"""Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
+"""Lower bound of every noise, in its unit, against division by zero."""
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
-"""HIL_GPS has degE7, mm and cm/s."""
+"""Resolutions of HIL_GPS: degE7, mm and cm/s."""
 _CLAIM_STEP_M = 0.01
 _IRON_WALK_GAUSS = 1e-5
 _UNSURE_PART = 0.3
-"""Of what position lacked by a bias, as well as that is known."""
+"""Uncertainty of the position correction after a bias, as a part of it."""
 _UNSURE_TIMES = 3.0
-"""The variance of that bias: what velocity lacked errs with it."""
+"""Inflation of the bias variance, because the velocity correction has the same error."""
 _UNSURE_TURN = 2.0
-"""The field does not see a turn about itself: it may be larger than what it sees."""
+"""The attitude error may exceed the turn of the field, which does not show a turn about itself."""
 _UNSURE_S = 0.5
-"""For how long a velocity that has grown wrong was, in the mean."""
+"""Mean duration of the velocity error."""
 _PATIENCE_US = 7_000_000
 _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
 
 class FilterRecord(NamedTuple):
-    """A filter as plain data: state, covariance, the kinds of what is measured, and when biases were reset."""
+    """A filter as plain data."""
 
     x: Array
     P: Array
@@ -75,15 +75,14 @@ class FilterRecord(NamedTuple):
 
 
 class Filter:
-    """State and covariance, at a time some way behind the vehicle's.
+    """State and covariance, some time behind the vehicle's.
 
     Attributes:
         x: Nominal state, (23,).
         P: Covariance of its error, (22, 22).
-        instruments: All that is fused as it comes: magnetometer, barometer, and what else is fitted.
-        kinds: Of all measurements, in the order of `table.KINDS`.
-        field_gauss: Strength of the earth's field.
-        accel_bias_us, gyro_bias_us: When each bias was last reset; None if never.
+        instruments: Sensors fused without delay: magnetometer, barometer, optional ones.
+        kinds: All measurements, in the order of `table.KINDS`.
+        accel_bias_us, gyro_bias_us: Time of the last reset of each bias.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
@@ -111,10 +110,10 @@ class Filter:
         self.gyro_bias_us: int | None = None
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
-        """Begin at rest: each mean is fused as a measurement, so that the covariance holds their correlations.
+        """Start at rest: each mean is fused as a measurement, so that the covariance holds their correlations.
 
-        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, which the magnetic field
-        shows: a covariance linearised at the first guess would later count as information.
+        The attitude is found by iteration: a measured tilt may be accelerometer bias, which the magnetic field shows. A
+        covariance linearised at the first guess would later count as information.
         """
         x, P = self.x, self.P
         attitude = aligned.attitude
@@ -136,7 +135,6 @@ class Filter:
             update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
 
     def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
-        """Begin with a vehicle that falls, at a place."""
         x, P = self.x, self.P
         self._reset(place_enu_m)
         x[3:6], x[6:10] = caught.velocity_enu_m_s, caught.attitude
@@ -149,7 +147,7 @@ class Filter:
             kind.accept(time_us)
 
     def _reset(self, place_enu_m: Vector) -> None:
-        """Reset state and covariance to what is known of a vehicle at a place before anything is measured."""
+        """Reset state and covariance to the prior of a vehicle at a place."""
         sensors, P = self._sensors, self.P
         self.x[:], P[:] = 0.0, 0.0
         self.x[:3] = place_enu_m
@@ -179,13 +177,12 @@ class Filter:
             P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
 
     def record(self) -> FilterRecord:
-        """Return state, covariance, and what was accepted when."""
         return FilterRecord(
             self.x, self.P, [kind.record() for kind in self.kinds], self.accel_bias_us, self.gyro_bias_us
         )
 
     def resume(self, record: FilterRecord) -> bool:
-        """Go on from a record; return whether it is one of such a filter."""
+        """Restore a record; return whether its shape fits."""
         if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
             return False
         self.x[:], self.P[:] = record.x, record.P
@@ -195,11 +192,10 @@ class Filter:
         return True
 
     def predict(self, samples: Array, row: int) -> None:
-        """Go on by one sample of many."""
         predict(self.x, self.P, samples, row, self._packed_noise, self._gravity)
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
-        """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""
+        """Fuse a fix measured `after_s` after the filter's time; return the reason of a rejection, even of a part."""
         x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
         z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
         claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
@@ -219,7 +215,7 @@ class Filter:
         return None if accepted else Reason.INNOVATION
 
     def reset_accel_bias(self, found: Found, time_us: int) -> None:
-        """Reset the accelerometer's bias by what was `found`, and undo what its change has done since."""
+        """Correct the accelerometer bias, and the position and velocity errors since its change."""
         x, P = self.x, self.P
         x[:3] += found.position_m
         x[3:6] += found.velocity_m_s
@@ -232,10 +228,7 @@ class Filter:
         self.accel_bias_us = time_us
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
-        """Inflate the covariance of what a gyroscope that is off has spoilt: attitude, bias, the velocity contradicted.
-
-        The magnetic field has turned by `turned_rad` within `since_s`.
-        """
+        """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` within `since_s`."""
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
@@ -247,23 +240,22 @@ class Filter:
         self.gyro_bias_us = time_us
 
     def check(self, time_us: int) -> Check:
-        """Return what its consistency can be checked by; `time_us` is its time."""
+        """Return the data for a consistency check at the filter's time `time_us`."""
         upper = self.P.take(_UPPER).tolist()
         nis, accepted = tuple(kind.nis for kind in self.kinds), tuple(kind.accepted for kind in self.kinds)
         return Check(time_us, tuple(self.x[:10].tolist()), tuple(upper), nis, accepted)
 
     @property
     def tests(self) -> Tests:
-        """The last test of each kind."""
         return {kind.name: kind.test for kind in self.kinds}
 
     @property
     def resets(self) -> int:
-        """How often a part of the state was reset."""
+        """Number of resets of a part of the state."""
         return sum(kind.resets for kind in self.kinds)
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:
-        """Return the variances of the white noise of a fix: as described, and more if it claims to be worse."""
+        """Return the white-noise variances of a fix: as described, or larger if it reports worse accuracy."""
         drift = self._noise.gps_drift
         return (
             self._horizontal + _excess(fix.horizontal_accuracy_m, self._horizontal + drift[0]),
@@ -272,7 +264,7 @@ class Filter:
 
 
 def noise_of(sensors: Sensors) -> Noise:
-    """Return what drives the errors of a vehicle with `sensors`."""
+    """Return the process noise of a vehicle with `sensors`."""
     accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
     horizontal, vertical = (square(max(sigma, _MIN_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m))
     drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _MIN_NOISE)
@@ -289,5 +281,5 @@ def noise_of(sensors: Sensors) -> Noise:
 
 
 def _excess(claimed_m: float, described: float) -> float:
-    """Return by how much the variance that a receiver claims, rounded to cm by the wire, is above what is described."""
+    """Return the excess of a reported variance, rounded to cm on the wire, over the described one."""
     return max(0.0, square(max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0)) - described) if isfinite(claimed_m) else 0.0

@@ -1,7 +1,7 @@
-"""Error-state Kalman filter: how state and covariance go on with what gyroscope and accelerometer measure.
+"""Prediction step of the error-state Kalman filter.
 
-J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, sections 5.3 and 5.4, in ENU/FLU:
-the attitude rotates body vectors into the earth frame, and its error is a small rotation in the body frame.
+J. Solà, arXiv:1711.02508, sections 5.3 and 5.4, in ENU/FLU: the attitude rotates body vectors into the earth frame, and
+its error is a small rotation in the body frame.
 """
 
 from math import sqrt
@@ -19,36 +19,34 @@ Four: TypeAlias = tuple[float, float, float, float]
 Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS, GPS_DRIFT, BARO_OFFSET, HARD_IRON = 0, 3, 6, 9, 12, 15, 18, 19
-"""Where the parts of the error state begin: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU."""
+"""First index of each part of the error state: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU."""
 ERRORS = 22
 NOMINAL = 23
-"""The nominal state is the same with a quaternion for the attitude: what follows it lies one place later."""
+"""The nominal state has a quaternion for the attitude: later parts are one place later."""
 
 INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
 SAMPLE = 9
-"""Of the interval from one frame to the next: its length, s; mean specific force and rate as measured; and whether
-either is not known (1.0): then the vehicle is taken to keep its velocity, or its attitude."""
+"""Columns of a sample: duration, s; mean specific force and rate; 1.0 where either is unknown, with velocity or
+attitude then assumed constant."""
 
 _BLIND_FORCE_DENSITY = 3.0**2
 """(m/s²)²/Hz: 3 m/s after a second without an accelerometer."""
 _BLIND_RATE_DENSITY = 0.5**2
 """(rad/s)²/Hz."""
 _SMALL_TURN = 0.05
-"""Half a turn, rad, below which the series of sine and cosine are exact to the last bits."""
+"""Half turn, rad, below which the series of sine and cosine are exact to the last bits."""
 _MAX_POSITION_VARIANCE, _MAX_VELOCITY_VARIANCE, _MAX_ATTITUDE_VARIANCE = 1e6, 1e4, 1.0
-"""Variances beyond which a part is unknown: it forgets what it had to do with the others, and all stays positive."""
+"""Variances beyond which a part is unknown and loses its correlations, so that P stays positive."""
 
 
 class Noise(NamedTuple):
-    """What drives the errors: spectral densities of white noise.
+    """Process noise, as spectral densities of white noise.
 
     Attributes:
-        force, rate: Of specific force and rates, (m/s²)²/Hz and (rad/s)²/Hz.
-        gyro_bias, accel_bias: Of the walks of the biases, (rad/s²)²/Hz and (m/s³)²/Hz.
-        gps_drift: Variances of the Gauss-Markov drift of GPS, m², east, north, up.
-        gps_drift_time_s: Its correlation time.
-        baro_offset: Of the walk of the barometer's offset, m²/s.
-        hard_iron: Of the walk of the vehicle's own field, gauss²/s.
+        force, rate: (m/s²)²/Hz and (rad/s)²/Hz.
+        gyro_bias, accel_bias: Bias walks, (rad/s²)²/Hz and (m/s³)²/Hz.
+        gps_drift: Variances of the Gauss-Markov drift of GPS, m², ENU, with correlation time `gps_drift_time_s`.
+        baro_offset, hard_iron: Walks, m²/s and gauss²/s.
     """
 
     force: float
@@ -63,10 +61,9 @@ class Noise(NamedTuple):
 
 @compiled
 def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Three, Three]:
-    """Move the nominal state on by one sample, Solà's (260) with the attitude at the middle of the interval.
+    """Advance the nominal state by one sample, Solà's (260) with the attitude at the middle of the interval.
 
-    Returns:
-        The rotation at the middle, row by row; specific force without its bias, FLU; the angle turned, rad, FLU.
+    Return that attitude's rotation matrix by rows, specific force without bias, FLU, and the angle turned, rad, FLU.
     """
     dt = samples[row, INTERVAL]
     a, b, c = 0.0, 0.0, 0.0
@@ -98,7 +95,7 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 
 @compiled
 def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravity: float) -> None:
-    """Move state (23,) and covariance (22, 22) on by one sample, in place: P = F P Fᵀ + Q, Solà's (270) and (271).
+    """Advance state and covariance by one sample in place: P = F P Fᵀ + Q, Solà's (270) and (271).
 
     `packed` is the `Noise`.
     """
@@ -138,10 +135,10 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
 
 @compiled
 def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravity: float, now: Array) -> None:
-    """Write the state that `count` samples after the filter's lead to, and how well it is known, to `now`, (19,).
+    """Write the state after the `count` waiting samples, and its standard deviations, to `now`, (19,).
 
-    That is position, velocity, attitude (10,); standard deviations of position, of velocity (ENU), and of attitude
-    about east, north and up, rad (9,). `samples` is a ring, (n, 9), and row `first` follows the filter's state.
+    These are position, velocity, attitude (10,), then standard deviations of position, velocity (ENU), and attitude
+    about east, north and up, rad (9,). `samples` is the ring, (n, 9), beginning at row `first`.
     """
     ahead = x.copy()
     delay, row = 0.0, first
@@ -166,7 +163,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
 
 @compiled
 def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
-    """Multiply P by the transition matrix from the left: half of the turn, the push, the other half."""
+    """Multiply P by the transition matrix from the left: half turn, velocity, half turn."""
     for column in range(ERRORS):
         g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
         t0, t1, t2 = P[6, column], P[7, column], P[8, column]
@@ -198,7 +195,7 @@ def _bound(P: Array, part: int, maximum: float) -> None:
 
 @compiled
 def _turned(q: Four, x: float, y: float, z: float) -> Four:
-    """Return the quaternion turned by a rotation vector in the body frame, rad: q ⊗ Exp."""
+    """Turn a quaternion by a rotation vector in the body frame, rad: q ⊗ Exp."""
     square = 0.25 * (x * x + y * y + z * z)
     if square < _SMALL_TURN * _SMALL_TURN:
         c = 1.0 - square * (0.5 - square / 24.0)

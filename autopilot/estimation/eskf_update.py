@@ -1,10 +1,9 @@
-"""Error-state Kalman filter: how a measurement corrects state and covariance, if its innovation passes the test.
+"""Update step of the error-state Kalman filter.
 
-J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, section 6: gain and update (275),
-Joseph's form of the covariance, the error put into the nominal state (283) and reset (287).
+J. Solà, arXiv:1711.02508, section 6: gain and update (275), Joseph form, injection (283) and reset (287).
 
-Every `fuse_…` corrects the nominal state x, (23,), and its covariance P, (22, 22), in place, returns NIS = yᵀ S⁻¹ y,
-and writes the innovation y to its last argument. Where NIS is above the gate, or is no number, nothing else changes.
+Every `fuse_…` corrects the nominal state x, (23,), and covariance P, (22, 22), in place, writes the innovation y, and
+returns NIS = yᵀ S⁻¹ y. If NIS exceeds the gate or is nan, only y is written.
 """
 
 from math import inf, sqrt
@@ -26,12 +25,12 @@ from colibri.common.kernels import asin
 from colibri.common.types import Array
 
 _MIN_VARIANCE = 1e-18
-"""What rounding leaves of a variance that a measurement has taken away."""
+"""Rounding floor of a variance."""
 
 
 @compiled
 def fuse_horizontal(x: Array, P: Array, place: Array, after_s: float, variance: float, gate: float, y: Array) -> float:
-    """Correct by the east and north of a GPS fix, m, measured `after_s` after the state."""
+    """Fuse east and north of a GPS fix, m, measured `after_s` after the state."""
     H = np.zeros((2, ERRORS))
     for i in range(2):
         H[i, POSITION + i], H[i, GPS_DRIFT + i], H[i, VELOCITY + i] = 1.0, 1.0, after_s
@@ -41,7 +40,7 @@ def fuse_horizontal(x: Array, P: Array, place: Array, after_s: float, variance: 
 
 @compiled
 def fuse_height(x: Array, P: Array, place: Array, after_s: float, variance: float, gate: float, y: Array) -> float:
-    """Correct by the height of a GPS fix, m, measured `after_s` after the state."""
+    """Fuse the height of a GPS fix, m, measured `after_s` after the state."""
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, GPS_DRIFT + 2], H[0, VELOCITY + 2] = 1.0, 1.0, after_s
     y[0] = place[2] - (x[2] + after_s * x[5] + x[18])
@@ -50,7 +49,7 @@ def fuse_height(x: Array, P: Array, place: Array, after_s: float, variance: floa
 
 @compiled
 def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: float, y: Array) -> float:
-    """Correct by a velocity, m/s ENU."""
+    """Fuse a velocity, m/s ENU."""
     H = np.zeros((3, ERRORS))
     for i in range(3):
         H[i, VELOCITY + i] = 1.0
@@ -62,10 +61,10 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 def fuse_fix(
     x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
 ) -> None:
-    """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it passes its test.
+    """Fuse velocity, place and height of a GPS fix in turn, each with its own test.
 
-    The fix, (6,), is place, m, and velocity, m/s, ENU, measured `after_s` after the state. Variances, gates and NIS are
-    of velocity, place and height, (3,) each, and the innovations y in the same order: 3, 2 and 1, (6,).
+    `fix`, (6,), is place, m, and velocity, m/s, ENU. Variances, gates and NIS, (3,), and innovations y, (6,), are in
+    the order velocity, place, height.
     """
     nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
     nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])
@@ -74,7 +73,7 @@ def fuse_fix(
 
 @compiled
 def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gate: float, y: Array) -> float:
-    """Correct by the height of a barometer, m, up to its offset."""
+    """Fuse the height of a barometer, m, with its offset."""
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, BARO_OFFSET] = 1.0, 1.0
     y[0] = height - (x[2] + x[19])
@@ -83,7 +82,7 @@ def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gat
 
 @compiled
 def fuse_field(x: Array, P: Array, measured: Array, field: Array, variance: float, gate: float, y: Array) -> float:
-    """Correct by the magnetic field, gauss FLU, where `field` is that of the earth, gauss ENU."""
+    """Fuse the magnetic field, gauss FLU, with the earth's `field`, gauss ENU."""
     H = np.zeros((3, ERRORS))
     body = _in_body(x, field)
     _put_cross(H, body)
@@ -105,10 +104,7 @@ def fuse_rest(
     field_variance: float,
     y: Array,
 ) -> float:
-    """Correct by specific force, m/s² FLU, and magnetic field, gauss FLU, of a vehicle that rests: both at once.
-
-    What force it feels is that which carries it. The innovation (6,) is in standard deviations of the two.
-    """
+    """Fuse specific force, m/s² FLU, and magnetic field, gauss FLU, at rest jointly; y (6,) is in sigmas."""
     H = np.zeros((6, ERRORS))
     up = _in_body(x, np.array([0.0, 0.0, gravity]))
     body = _in_body(x, field)
@@ -125,14 +121,14 @@ def fuse_rest(
 
 @compiled
 def inflate_covariance(P: Array, first: int, count: int, variance: float) -> None:
-    """Add to the variances of a part of the state, so that the next measurement of it is accepted again."""
+    """Add to the variances of a part of the state, so that its next measurement is accepted."""
     for i in range(first, first + count):
         P[i, i] += variance
 
 
 @compiled
 def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, dip_rad: float) -> bool:
-    """Whether a magnetic field, gauss FLU, less the vehicle's own, has strength and dip of the earth's, gauss ENU."""
+    """Check a magnetic field, gauss FLU, minus the vehicle's own, for strength and dip of the earth's, gauss ENU."""
     up = _in_body(x, np.array([0.0, 0.0, 1.0]))
     own, earth, along = 0.0, 0.0, 0.0
     for i in range(3):
@@ -148,7 +144,7 @@ def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, d
 
 @compiled
 def fuse_rows(x: Array, P: Array, H: Array, y: Array, variance: float, gate: float) -> float:
-    """Correct by an innovation (m,) of linearised measurements H (m, 22), each of this variance."""
+    """Fuse an innovation (m,) of linearised measurements H (m, 22), each with this variance."""
     m = len(H)
     C = np.zeros((ERRORS, m))
     for k in range(m):
@@ -199,7 +195,7 @@ def _cholesky(S: Array) -> Array:
 
 @compiled
 def _gain(C: Array, L: Array) -> Array:
-    """Return K = C S⁻¹ with S = L Lᵀ."""
+    """K = C S⁻¹ with S = L Lᵀ."""
     m = len(L)
     K = C.copy()
     for i in range(len(C)):
@@ -232,7 +228,7 @@ def _join(P: Array, C: Array, K: Array, S: Array) -> None:
 
 @compiled
 def _inject(x: Array, P: Array, error: Array) -> None:
-    """Put the error into the nominal state, and turn its attitude part into the new body frame."""
+    """Add the error to the nominal state, and turn its attitude part into the new body frame."""
     x[:6] += error[:6]
     x[10:] += error[9:]
     a, b, c = 0.5 * error[6], 0.5 * error[7], 0.5 * error[8]
@@ -252,7 +248,7 @@ def _inject(x: Array, P: Array, error: Array) -> None:
 
 @compiled
 def _in_body(x: Array, earth: Array) -> Array:
-    """Return Rᵀ · earth."""
+    """Rᵀ · earth."""
     w, a, b, c = x[6:10]
     e, n, u = earth
     body = np.empty(3)
@@ -264,7 +260,7 @@ def _in_body(x: Array, earth: Array) -> Array:
 
 @compiled
 def _put_cross(H: Array, body: Array) -> None:
-    """Write [body]×, how a vector seen from the body changes with the attitude's error."""
+    """Write [body]×, the derivative of a vector in the body frame with the attitude error."""
     x, y, z = body
     H[0, ATTITUDE + 1], H[0, ATTITUDE + 2] = -z, y
     H[1, ATTITUDE], H[1, ATTITUDE + 2] = z, -x

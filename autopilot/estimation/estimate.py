@@ -1,4 +1,4 @@
-"""The estimate of the vehicle's state, its standard deviations, and the health of what it is made of."""
+"""The estimated state, its standard deviations, and the health of its sources."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -11,13 +11,13 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class Test(NamedTuple):
-    """The last test of a kind of measurement.
+    """Last test of a measurement.
 
     Attributes:
-        time_us: When, µs; -1 before the first.
-        innovation: Measured less expected, in the unit of the measurement.
-        nis: Normalised innovation squared: χ² of as many degrees of freedom as the innovation has numbers.
-        gate: What is above is rejected.
+        time_us: -1 before the first.
+        innovation: Measured minus expected, in the unit of the measurement.
+        nis: Normalised innovation squared, χ² distributed.
+        gate: Largest accepted NIS.
     """
 
     time_us: int
@@ -27,12 +27,12 @@ class Test(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """As in ESTIMATOR_STATUS: what is above 1 was rejected."""
+        """Test ratio of ESTIMATOR_STATUS: rejected above 1."""
         return self.nis / self.gate
 
 
 Tests: TypeAlias = Mapping[str, Test]
-"""The last test of each kind of measurement that the vehicle has, by name."""
+"""Last test of each measurement, by name."""
 
 
 _HORIZONTAL_VELOCITY = mav.ESTIMATOR_VELOCITY_HORIZ | mav.ESTIMATOR_POS_HORIZ_REL | mav.ESTIMATOR_PRED_POS_HORIZ_REL
@@ -40,18 +40,17 @@ _HORIZONTAL_POSITION = mav.ESTIMATOR_POS_HORIZ_ABS | mav.ESTIMATOR_PRED_POS_HORI
 
 
 class Health(NamedTuple):
-    """What may be flown on.
+    """Usable parts of the estimate.
 
     Attributes:
-        attitude, heading: Whether roll and pitch, and yaw, are known.
-        horizontal_velocity, vertical_velocity: Known to 1 m/s.
-        horizontal_position, height: Known to 5 m on earth.
-        dead_reckoning: GPS holds neither position nor velocity: they drift.
-        gps_lost_since_us: When GPS was last accepted, if that is long ago; None while it is.
-        gps_glitch: Fixes come, and are rejected.
-        accelerometer, gyroscope: Their values can be used.
-        accel_bias, gyro_bias: Their biases were not reset lately.
-        not_accepted: Other sensors whose values are missing or rejected since long.
+        attitude, heading: Roll and pitch to 10°, yaw to 15°.
+        horizontal_velocity, vertical_velocity: To 1 m/s.
+        horizontal_position, height: To 5 m.
+        dead_reckoning: Without GPS, position and velocity drift.
+        gps_lost_since_us: Time of the last accepted fix, if GPS is lost.
+        gps_glitch: Fixes are received but rejected.
+        accel_bias, gyro_bias: False for a while after a reset of the bias.
+        not_accepted: Other sensors with missing or rejected values.
     """
 
     attitude: bool
@@ -71,7 +70,7 @@ class Health(NamedTuple):
 
     @property
     def flags(self) -> int:
-        """ESTIMATOR_STATUS_FLAGS of MAVLink."""
+        """ESTIMATOR_STATUS_FLAGS."""
         return _flags(self)
 
 
@@ -90,15 +89,12 @@ def _flags(health: Health) -> int:
 
 
 class Check(NamedTuple):
-    """The filter at its own time, with its covariance, so that its consistency can be checked.
+    """The filter at its own time, for consistency checks.
 
     Attributes:
-        time_us: The filter's time, µs.
-        state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), 10 numbers.
-        covariance: Of position, velocity, and attitude as a rotation vector in the body frame: the upper triangle, 45
-            numbers, row by row.
-        nis: Of each kind of `Tests`, the sum of the normalised innovations squared that were accepted up to now.
-        accepted: How many they are.
+        state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), (10,).
+        covariance: Upper triangle of position, velocity and attitude (body rotation vector), 45 numbers by rows.
+        nis, accepted: Sum and number of the accepted NIS, for each of `Tests`.
     """
 
     time_us: int
@@ -112,16 +108,14 @@ class Estimate(NamedTuple):
     """The vehicle at one instant.
 
     Attributes:
-        frame: Its state now; the position is from the origin, the rates are without their bias.
-        position_std_m: Standard deviations of the position, east, north, up.
-        velocity_std_m_s: Of the velocity, east, north, up.
-        attitude_std_rad: Of the attitude, about east, north, up.
+        frame: Current state; rates without bias.
+        position_std_m, velocity_std_m_s: Standard deviations, ENU.
+        attitude_std_rad: Standard deviations about east, north, up.
         gyro_bias_rad_s, accel_bias_m_s2: FLU.
-        tests: How well the measurements agree with it.
-        rejected: How many values were rejected since the start, by sensor and reason.
-        resets: How often position, velocity or a reference was reset, because measurements had long contradicted it.
-        smoothing_m: Part of the published position that is still to move to the filter's, east, north, up.
-        check: The filter with its covariance, ten times a second; None between.
+        rejected: Number of rejected values since the start, by sensor and reason.
+        resets: Number of resets of position, velocity or a reference.
+        smoothing_m: Filter position minus published position, ENU.
+        check: Ten times a second.
     """
 
     frame: StateFrame

@@ -1,11 +1,4 @@
-"""The estimator: sensor frames in, the vehicle's state now out, with what it is worth.
-
-GPS measures the past. The filter therefore runs the delay of GPS behind: inertial samples, magnetic field and pressure
-wait in a ring until it comes to them, and each fix is fused at the instant that it was measured, so that the update is
-the exact one of a Kalman filter and its covariance is honest. The state now is the filter's, carried on through the
-samples that wait: with the inertial sensors alone, over a tenth of a second, nothing is lost by that. PX4's EKF2 runs
-so too, with an observer in place of the second integration, which is exact and costs a few microseconds.
-"""
+"""The estimator: sensor frames in, current state and accuracy out."""
 
 from functools import reduce
 from math import ceil, isfinite
@@ -39,30 +32,29 @@ from colibri.plant.vehicle.sensors import Sensors
 
 _SPARE_SAMPLES = 8
 _LATE_US = 1_000_000
-"""A source of several measurements a second of which none was accepted for so long is lost."""
+"""A sensor is lost this long after its last accepted measurement."""
 _LEARNING_US = 5_000_000
-"""For so long after its reset a bias counts as not yet learned."""
+"""A bias counts as not yet learned this long after its reset."""
 _MAX_FIX_AGE_S = 0.5
-"""How far from the filter's time a fix may have been measured."""
+"""Largest distance of a fix from the filter's time."""
 _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
 _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
-"""Between two fixes: a frame with one has enough to do."""
+"""Between two fixes, because frames with a fix have enough work."""
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
 class EstimatorRecord(NamedTuple):
-    """What an estimator needs to go on after a restart, as plain data.
+    """State of an estimator for a restart, as plain data.
 
     Attributes:
-        time_us, filter_us: Of the last frame, and of the filter.
-        samples: The ring, whose first sample that waits is row `first`.
-        waiting: What was measured at the ends of the samples that wait.
-        reading: Of the last frame.
-        fix_us: Time of the last fix that was taken; None before the first.
-        position_m, velocity_m_s: What is still to be given in of the last corrections.
+        time_us, filter_us: Times of the last frame and of the filter.
+        samples, first, waiting: The delay buffer.
+        reading: Inertial reading of the last frame.
+        fix_us: Time of the last fix.
+        position_m, velocity_m_s: Remaining output smoothing.
     """
 
     time_us: int
@@ -81,9 +73,8 @@ class Estimator:
     """Estimates the state of one vehicle.
 
     Attributes:
-        filter: The filter, as far behind as GPS is.
-        filter_us: Its time, µs.
-        caught: Whether it began with a vehicle that fell, not with one that rested.
+        filter_us: Time of the filter, behind by the delay of GPS.
+        caught: Whether it started in a fall, not at rest.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
@@ -129,18 +120,18 @@ class Estimator:
 
     @property
     def last(self) -> Estimate | None:
-        """The last estimate; None as long as the vehicle has not rested with a fix."""
+        """The latest estimate, after a start at rest with a fix."""
         return self._estimate
 
     def step(self, frame: SensorFrame) -> Estimate | None:
-        """Return the estimate at the time of a frame, as `receive` and `estimate` do."""
+        """`receive`, then `estimate`."""
         self.receive(frame)
         return self.estimate()
 
     def receive(self, frame: SensorFrame) -> None:
-        """Queue a frame for `advance`, which comes with the next call of any method at the latest.
+        """Queue a frame until the next call of any method.
 
-        The first estimate, and a frame that does not follow, are dealt with at once: `last` depends on them.
+        The first estimate and frames out of sequence are handled at once, because `last` depends on them.
         """
         self.advance()
         self._queued = frame
@@ -149,10 +140,10 @@ class Estimator:
             self.advance()
 
     def estimate(self) -> Estimate | None:
-        """Return the estimate at the time of the last frame; None as long as there is none.
+        """Return the estimate at the last frame.
 
-        Where the time of a frame does not follow, the one before is returned. When such frames go on, the simulator has
-        restarted, and so does the estimator.
+        A frame out of sequence repeats the previous estimate; a series of them restarts the estimator with the
+        simulator.
         """
         self.advance()
         if self._unpublished and self._time_us is not None:
@@ -160,13 +151,13 @@ class Estimator:
         return self._estimate
 
     def advance(self) -> None:
-        """Take in the frame that is queued: bring the filter on to what is as old as a fix that comes with it."""
+        """Process the queued frame."""
         frame, self._queued = self._queued, None
         if frame is not None:
             self._take_in(frame)
 
     def settle(self) -> None:
-        """Advance, and do what the next frame will need, where it comes in time: the same, but earlier."""
+        """Advance, and precompute the work of the next frame in case it is on time."""
         self.advance()
         if self._estimate is not None and self._time_us is not None:
             self._take_until(self._time_us + self._interval_us)
@@ -216,7 +207,7 @@ class Estimator:
             self._publish(frame.time_us)
 
     def record(self) -> bytes:
-        """Return what is needed to go on after a restart; empty before the first estimate."""
+        """Return the state for a restart; empty before the first estimate."""
         self.advance()
         if self._estimate is None or self._time_us is None:
             return b""
@@ -236,9 +227,9 @@ class Estimator:
         )
 
     def resume(self, record: bytes, time_us: int) -> bool:
-        """Go on from a record, the next frame being of `time_us`; return whether that can be.
+        """Restore a record for a next frame at `time_us`; return whether it fits.
 
-        A frame that came before, and whose answer was lost with the process, comes again.
+        A frame whose answer was lost with the process is received again.
         """
         kept, buffer = of_bytes(EstimatorRecord, record), self._buffer
         if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != buffer.samples.shape:
@@ -282,7 +273,7 @@ class Estimator:
             self._take(now_us)
 
     def _take(self, now_us: int) -> None:
-        """Bring the filter on by the oldest sample that waits, and fuse what was measured at its end."""
+        """Advance the filter by the oldest waiting sample, and fuse the measurements at its end."""
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
         time_us, values = self._buffer.take()
@@ -322,7 +313,7 @@ class Estimator:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
-        """Make the estimate of now; None, after a restart, if its numbers can be of no vehicle."""
+        """Compute the current estimate; restart on impossible numbers."""
         self._unpublished = False
         filter_, buffer = self.filter, self._buffer
         ahead = len(buffer.waiting)
@@ -397,7 +388,7 @@ class Estimator:
         )
 
     def _warm_up(self) -> None:
-        """Load what is compiled, on a vehicle that rests at the origin."""
+        """Load compiled code with a vehicle at rest at the origin."""
         fix = GpsFix(0, 3, self._origin, (0.0, 0.0, 0.0), 1.0, 1.0, 10)
         force = (0.0, 0.0, self._gravity)
         aligned = Aligned(1.0, force, (0.0, 0.0, 0.0), self._field, 50, 0.0, 50, fix, (1.0, 0.0, 0.0, 0.0))

@@ -1,10 +1,9 @@
-"""Notices that the gyroscope is suddenly off, when magnetic field and GPS velocity both contradict the attitude.
+"""Detection of a sudden gyroscope bias, when magnetic field and GPS velocity both contradict the attitude.
 
-A bias of the rate that is there from one instant on turns the filter's attitude away from the vehicle's. The magnetic
-field is rejected within a tenth of a second, GPS velocity after another second or two, since thrust then points
-elsewhere. Either alone proves nothing: iron turns a field, and a receiver may lie. Together they leave only what they
-have in common. The covariance of attitude and bias is then inflated by as much as the field has turned since, and the
-filter finds both by itself. PX4's EKF2 likewise resets its yaw where field and GPS velocity contradict it.
+A sudden bias turns the filter's attitude. The magnetic field is rejected within 0.1 s, GPS velocity after 1 s or 2 s,
+as thrust then points elsewhere. Iron also turns a field, and receivers fail, but both together have one common cause.
+The covariance of attitude and bias is then inflated by the turn of the field, and the filter finds both. PX4's EKF2
+resets its yaw under the same conditions.
 """
 
 from math import hypot
@@ -12,13 +11,13 @@ from math import hypot
 from colibri.autopilot.estimation.eskf import Filter
 
 _REJECTED_US = 200_000
-"""Of GPS velocity, before it is a witness: three fixes at 10 Hz."""
+"""Required rejection of GPS velocity: three fixes at 10 Hz."""
 _MAX_TURN_RAD = 0.3
-"""Beyond that the field is not plausible either."""
+"""Beyond this the field is implausible."""
 
 
 def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:
-    """Return by what angle the field is off, rad, and for how long, s, if a gyroscope is; after the test of a fix."""
+    """Return the angle error of the field, rad, and its duration, s, after a gyroscope fault; call after a fix."""
     velocity, field = filter_.velocity, filter_.magnetometer.kind
     if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
         return None

@@ -1,4 +1,4 @@
-"""The estimator's health for people and telemetry: lines when it changes, reasons not to arm, ESTIMATOR_STATUS."""
+"""The estimator's health as status texts, arming checks and ESTIMATOR_STATUS."""
 
 from collections.abc import Callable
 from functools import lru_cache, partial
@@ -14,7 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class _Matter(NamedTuple):
-    """A condition of health, and the lines when it ceases to hold and when it holds again."""
+    """A condition of health, and the texts when it ends and returns."""
 
     well: Callable[[Health], bool]
     ceased: str
@@ -55,13 +55,13 @@ _NO_RATIOS = (0.0,) * len(Ratio)
 
 
 class HealthWatch:
-    """Notices what has ceased to be well, and what is well again."""
+    """Reports changes of health."""
 
     def __init__(self) -> None:
         self._ill: frozenset[int] = frozenset()
 
     def lines(self, health: Health) -> list[tuple[int, str]]:
-        """Return severity and text of what has changed."""
+        """Return severity and text of each change."""
         ill = frozenset(number for number, matter in enumerate(_MATTERS) if not matter.well(health))
         if ill == self._ill:
             return []
@@ -71,12 +71,12 @@ class HealthWatch:
 
 
 def not_known(health: Health) -> str:
-    """Return the parts of the state that are not known well enough to fly, as text; empty if all are."""
+    """Return the parts of the state too inaccurate to fly, as text; empty if all are usable."""
     return ", ".join(reason for known, reason in _UNKNOWN if not known(health))
 
 
 def estimator_state(estimate: Estimate) -> EstimatorState:
-    """Return flags, test ratios and accuracy of an estimate for telemetry."""
+    """Return flags, test ratios and accuracy for telemetry."""
     health, tests = estimate.health, estimate.tests
     east, north, up = estimate.position_std_m
     ratios = [*_NO_RATIOS]

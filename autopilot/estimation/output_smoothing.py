@@ -1,9 +1,8 @@
-"""Smooths what is published: the filter's estimate jumps with every fix, the vehicle must not.
+"""Smoothing of the published state, because the filter jumps with every fix.
 
-Each correction of the position is taken back from what is published, and given in with a time constant: a control loop
-that follows each of them is shaken by them, as PX4's is spared by the time constants of its output predictor. Where GPS
-comes back and corrects by metres, it is given in at a speed that the vehicle follows without haste. Of velocity only
-what exceeds the usual is kept back: that the controller needs at once.
+Each position correction is removed from the output and added back with a time constant, as in PX4's output predictor;
+large corrections, after a GPS loss, at a limited speed. Of velocity corrections only the unusual part is smoothed,
+because the controller needs the rest at once.
 """
 
 from math import sqrt
@@ -19,11 +18,10 @@ _NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class OutputSmoothing:
-    """What is still to be given in.
+    """Corrections still to be added back.
 
     Attributes:
-        position_m: To be added to the filter's position, ENU.
-        velocity_m_s: To be added to its velocity, ENU.
+        position_m, velocity_m_s: Published minus filter, ENU.
     """
 
     def __init__(self) -> None:
@@ -31,7 +29,7 @@ class OutputSmoothing:
         self.velocity_m_s = _NONE
 
     def absorb(self, before: list[float], after: list[float], delay_s: float) -> None:
-        """Take a correction of position and velocity (6,), made `delay_s` ago."""
+        """Smooth a correction of position and velocity (6,) made `delay_s` ago."""
         (x, y, z, vx, vy, vz), (x1, y1, z1, vx1, vy1, vz1) = before, after
         dvx, dvy, dvz = vx1 - vx, vy1 - vy, vz1 - vz
         moved = (x1 - x + delay_s * dvx, y1 - y + delay_s * dvy, z1 - z + delay_s * dvz)
@@ -39,7 +37,7 @@ class OutputSmoothing:
         self.velocity_m_s = _less(self.velocity_m_s, _beyond((dvx, dvy, dvz), _USUAL_M_S))
 
     def give_in(self, interval_s: float) -> None:
-        """Let time pass."""
+        """Decay over an interval."""
         if self.position_m is not _NONE:
             self.position_m = _faded(self.position_m, interval_s)
         if self.velocity_m_s is not _NONE:
@@ -47,7 +45,7 @@ class OutputSmoothing:
 
 
 def _faded(vector: Vector, interval_s: float) -> Vector:
-    """Return what is left of a vector after an interval: less by its time constant, but never faster than allowed."""
+    """Decay by the time constant, at most at the allowed speed."""
     x, y, z = vector
     norm = sqrt(x * x + y * y + z * z)
     if norm <= _MIN_M:

@@ -1,4 +1,4 @@
-"""Where the vehicle's state comes from: the simulator's frames, or the estimate from sensors."""
+"""Source of the vehicle's state: the simulator's frames, or the estimate from sensors."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -14,11 +14,15 @@ if TYPE_CHECKING:
     from colibri.autopilot.estimation.estimator import Estimator
 
 NewEstimator: TypeAlias = Callable[[int], "Estimator"]
-"""Makes an estimator for frames that are so many µs apart."""
+"""Creates an estimator for a frame interval in µs."""
 
 
 def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> NewEstimator | None:
-    """Return the estimator of `vehicle`, or a VehicleError without sensors; None if the simulator sends the state."""
+    """Return the factory of estimators for sensor feedback.
+
+    Raises:
+        VehicleError: The vehicle has no sensors.
+    """
     if feedback is Feedback.STATE:
         return None
     sensors = vehicle.sensors
@@ -32,20 +36,17 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> New
 
 _LATE_US = 1_000_000
 _NO_FIX_AFTER_US = 500_000
-"""Receivers of a few hertz are sometimes late, too."""
+"""Receivers of a few hertz are sometimes late."""
 
 
 class StateSource:
     """Turns any frame into a state.
 
     Attributes:
-        estimate: The last one; None before the first, and where the simulator sends the state.
-        sensed: What was measured on board last.
-        latest: The last of each sensor with a message of its own, by the frame's field.
+        latest: Latest value of each sensor with its own message, by frame field.
     """
 
     def __init__(self, estimator: NewEstimator | None, interval_us: int) -> None:
-        """Load what is compiled, not at the first frame; without an estimator there are no frames of sensors."""
         self._interval_us = interval_us
         self._make = estimator
         self._estimating = None if estimator is None else estimator(interval_us)
@@ -58,28 +59,25 @@ class StateSource:
 
     @property
     def fix(self) -> GpsFix | None:
-        """The last of GPS."""
         fix: GpsFix | None = self.latest.get("gps")
         return fix
 
     @property
     def rests(self) -> bool:
-        """Whether the estimate began with a vehicle that rested."""
+        """Whether the estimate started at rest."""
         return self.estimate is not None and self._estimating is not None and not self._estimating.caught
 
     def record(self) -> bytes:
-        """Return what the estimator needs to go on after a restart; empty where there is nothing to go on with."""
         return b"" if self._estimating is None else self._estimating.record()
 
     def resume(self, record: bytes, time_us: int) -> bool:
-        """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
+        """Restore the estimator for a next frame at `time_us`; return whether the record fits."""
         return self._estimating is not None and self._estimating.resume(record, time_us)
 
     def receive(self, frame: Frame) -> None:
-        """Take in a frame; on sensors, queue it for the estimator.
+        """Process a frame; sensor frames are queued for the estimator.
 
-        Time that begins again is another flight, of which nothing is known. A frame that is a little late is left to
-        the estimator.
+        Time that restarts is a new flight. The estimator handles frames that are slightly late.
         """
         if isinstance(frame, StateFrame):
             self._given = frame
@@ -100,31 +98,31 @@ class StateSource:
         self.estimate = self._estimating.last
 
     def state(self) -> StateFrame | None:
-        """Return the state at the last frame; None until there is an estimate."""
+        """Return the state at the last frame."""
         if self._estimating is not None and self._given is None:
             self.estimate = self._estimating.estimate()
         return self.last
 
     @property
     def last(self) -> StateFrame | None:
-        """The last state: that of the last frame, or on sensors of the last estimate; None before the first."""
+        """Latest state without further work: of the last frame, or of the last estimate."""
         if self._given is not None:
             return self._given
         return None if self.estimate is None else self.estimate.frame
 
     def advance(self) -> None:
-        """Have the estimator do the work of the last frame now, whether its estimate is needed or not."""
+        """Process the last frame in the estimator now."""
         if self._estimating is not None:
             self._estimating.advance()
             self.estimate = self._estimating.last
 
     def settle(self) -> None:
-        """Do what need not be done between a frame and its answer."""
+        """Do deferrable work after the answer to a frame."""
         if self._estimating is not None:
             self._estimating.settle()
 
     def has_gps(self, now_us: int) -> bool:
-        """Whether there is GPS; where the simulator sends the state, there always is."""
+        """Whether GPS is available; always with state feedback."""
         if self._make is None:
             return True
         fix = self.fix

@@ -1,7 +1,4 @@
-"""The battery monitor: charge and voltage by a model driven with the commanded rotor speeds.
-
-What the battery itself reports takes precedence.
-"""
+"""The battery monitor: charge and voltage from a model driven by the rotor commands, or as the battery reports."""
 
 from math import nan
 
@@ -17,11 +14,11 @@ _CELL_V = 4.2
 _SECONDS_PER_HOUR = 3600.0
 _MIN_CURRENT_A = 0.01
 _SAG = 0.03
-"""Voltages that differ by less than this part of the full one are the same: the model's rotors do not lag."""
+"""Tolerance between voltages, as a part of the full voltage: the model's rotors do not lag."""
 
 
 class BatteryMonitor:
-    """Integrates the charge taken from one vehicle's battery."""
+    """Integrates the charge taken from one battery."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._model = BatteryModel(vehicle)
@@ -35,7 +32,6 @@ class BatteryMonitor:
         self.charge_ah = 0.0
 
     def receive(self, reported: PlantBattery) -> None:
-        """Take in the charge and the voltage that the battery reports."""
         if self._battery is None:
             return
         model_ah = self.charge_ah if self._is_reported else reported.used_ah
@@ -44,7 +40,7 @@ class BatteryMonitor:
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:
-        """Restore charge and energy after a restart, unless the battery reports its charge itself."""
+        """Restore charge and energy after a restart, unless the battery reports its charge."""
         self.energy_wh = energy_wh
         if self._is_reported:
             return
@@ -52,25 +48,24 @@ class BatteryMonitor:
         self._now = self._model.terminal(charge_ah, np.zeros(4))
 
     def run(self, controls: FourRotors, duration_s: float) -> None:
-        """Integrate `duration_s` with the rotors at `controls`, parts of the largest speed."""
+        """Integrate `duration_s` with the rotors at `controls`, relative to top speed."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah = charged(self.charge_ah, current_a, duration_s)
         self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
 
     @property
     def left(self) -> float:
-        """Part of the charge that is left; 1 without a battery."""
         if self._battery is None:
             return 1.0
         return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
 
     @property
     def voltage_v(self) -> float:
-        """Voltage at the terminals now, V; 0 without a battery."""
+        """Terminal voltage, V; 0 without a battery."""
         return max(0.0, self._now[0] + self._sag_v)
 
     def state(self, charge_state: int = CHARGE_OK) -> BatteryState | None:
-        """Return the battery state for telemetry, with this MAV_BATTERY_CHARGE_STATE; None without a battery."""
+        """Return the battery state for telemetry."""
         if self._battery is None:
             return None
         left, current_a = self.left, self._now[1]

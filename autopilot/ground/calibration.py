@@ -1,7 +1,4 @@
-"""Calibrations, gone through as ground stations expect them; with a simulated vehicle there is nothing to find out.
-
-MAV_CMD_PREFLIGHT_CALIBRATION, and the lines "[cal] ..." by which PX4 reports progress: ground stations read them.
-"""
+"""Simulated calibrations: MAV_CMD_PREFLIGHT_CALIBRATION, and PX4's "[cal] ..." texts that ground stations parse."""
 
 from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Command
 from colibri.mavlink.wire.refusal import Refusal
@@ -12,7 +9,7 @@ _KINDS = {"gyro": 2, "mag": 2, "accel": 2, "level": 2}
 
 
 class Calibration:
-    """Goes through one calibration at a time."""
+    """Runs one calibration at a time."""
 
     def __init__(self) -> None:
         self._kind = ""
@@ -20,7 +17,7 @@ class Calibration:
         self._due_us = 0
 
     def begin(self, command: Command, *, armed: bool) -> Refusal | None:
-        """Obey a command: calibrate what its parameters choose, or stop where they choose nothing."""
+        """Start the calibration selected by the parameters, or cancel if all are 0."""
         if armed:
             return Refusal("calibration refused: the rotors are armed")
         chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
@@ -37,7 +34,6 @@ class Calibration:
         return None
 
     def poll(self, now_us: int) -> list[str]:
-        """Return the lines that are due."""
         if self._step == -1:
             self._step = 0
             return ["[cal] calibration cancelled"]
@@ -54,7 +50,7 @@ class Calibration:
 
 
 def _kind_of(p: tuple[float, ...]) -> str | None:
-    """Return what to calibrate; empty where nothing is chosen, None where it is not known."""
+    """Return the selected calibration; empty for a cancellation, None if unknown."""
     given = [0.0 if value != value else value for value in p]  # nan: not given
     chosen = [(place, value) for place, value in enumerate(given) if value != 0.0]
     if not chosen:

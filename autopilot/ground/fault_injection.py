@@ -1,7 +1,6 @@
-"""Injected faults, MAV_CMD_INJECT_FAILURE: accepted only where parameter SYS_FAILURE_EN is 1; done by the plant.
+"""MAV_CMD_INJECT_FAILURE, forwarded to the plant if parameter SYS_FAILURE_EN is 1.
 
-A fault travels with the answer to the next frame, and the frame after that has its result. Only then is the command
-acknowledged: what is accepted has happened.
+A fault is sent with the answer to a frame; the next frame has its result. The command is acknowledged only then.
 """
 
 from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
@@ -12,21 +11,21 @@ from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
 from colibri.mavlink.wire.refusal import Refusal
 
 ANSWERED_WITHIN_US = 1_000_000
-"""A plant that knows faults answers with the next frame but one."""
+"""The result is normally in the frame after next."""
 
 
 class Failures:
-    """Hands faults on to the plant, and its answers back."""
+    """Forwards faults to the plant, and its results back."""
 
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        """`relays`: whether the plant takes faults; those of sensors exist with feedback of sensors only."""
+        """`relays`: whether the plant accepts faults; faults of sensors require sensor feedback."""
         self._relays = relays
         self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []
         self._pending: tuple[Fault, Command] | None = None
 
     def inject(self, command: Command, *, enabled: bool) -> Refusal | None:
-        """Obey a command, or say why not; what became of it comes by `poll`."""
+        """Queue the fault of a command; `poll` returns the outcome."""
         if not enabled:
             return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
         if not self._relays:
@@ -42,14 +41,14 @@ class Failures:
         return PENDING
 
     def take(self) -> tuple[Fault, ...]:
-        """Return the faults to hand on with the next answer, and forget them."""
+        """Return the faults for the next answer, and clear the queue."""
         if not self._to_send:
             return ()
         faults, self._to_send = tuple(self._to_send), []
         return faults
 
     def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Refusal | None] | None:
-        """Take in the plant's results of faults; return the command that has come to its end, and how."""
+        """Process the plant's results; return a finished command and its outcome."""
         if self._pending is None:
             return None
         fault, command = self._pending

@@ -1,4 +1,4 @@
-"""Where the control law's plan leads: its predicted attitudes and thrusts, integrated to velocity and position."""
+"""The predicted path of the control law's plan: attitudes and thrusts integrated to velocity and position."""
 
 from math import isnan
 
@@ -14,14 +14,14 @@ from colibri.mavlink.telemetry.snapshot import Forecast
 from colibri.plant.vehicle.description import Vehicle
 
 POINTS = 5
-"""What TRAJECTORY_REPRESENTATION_WAYPOINTS holds."""
+"""Size of TRAJECTORY_REPRESENTATION_WAYPOINTS."""
 
 
 class Forecaster:
-    """Integrates the plans of one vehicle's control law."""
+    """Integrates the plans of one control law."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
-        """Take plans whose steps are `interval_s` apart; `columns` None: they hold no attitude."""
+        """`columns` is None for plans without attitude."""
         self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg
@@ -32,7 +32,7 @@ class Forecaster:
             _motion(np.zeros(6), plan, columns, np.zeros(1), self._mass_kg, self._gravity_m_s2, interval_s)
 
     def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
-        """Return points of the plan, the last at its end; of the references where the law predicts no attitude."""
+        """Return points of the plan up to its end, or of the references if the law predicts no attitude."""
         plan, squared = how.predicted, how.planned_squared
         if plan is not None and squared is not None and self._columns is not None:
             mass_kg = self._mass_kg if isnan(how.mass_kg) else how.mass_kg
@@ -45,7 +45,7 @@ class Forecaster:
     def _integrated(
         self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns, mass_kg: float
     ) -> tuple[Forecast, ...]:
-        """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
+        """Integrate thrust along body z and gravity; drag is negligible over the horizon."""
         begin = np.array((*state.position_enu_m, *state.velocity_enu_m_s))
         thrusts_n = matvec(squared, self._full_thrust_n)
         motion = _motion(begin, plan, columns, thrusts_n, mass_kg, self._gravity_m_s2, self._interval_s)
@@ -78,9 +78,9 @@ def _motion(
     gravity_m_s2: float,
     interval_s: float,
 ) -> Array:
-    """Return position, velocity and acceleration, ENU, after each step of a plan, (n, 9).
+    """Return position, velocity and acceleration, ENU, after each step, (n, 9).
 
-    `begin` is position and velocity before it, (6,); `plan` has a row more than there are `thrusts_n`, that of now.
+    `begin` is the present position and velocity, (6,); `plan` has one row more than `thrusts_n`, for the present.
     """
     motion = np.zeros((thrusts_n.shape[0], 9))
     speeds, places = np.zeros(3), np.zeros(3)  # their sums; what they are multiplied by comes after

@@ -1,4 +1,4 @@
-"""The log that ground stations list and download: a ULog of each flight, from arming to disarming."""
+"""The onboard log for ground stations: a ULog of each flight, from arming to disarming."""
 
 from collections.abc import Iterable
 
@@ -21,15 +21,14 @@ class _Topics(TopicLog):
         self._log = log
 
     def append(self, encoded: bytes) -> None:
-        """Append messages to it, if there is one."""
         self._log.record(encoded)
 
 
 class OnboardLog:
-    """Records snapshots and status texts while the rotors are armed."""
+    """Records snapshots and status texts while armed."""
 
     def __init__(self, vehicle: str, system_id: int, parameters: Parameters, files: Files) -> None:
-        """Record a vehicle into folder `logs` of `files`."""
+        """Record into folder `logs` of `files`."""
         self._log = FlightLog(files, (LOGS,))
         self._topics = _Topics(self._log)
         self._recorder = Recorder(self._topics, vehicle, system_id, parameters, with_battery=True)
@@ -38,11 +37,11 @@ class OnboardLog:
 
     @property
     def name(self) -> str | None:
-        """Name of the log that is being written."""
+        """Name of the open log."""
         return self._log.name
 
     def update(self, snapshot: Snapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
-        """Record a snapshot, if it is new, and what was said since the last time; begin and end logs."""
+        """Record new snapshots and texts; start and end logs."""
         begins, ends = armed and not self._armed, self._armed and not armed
         self._armed = armed
         if begins:
@@ -61,6 +60,5 @@ class OnboardLog:
         log.update(armed, now_us)
 
     def close(self) -> None:
-        """Close the log."""
         self._topics.flush()
         self._log.close()

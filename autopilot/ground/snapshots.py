@@ -1,4 +1,4 @@
-"""Snapshots for telemetry: what the flight is like at a control sample."""
+"""Snapshots of a control sample for telemetry."""
 
 from math import isnan
 
@@ -45,7 +45,7 @@ _SINKING_M_S = -0.1
 
 
 class SnapshotBuilder:
-    """Takes the snapshots of one vehicle."""
+    """Builds the snapshots of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
         self._interval_s = interval_s
@@ -53,7 +53,7 @@ class SnapshotBuilder:
         self.adopt(vehicle)
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go by other numbers of the vehicle, with nothing remembered of the samples before."""
+        """Apply a changed vehicle model, and reset the state."""
         self._max_speed_rad_s = vehicle.rotors.max_speed * vehicle.rad_s_per_speed_unit
         self._forecaster = Forecaster(vehicle, self._interval_s, self._columns)
         self._velocity: Vector | None = None
@@ -74,10 +74,7 @@ class SnapshotBuilder:
         *,
         breached: bool,
     ) -> Snapshot:
-        """Return the vehicle as it is now.
-
-        `decision` took `duration_s`, and is None while the rotors rest; `controls` are parts of the largest speed.
-        """
+        """Return the snapshot; `decision` took `duration_s`, and `controls` are relative to top speed."""
         sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
         mode, armed = pilot.state
         number = custom_mode(mode)
@@ -151,7 +148,6 @@ _BY_STICKS = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
 
 
 def landed_state(pilot: Pilot, state: VehicleState) -> int:
-    """Return the MAV_LANDED_STATE."""
     if pilot.ground.standing:
         return int(mav.MAV_LANDED_STATE_ON_GROUND)
     mode = pilot.state.mode
@@ -168,7 +164,7 @@ def _comes_down(pilot: Pilot, state: VehicleState) -> bool:
 
 
 def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors) -> Setpoint:
-    """Return what the control law steers to."""
+    """Return the setpoint of the control law."""
     if decision is None:
         return NO_SETPOINT
     c1, c2, c3, c4 = controls
@@ -190,11 +186,10 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
 
 
 def rates_of(demand: AttitudeDemand | None) -> Vector:
-    """Return the angular rates demanded now, rad/s; for small tilt they are the body's."""
+    """Return the demanded rates, rad/s, equal to body rates for small tilt."""
     return NOWHERE if demand is None else first(demand.angle_rates_rad_s)
 
 
 def first(column: Array) -> Vector:
-    """Return the first row of (n, 3)."""
     x, y, z = column[0].tolist()
     return (x, y, z)

@@ -1,4 +1,4 @@
-"""The vehicle's side towards ground stations: all services, put together around one pilot, on one hub."""
+"""All MAVLink services of a vehicle, assembled around one pilot on one hub."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -53,7 +53,7 @@ T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 MAX_SAID = 20
-"""Status texts kept for whoever watches the process."""
+"""Status texts kept for the terminal."""
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
@@ -63,12 +63,11 @@ class StationSettings:
 
     Attributes:
         identity: A name of `identity.IDENTITIES`.
-        origin: Of the ENU frame.
-        boot_unix_us: Unix time at simulated time 0, µs; 0 if it is unknown.
-        files: What can be read and written by file transfer.
-        logs: Where the logs of flights go; None: into folder `logs` of the files.
-        feedback: Kind of the frames, states or sensors.
-        relays_faults: Whether the plant is one that takes faults.
+        origin: Origin of the ENU frame.
+        boot_unix_us: Unix time at simulated time 0, µs; 0 if unknown.
+        files: Files for transfer.
+        logs: Folder of flight logs; None for folder `logs` of the files.
+        relays_faults: Whether the plant accepts injected faults.
     """
 
     system_id: int
@@ -83,24 +82,17 @@ class StationSettings:
 
 
 class Guarding(Protocol):
-    """Catches the exceptions of parts by their names."""
+    """Catches the exceptions of named parts."""
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return what `call` returns, or what `otherwise` does where that raises."""
+        """Return the result of `call`, or of `otherwise` if it raises."""
 
     def caught(self, part: str, error: Exception, instead: str = "") -> None:
-        """Take in an exception of a part."""
+        """Record an exception of a part."""
 
 
 class Stations:
-    """Serves any number of ground stations: services put together, and the parts that they serve.
-
-    Attributes:
-        hub: Where the links meet.
-        offboard: Setpoints of companions.
-        manual: Sticks of a pilot.
-        needs: Which needs of modes are met.
-    """
+    """Serves any number of ground stations."""
 
     def __init__(
         self,
@@ -115,7 +107,6 @@ class Stations:
         takes_attitude: bool,
         defence: Guarding,
     ) -> None:
-        """`defence` catches the exceptions of services."""
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._guard = lines, pilot, defence.guard
         self._text = StatusText()
@@ -169,20 +160,20 @@ class Stations:
         self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
 
     def use(self, channel: int, kind: str) -> None:
-        """Stream to `channel` what its kind gets by default."""
+        """Stream to `channel` the default messages of its kind."""
         self._streams.use(channel, kind)
 
     @property
     def station_us(self) -> int | None:
-        """When the last heartbeat of a ground station came, µs; None if there never was one."""
+        """Time of the last ground station heartbeat, µs."""
         return self._heartbeat.station_us
 
     def expect_station(self, now_us: int) -> None:
-        """Count the loss of a ground station, which was connected before a restart, from now on."""
+        """Count a ground station connected before a restart as lost from now on."""
         self._heartbeat.expect(now_us)
 
     def update(self, snapshot: Snapshot) -> None:
-        """Take in the vehicle's state. Called once a control sample."""
+        """Publish a snapshot of the control sample."""
         vehicle = self._pilot.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
@@ -192,12 +183,12 @@ class Stations:
         self._follow.update(snapshot.origin)
 
     def go_on(self) -> None:
-        """Send the mode at least, where the vehicle's state could not be taken in."""
+        """Send at least the mode if a snapshot fails."""
         mode, armed = self._pilot.state
         self._heartbeat.go_on(custom_mode(mode), armed=armed)
 
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
-        """Take in the plant's results of requested faults, and the time of the messages that follow."""
+        """Process the plant's results of faults, and set the time of the next messages."""
         self.needs.at(now_us)
         ended = self.failures.poll(plant_status.results, now_us)
         if ended is not None:
@@ -205,7 +196,7 @@ class Stations:
             self.hub.send(self._obeys.finish(command.id, command.peer, outcome))
 
     def poll(self, now_us: int) -> list[Outgoing]:
-        """Do what is due; return what to send. Called once a frame."""
+        """Do due work; return the messages to send. Called once a frame."""
         self._guard("progress", self._tell, _nothing, now_us)
         self._guard("hub", self._poll_hub, _nothing, now_us)
         said = self._text.take()
@@ -226,24 +217,21 @@ class Stations:
             self.say(INFO, text)
 
     def refuse_commands(self, reason: str) -> None:
-        """Deny every command for a reason, and drop all other messages; with an empty reason, serve again."""
+        """Deny every command with `reason`, and drop other messages; an empty reason resumes service."""
         self.hub.accept_only(_COMMANDS if reason else None)
         self._obeys.close(reason)
 
     def take_outbox(self) -> list[Outgoing]:
-        """Return what to send now."""
         return self.hub.take_outbox()
 
     def warn(self, text: str) -> None:
-        """Send a warning to everybody."""
         self.say(WARNING, text)
 
     def say(self, severity: int, text: str) -> None:
-        """Send a status text to everybody."""
         self.hub.send(self._text.say(severity, text))
 
     def take_texts(self) -> list[Line]:
-        """Return the status texts since the last time, the last of many, for whoever watches the process."""
+        """Return the latest status texts for the terminal."""
         if not self._said:
             return []
         said = list(self._said)
@@ -277,5 +265,4 @@ def _files(settings: StationSettings, metadata: Metadata, parameters: Parameters
     return Tree(settings.files or Memory(), mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
 
 
-def _nothing() -> None:
-    """Replace what raised by nothing."""
+def _nothing() -> None: ...

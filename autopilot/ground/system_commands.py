@@ -21,11 +21,10 @@ REBOOT, SHUT_DOWN = 1.0, 2.0
 
 
 class SystemCommands:
-    """Obeys commands to one autopilot as a system.
+    """Handles system commands.
 
     Attributes:
-        banner: Name and version of the autopilot.
-        restart: `REBOOT` or `SHUT_DOWN` once that was requested; 0 before.
+        restart: `REBOOT` or `SHUT_DOWN` once requested; otherwise 0.
     """
 
     def __init__(
@@ -38,7 +37,6 @@ class SystemCommands:
         self.restart = 0.0
 
     def handlers(self) -> Mapping[int, Handler]:
-        """Return the handlers of the commands."""
         return {
             mav.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
@@ -47,19 +45,15 @@ class SystemCommands:
         }
 
     def shell(self) -> Mapping[str, ShellCommand]:
-        """Return the commands of the shell."""
         return {"ver": lambda _: self.banner + "\n", "status": lambda _: self._status(), "param": self._param}
 
     def reboot(self) -> None:
-        """Request a restart, as a ground station may."""
         self.restart = REBOOT
 
     def poll(self, now_us: int) -> list[str]:
-        """Return the status texts that are due."""
         return self._calibration.poll(now_us)
 
     def set_origin(self, place: Geodetic) -> Refusal | None:
-        """Set the origin of the ENU frame; return why not."""
         if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= MAX_HEIGHT_M:
             return Refusal("origin refused: not a latitude, longitude and altitude")
         if self._pilot.state.armed:
@@ -83,7 +77,7 @@ class SystemCommands:
         return None
 
     def _storage(self, command: Command) -> Refusal | None:
-        """Obey PREFLIGHT_STORAGE: parameters are stored as they change, so only the reset does anything."""
+        """Handle PREFLIGHT_STORAGE: parameters are stored on change, so only the reset has an effect."""
         if command.p1 == 2.0:
             if self._pilot.state.armed:
                 return Refusal("parameters refused: the rotors are armed")

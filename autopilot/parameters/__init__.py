@@ -1,1 +1,1 @@
-"""Which numbers of law, vehicle, behaviour and failsafes are parameters, and the law rebuilt when one changes."""
+"""Parameters of control law, vehicle, behaviour and failsafes, and the law rebuilt on a change."""

@@ -1,4 +1,4 @@
-"""How the vehicle behaves, as parameters: under PX4's names where they mean what PX4 means by them."""
+"""Parameters of the vehicle's behaviour, under PX4's names where the meaning is the same."""
 
 from dataclasses import fields
 from math import radians
@@ -10,14 +10,14 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Value
 
 TRACKS = (*THESIS_TRACKS, "lemniscate", "circle")
-"""What the numbers of TRACK stand for."""
+"""Tracks by the number of TRACK."""
 _BEHAVIOUR = Behaviour()
 _DEG = radians(1.0)
 _YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
 
 
 class Row(NamedTuple):
-    """A parameter that is a `field` of `Behaviour` or of its limits, `scale` times the parameter's value."""
+    """A parameter for a `field` of `Behaviour` or its limits, which is `scale` times the parameter."""
 
     name: str
     field: str
@@ -31,7 +31,6 @@ class Row(NamedTuple):
     values: tuple[tuple[int, str], ...] = ()
 
     def parameter(self) -> Parameter:
-        """Return the parameter."""
         value = _field(self.field)
         kind = Kind.REAL if isinstance(value, float) else Kind.INT
         return Parameter(
@@ -128,18 +127,18 @@ ROWS = (
         values=tuple(enumerate(TRACKS)),
     ),
 )
-"""One for each number of `Behaviour` and `Limits`."""
+"""One row for each number of `Behaviour` and `Limits`."""
 
 _ANSWERS = "Only answers ground stations that request it: changes nothing."
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
-    """Return the parameters of behaviour, and those that ground stations expect of a PX4."""
+    """Return the behaviour's parameters, and those that ground stations expect from PX4."""
     return [*(row.parameter() for row in ROWS), *_answers(system_id)]
 
 
 def behaviour(parameters: Parameters) -> Behaviour:
-    """Return the behaviour by the parameters' values; numbers that nobody changed keep their 64 bits."""
+    """Return the behaviour by the parameters; unchanged numbers keep 64 bits."""
     changed: dict[str, Any] = {}
     for row in ROWS:
         value = parameters[row.name]
@@ -157,7 +156,6 @@ def behaviour(parameters: Parameters) -> Behaviour:
 
 
 def _answers(system_id: int) -> list[Parameter]:
-    """Return parameters that ground stations for PX4 read or set, and that change nothing here."""
     return [
         _answer("SYS_AUTOSTART", 4001, "Airframe", read_only=True),
         _answer("SYS_AUTOCONFIG", 0, "Reset of the airframe"),

@@ -1,4 +1,4 @@
-"""The numbers of a control law that are parameters: those that can change in flight."""
+"""Parameters of a control law that can change in flight."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,12 +9,12 @@ _TURN = ("1st", "2nd")
 _MOMENTS = ("roll", "pitch", "yaw")
 
 STRUCTURE = frozenset({"control_interval_s", "qp"})
-"""Keys of any control law whose numbers are not for changing in flight."""
+"""Keys of any control law fixed in flight."""
 _PREFIX_LENGTH = 3
 
 
 def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
-    """Return the numbers in the table of a control law; where nobody described them, under names made of their keys."""
+    """Return the numbers of a control law's table; undescribed ones are named by their keys."""
     if controller in DESCRIBED:
         return [number for number in DESCRIBED[controller] if has(table, number.path)]
     letters = "".join(letter for letter in controller.upper() if letter.isascii() and letter.isalnum())
@@ -112,7 +112,7 @@ LPV_MPC = [
     ),
     *_recovery("LPV"),
 ]
-"""Of `colibri.autopilot.control.lpv_mpc.law`: all but its samples and the solver."""
+"""`colibri.autopilot.control.lpv_mpc.law`, without its samples and the solver."""
 WHOLE_LPV_MPC = [
     *_poles("WHL_POLE", ("guidance",), "a large position error"),
     Number("WHL_EXACT", ("guidance", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
@@ -141,6 +141,6 @@ WHOLE_LPV_MPC = [
     *_poles("WHL_FB_POLE", ("fallback",), "position, of recovery"),
     *_recovery("WHL"),
 ]
-"""Of `colibri.autopilot.control.whole_lpv_mpc.law`: all but its samples, its preview and the solver."""
+"""`colibri.autopilot.control.whole_lpv_mpc.law`, without its samples, preview and solver."""
 DESCRIBED = {"lpv-mpc": LPV_MPC, "whole-lpv-mpc": WHOLE_LPV_MPC}
-"""Name of a control law -> its numbers."""
+"""Numbers by name of the control law."""

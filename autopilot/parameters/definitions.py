@@ -1,4 +1,4 @@
-"""The parameters of this autopilot: the numbers of its control law, of its vehicle model, and of its behaviour."""
+"""All parameters of the autopilot: control law, vehicle model, behaviour, failsafes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,14 +19,14 @@ __all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
 
 
 class ImpossibleError(AutopilotError):
-    """Values that no vehicle can have together; the message names the key."""
+    """Values that contradict each other; the message names the key."""
 
 
 class Numbers:
-    """The numbers of a profile's control law and of a vehicle model that are parameters.
+    """The parameters of a control law and a vehicle model.
 
     Attributes:
-        definitions: The parameters, whose defaults are the numbers.
+        definitions: Parameters, with the files' numbers as defaults.
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
@@ -49,9 +49,10 @@ class Numbers:
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
-        """Return profile and vehicle with the values of the parameters in; ImpossibleError if no such vehicle can be.
+        """Return profile and vehicle with these values; the law's table is checked when the law is built.
 
-        The control law's table is checked when the law is built from it.
+        Raises:
+            ImpossibleError: The vehicle is impossible.
         """
         profile, vehicle = self._profile, self._vehicle
         table = changed(self._table, self._law, values, self.defaults)
@@ -63,7 +64,6 @@ class Numbers:
 
 
 def definitions(profile: Profile, vehicle: Vehicle, system_id: int = 1) -> list[Parameter]:
-    """Return all parameters of an autopilot that flies `vehicle` by `profile`: their defaults are the files'."""
     return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
 
 

@@ -1,4 +1,4 @@
-"""Numbers of a table of tables, as parameters: where each lies, what it is called, and back."""
+"""Numbers in nested tables as parameters: paths, names, values."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter, Value
 
 Path: TypeAlias = tuple[str | int, ...]
-"""Keys, and places in lists, from the outside in."""
+"""Keys and list indices, outermost first."""
 Tree: TypeAlias = dict[str, Any]
 
 _UNITS = {
@@ -24,13 +24,13 @@ _UNITS = {
     "_m": "m",
     "_n": "N",
 }
-"""Endings of keys, longer ones first."""
+"""Units by the ending of a key, longest first."""
 _MAX_NAME_CHARS = 16
 _MAX_WORD_CHARS = 8
 
 
 class Number(NamedTuple):
-    """A number at a `path` of a tree, `scale` times a parameter; the other fields are the parameter's."""
+    """A number at a `path`, `scale` times its parameter; the other fields are the parameter's."""
 
     name: str
     path: Path
@@ -42,7 +42,7 @@ class Number(NamedTuple):
     decimals: int = 3
 
     def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
-        """Return the parameter, whose default is what the tree holds: bounds give way to it."""
+        """Return the parameter; its default is the tree's value, and bounds widen to include it."""
         value = read(tree, self.path)
         kind = Kind.INT if isinstance(value, int) else Kind.REAL
         default = value if kind == Kind.INT else value / self.scale
@@ -60,12 +60,11 @@ class Number(NamedTuple):
         )
 
     def applied(self, value: Value) -> Value:
-        """Return the number that a value of the parameter stands for."""
         return value if isinstance(value, int) else value * self.scale
 
 
 def read(tree: Mapping[str, Any], path: Path) -> Any:
-    """Return what lies at `path`; KeyError if nothing does."""
+    """Return the value at `path`, or raise KeyError."""
     here: Any = tree
     for key in path:
         try:
@@ -76,7 +75,6 @@ def read(tree: Mapping[str, Any], path: Path) -> Any:
 
 
 def has(tree: Mapping[str, Any], path: Path) -> bool:
-    """Whether there is a number at `path`."""
     try:
         return is_number(read(tree, path))
     except KeyError:
@@ -84,9 +82,9 @@ def has(tree: Mapping[str, Any], path: Path) -> bool:
 
 
 def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], defaults: Mapping[str, Value]) -> Tree:
-    """Return the tree with the values that are not at their defaults in; the same one if all are.
+    """Return the tree with all changed values, or the same tree without changes.
 
-    A parameter holds 32 bits: numbers that nobody changed keep their 64.
+    Parameters hold 32 bits: unchanged numbers keep 64.
     """
     for number in numbers:
         if values[number.name] != defaults[number.name]:
@@ -105,7 +103,7 @@ def _with(tree: Any, path: Path, value: Value) -> Any:
 
 
 def is_number(value: Any) -> bool:
-    """Whether this is a number that a parameter can hold."""
+    """Whether a parameter can hold this value."""
     if isinstance(value, bool):
         return False
     if isinstance(value, int):
@@ -114,7 +112,6 @@ def is_number(value: Any) -> bool:
 
 
 def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
-    """Yield where numbers lie, in the order of the keys."""
     if is_number(tree):
         yield before
     elif isinstance(tree, Mapping):
@@ -126,9 +123,9 @@ def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
 
 
 def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> list[Number]:
-    """Return the numbers of a table that nobody described, but those below an excluded key.
+    """Return the undescribed numbers of a table, without excluded keys.
 
-    Each is called by a prefix and the words of its keys, shortened alike until they fit.
+    Names are the prefix and the words of the keys, all shortened to the same length until they fit.
     """
     taken: set[str] = set()
     numbers = []
@@ -143,7 +140,7 @@ def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> lis
 
 
 def described(path: Path) -> str:
-    """Return a path as it would be written: a.b[1]."""
+    """Return a path as text: a.b[1]."""
     text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return text.removeprefix(".")
 
@@ -158,7 +155,7 @@ def _without_unit(path: Path) -> tuple[Path, str]:
 
 
 def _names(prefix: str, path: Path) -> Iterator[str]:
-    """Yield names for a path, the most telling first."""
+    """Yield names for a path, longest first."""
     words = [_plain(word) for key in path if isinstance(key, str) for word in key.split("_")]
     places = "".join(str(key + 1) for key in path if isinstance(key, int))
     room = _MAX_NAME_CHARS - len(prefix) - 1 - len(places)

@@ -1,4 +1,4 @@
-"""Retuning in flight: the control law is rebuilt, and checked, before one of its parameters changes."""
+"""Retuning in flight: the control law is rebuilt and checked before a parameter changes."""
 
 from collections.abc import Callable, Mapping
 from math import pi
@@ -32,26 +32,26 @@ _TRIED = (
 
 
 class Rhythm(Protocol):
-    """What a control law cannot change in flight: its sample, and the references that it takes."""
+    """Parts of a control law that are fixed in flight."""
 
     control_interval_us: int
     preview: Preview
 
 
 class Trial(Protocol):
-    """Whatever else is built from the parameters; either method raises what it cannot be built by."""
+    """Other objects built from parameters; both methods raise on bad values."""
 
     def try_vehicle(self, vehicle: Vehicle) -> None:
-        """Build all that is built from a vehicle's numbers, and try it."""
+        """Build and try everything that depends on the vehicle model."""
         ...
 
     def try_values(self, parameters: Parameters) -> None:
-        """Build all that is built from the other parameters, and try it."""
+        """Build and try everything that depends on the other parameters."""
         ...
 
 
 class Tuned(NamedTuple):
-    """A control law with the numbers it was built from."""
+    """A control law with its numbers."""
 
     profile: Profile
     vehicle: Vehicle
@@ -59,7 +59,7 @@ class Tuned(NamedTuple):
 
 
 class Tuning:
-    """Checks each change before it is made: one by which no control law can be built, or fly, is refused."""
+    """Rejects changes with which the control law cannot be built or fly."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class Tuning:
         parameters: Parameters | None = None,
         trial: Trial | None = None,
     ) -> None:
-        """Tune while a law flies in the rhythm of `running`; `say` reports why a change was refused."""
+        """Keep the rhythm of `running`; `say` reports refusals."""
         self._numbers = numbers
         self._build = build
         self._say = say
@@ -79,9 +79,9 @@ class Tuning:
         self._tried: Vehicle | None = None
 
     def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
-        """Return the control law for a change as a `Tuned`, or why a parameter cannot change so; nothing is kept.
+        """Return the control law for a change as a `Tuned`, or a refusal, for `Parameters.prepare`.
 
-        For `colibri.mavlink.parameters.store.Parameters.prepare`; `values` are of all parameters, the new one in.
+        `values` are of all parameters, with the change.
         """
         try:
             if name not in self._numbers.defaults:
@@ -97,7 +97,7 @@ class Tuning:
         return Prepared(tuned)
 
     def tuned(self, values: Mapping[str, Value]) -> Tuned:
-        """Return law and vehicle for these values, all that is built from them tried; raise what any of it raises."""
+        """Build and try law and vehicle for these values; errors pass through."""
         profile, vehicle = self._numbers.applied(values)
         controller = self._build(profile, vehicle)
         _try(profile.controller, controller, vehicle)
@@ -107,7 +107,7 @@ class Tuning:
         return Tuned(profile, vehicle, controller)
 
     def try_all(self, values: Mapping[str, Value]) -> None:
-        """Try all that is built from these values, as the first that are flown; ImpossibleError if it cannot be."""
+        """Try all initial values, or raise ImpossibleError."""
         try:
             self._try_values(values)
             self.tuned(values)
@@ -120,7 +120,7 @@ class Tuning:
 
 
 def builder(controller: str, clock: Clock) -> Build:
-    """Return what builds a control law again and again, found once among what is installed, or a ControllerError."""
+    """Return the builder of an installed control law, or raise ControllerError."""
     factory = load_controller(controller)
 
     def build(profile: Profile, vehicle: Vehicle) -> Controller[Any]:
@@ -136,7 +136,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly two control samples of hover, the second one a metre away from the reference, and two far from hover."""
+    """Fly two control samples near hover and two far from it."""
     references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):

@@ -1,4 +1,4 @@
-"""The numbers of the vehicle model that are parameters: what the autopilot assumes, not what the plant flies."""
+"""Parameters of the vehicle model, as the autopilot assumes it, not the plant."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,12 +6,12 @@ from typing import Any
 from colibri.autopilot.parameters.number_paths import Number, Path, has
 
 _SPEED = "{speed}"
-"""Stands for the unit of the vehicle's rotor speeds."""
+"""Placeholder for the unit of rotor speeds."""
 _AXES = "XYZ"
 
 
 def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
-    """Return the numbers of a vehicle given as a table of tables; of parts that it does not model, none."""
+    """Return the numbers of a vehicle's tables, for modelled parts only."""
     speed = tree["rotors"]["speed_unit"]
     inside = f"({speed})" if "/" in speed else speed
     return [

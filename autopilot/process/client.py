@@ -1,4 +1,4 @@
-"""The autopilot's end of the link to a plant: frames received, answered, waited for."""
+"""The autopilot's end of the link to a plant."""
 
 from collections.abc import Callable
 from functools import partial
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _SILENCE_REPORTED_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
 _UNKNOWN_REPORTED_AFTER_US = 3_000_000
-"""Of simulated time: who rests is known after a second."""
+"""Simulated time; alignment at rest takes 1 s."""
 _UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
 
 
@@ -35,7 +35,7 @@ def _refusal(result: int) -> str:
 
 
 class Client:
-    """Drives the autopilot's end of the conversation over a link."""
+    """Drives the autopilot's end of a link."""
 
     def __init__(
         self,
@@ -46,7 +46,6 @@ class Client:
         log: AutopilotLog | None,
         ground: "Ground | None" = None,
     ) -> None:
-        """Serve `end` on `link` until `stop`, and `ground` beside it."""
         self._link = link
         self._end = end
         self._status = status
@@ -58,11 +57,11 @@ class Client:
         self._unknown_since_us: int | None = None
 
     def fly(self, autopilot: Autopilot[Any]) -> None:
-        """Answer every frame until it is stopped.
+        """Answer frames until stopped.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
-            LogError: A log cannot be written, and nobody needs the flight without it.
+            DecisionError: The control law returned impossible rotor speeds.
+            LogError: A log cannot be written, in a flight without ground stations.
         """
         self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
@@ -90,11 +89,7 @@ class Client:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _keep(self, write: Callable[[AutopilotLog], None]) -> None:
-        """Write to the log; whoever flies for ground stations flies on without one that cannot be written.
-
-        Raises:
-            LogError: There are no ground stations, and it cannot be written.
-        """
+        """Write to the log; with ground stations, a failed log does not end the flight."""
         if self._log is None:
             return
         try:
@@ -109,7 +104,7 @@ class Client:
             self._link.send(datagram)
 
     def _report_if_unknown(self, step: Step) -> None:
-        """Report, once, why a vehicle without an estimate stays disarmed, or falls."""
+        """Report once why a vehicle without an estimate stays disarmed, or falls."""
         now_us = step.command.time_us
         if step.known:
             self._unknown_since_us = None

@@ -1,4 +1,4 @@
-"""The exceptions caught in flight, kept on disk: a line of JSON each, and one on the terminal for each part."""
+"""Exceptions caught in flight: a line of JSON each, and a line on the terminal for each part."""
 
 import sys
 from pathlib import Path
@@ -15,18 +15,17 @@ class ErrorLog:
     """The exceptions of one process.
 
     Attributes:
-        failed: Whether there was any.
+        failed: Whether any was written.
     """
 
     def __init__(self, folder: Path | None, status: Status) -> None:
-        """Append to `errors.jsonl` in `folder`; without one, tracebacks go to standard error."""
+        """Append to `errors.jsonl` in `folder`; without a folder, tracebacks go to standard error."""
         self._path = None if folder is None else folder / FILE
         self._status = status
         self._said: set[str] = set()
         self.failed = False
 
     def write(self, records: list[ErrorRecord]) -> None:
-        """Append records."""
         for record in records:
             self.failed = True
             kept = self._kept(record)

@@ -1,4 +1,4 @@
-"""Ground stations as the process sees them: links, key, parameter file, logs, and what is reported on the terminal."""
+"""Ground stations of the process: links, key, parameter file, logs, terminal reports."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -35,17 +35,14 @@ if TYPE_CHECKING:
 _REPORT_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 _STANDING_SAMPLES = 50
-"""A vehicle that is not armed loses nothing in that many control samples."""
+"""A disarmed vehicle saves its state at this interval of control samples."""
 
 
 class Ground:
-    """Serves ground stations beside the plant, and keeps what must outlive the process.
-
-    It has more attributes than most classes: what a vehicle is made of, to make another one after a restart.
+    """Serves ground stations beside the plant, and saves all state that must survive the process.
 
     Attributes:
-        autopilot: Flies the vehicle; another one after a restart.
-        errors: What was caught in flight.
+        autopilot: Replaced by a restart.
         shut_down: Whether a ground station has requested the end.
     """
 
@@ -57,10 +54,10 @@ class Ground:
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files as `spec` says; a `conductor` stands for all ground stations.
+        """Open links and files of `spec`; a `conductor` replaces all ground stations.
 
         Raises:
-            GroundError: Something of it cannot be used.
+            GroundError: A link or file cannot be used.
         """
         self._spec = spec
         self._profile = profile
@@ -107,20 +104,19 @@ class Ground:
             self._status.say("ground", _invitation(link.url), url=link.url, link=number)
 
     def record(self, log: "AutopilotLog") -> None:
-        """Record in `log` what the vehicle begins with, and what it receives."""
+        """Record initial values and inputs in `log`."""
         self._log = log
         log.begin_again(self._values, self._past_bytes)
         log.follow(self.copter.parameters)
 
     @property
     def copter(self) -> Copter:
-        """The vehicle."""
         return self.autopilot.stages
 
     def serve(self, now_s: float) -> Autopilot[Copter]:
-        """Receive from ground stations and answer them; return the autopilot that flies on.
+        """Receive from ground stations and answer them; return the autopilot, which a restart replaces.
 
-        They are answered last: what an answer acknowledges is on disk by then, whenever this process is killed.
+        Answers are sent last, so that acknowledged changes are on disk even if the process is killed.
         """
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
@@ -138,7 +134,7 @@ class Ground:
         return self.autopilot
 
     def _record_told(self) -> None:
-        """Record what ground stations are told, where it is new; keep the texts for the terminal."""
+        """Record new snapshots and texts."""
         stations = self.copter.stations
         snapshot, said = stations.snapshot, stations.take_texts()
         if said:
@@ -155,14 +151,14 @@ class Ground:
             self._status.say("said", f"{error}; flying on")
 
     def _recorded(self, log: "AutopilotLog", received: Iterable[Received]) -> Iterator[Received]:
-        """Yield what was received; the flight goes on where it cannot be recorded."""
+        """Record and yield received datagrams; a failed log does not stop them."""
         try:
             yield from log.recorded(received)
         except LogError as error:
             self._status.say("said", f"{error}; flying on")
 
     def _look_after(self, now_s: float) -> None:
-        """Tell the terminal, and keep what changes."""
+        """Report to the terminal, and save changes."""
         if now_s >= self._reported_s + _REPORT_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
             self._report(now_s)
         if self.copter.parameters.revision != self._revision:
@@ -172,7 +168,7 @@ class Ground:
             self._keep()
 
     def _keep(self) -> None:
-        """Save what the flight needs to go on, should this process be killed."""
+        """Save the state that lets the flight continue if this process is killed."""
         copter, samples = self.copter, self.copter.samples
         if samples == self._kept_samples:  # between two control samples
             return
@@ -190,7 +186,7 @@ class Ground:
         self._kept_samples, self._kept_plans, self._kept_armed = samples, changes, armed
 
     def close(self) -> None:
-        """Write what is left to write, and let go of everything."""
+        """Write remaining data, and close links and files."""
         self._report_texts()
         self.copter.stations.log.close()
         self._state.save_signing()
@@ -198,7 +194,7 @@ class Ground:
         self._state.close()
 
     def abandon(self) -> None:
-        """Let go of the files as a power cut does: nothing is written that was not."""
+        """Close the files without writing, like a power cut."""
         self._state.close()
 
     def _restart(self, kind: float) -> None:

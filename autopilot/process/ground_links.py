@@ -1,4 +1,4 @@
-"""The links to ground stations: what came on any of them, and where each answer goes."""
+"""The links to ground stations: receive from all, and route each answer."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,19 +17,19 @@ from colibri.mavlink.node.router import Source
 from colibri.mavlink.streaming.rates import GCS, SDK
 
 SDK_PORTS = range(14540, 14550)
-"""Where SDKs wait for a PX4, and so for us: they ask for nothing, and expect everything."""
+"""Ports where SDKs wait for PX4; they request no streams, and expect all."""
 SHARE = 0.25
-"""Part of all time that receiving may take: at real time a frame leaves more than half of its time to that."""
+"""Part of all time for receiving: at real time the control law leaves more than half of a frame idle."""
 MAX_SAVED_S = 0.005
 _GONE_AFTER_S = 3.5
-"""By the wall clock; a ground station sends a HEARTBEAT a second."""
+"""Wall-clock time; ground stations send a HEARTBEAT every second."""
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
-    """Open the links that `urls` name.
+    """Open the links of `urls`.
 
     Raises:
-        LinkError: One cannot be opened, or would let anybody on the network fly the vehicle.
+        LinkError: A link cannot be opened, or would let strangers on the network fly the vehicle.
     """
     check_reach(urls, signed=signed, insecure=insecure)
     links: list[GroundLink] = []
@@ -44,14 +44,14 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
 
 
 class Allowance:
-    """How much time is left for what others send: a share of all time that passes, whatever they do.
+    """Time budget for received data: a share of all time.
 
-    Who takes more than that is read less often, and the control law not a moment later. What other processes take of
-    a busy computer meanwhile is no sender's doing: only the processor's time is counted.
+    Senders that exceed it are read less often, and the control law is not delayed. Only processor time counts, because
+    other processes on a busy computer are not the senders' fault.
     """
 
     def __init__(self, clock: Clock, processor_clock: Clock) -> None:
-        """Begin with all that can be saved up; one clock runs always, the other while this process does."""
+        """Start with a full budget."""
         self._clock = clock
         self._processor_clock = processor_clock
         self._earned_s = clock()
@@ -59,18 +59,16 @@ class Allowance:
         self._left_s = MAX_SAVED_S
 
     def earn(self) -> None:
-        """Take in the share of the time that has passed."""
         now_s = self._clock()
         self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MAX_SAVED_S)
         self._earned_s = now_s
 
     def begin(self) -> bool:
-        """Begin to spend time, if there is any left."""
         self._began_s = self._processor_clock()
         return self._left_s > 0.0
 
     def end(self) -> None:
-        """End to spend time; what was too much is owed."""
+        """Charge the time spent, even beyond the budget."""
         self._left_s -= self._processor_clock() - self._began_s
 
 
@@ -78,7 +76,7 @@ class GroundLinks:
     """Carries datagrams between links and a vehicle's hub."""
 
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
-        """Serve `links`; those with a target are called, whether anybody listens or not. Clocks as for `Allowance`."""
+        """Links with a target are called, whether anyone listens or not."""
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
         self._allowance = Allowance(clock, processor_clock)
@@ -90,7 +88,7 @@ class GroundLinks:
         self._last: dict[tuple[int, Source], tuple[int, float]] = {}
 
     def introduce(self, stations: Stations) -> None:
-        """Open a channel to everybody that is connected already."""
+        """Reopen the channels of all connections."""
         for number, address in self._opened:
             self._open(stations, number, address)
 
@@ -99,9 +97,9 @@ class GroundLinks:
         stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
     def receive(self, stations: Stations) -> Iterator[Received]:
-        """Yield what has come, as much of it as there is time for; forget connections that have ended.
+        """Yield received datagrams within the time budget; drop closed connections.
 
-        What there is no time for waits, first here, then in the system, which in the end drops it.
+        Excess data waits here, then in the system, which drops it in the end.
         """
         self._allowance.earn()
         for number, link in enumerate(self._links):
@@ -116,7 +114,7 @@ class GroundLinks:
                 self._forget(stations, number, address)
 
     def _in_turn(self) -> Iterator[Received]:
-        """Yield a datagram of each link after the other, so that none has to wait for one that is flooded."""
+        """Yield from the links in turn, so that a flooded link does not block the others."""
         while any(self._waiting):
             for number, waiting in enumerate(self._waiting):
                 if not waiting:
@@ -133,7 +131,7 @@ class GroundLinks:
         stations.hub.close(number, address)
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
-        """Send each datagram on its link; what cannot be sent is lost, as on any network."""
+        """Send each datagram on its link; failures are lost datagrams, as on any network."""
         self._allowance.begin()
         for number, address, datagram in outbox:
             try:
@@ -143,7 +141,7 @@ class GroundLinks:
         self._allowance.end()
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
-        """Return, for each link, who sends on it and how many messages a second come and go."""
+        """Return senders and message rates for each link."""
         facts = []
         for number, link in enumerate(self._links):
             channels = [channel for channel in stations.hub.channels if channel.link == number]
@@ -164,7 +162,7 @@ class GroundLinks:
         return facts
 
     def _there(self, channel: Channel) -> Iterator[Source]:
-        """Yield the sources of a channel that have sent something lately."""
+        """Yield the recent sources of a channel."""
         now_s = self._clock()
         for source, received_us in channel.sources_us.items():
             before_us, since_s = self._last.get((channel.number, source), (-1, now_s))
@@ -175,11 +173,10 @@ class GroundLinks:
                 yield source
 
     def take_notes(self) -> list[str]:
-        """Return what a user must know of the links since last asked."""
+        """Return new notes on the links for the user."""
         return [note for link in self._links for note in link.take_notes()]
 
     def close(self) -> None:
-        """Close every link."""
         for link in self._links:
             link.close()
 

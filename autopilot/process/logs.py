@@ -1,4 +1,4 @@
-"""What the autopilot records of a flight: how it began, what it received, decided and estimated."""
+"""The autopilot's records of a flight: setup, inputs, decisions, estimates."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import nan
@@ -44,14 +44,12 @@ _NO_REFERENCES = (nan,) * 11
 
 
 class AutopilotLog:
-    """Records control samples, what was received, and PX4's topics: of a track from its steps, else from snapshots.
+    """Records control samples, inputs, and PX4's topics: from the steps of a track, or from snapshots.
 
-    Attributes:
-        topics: Where it is recorded.
+    A method raises LogError if it cannot write.
     """
 
     def __init__(self, topics: TopicLog, setup: Setup) -> None:
-        """Record a flight that begins with `setup`."""
         self.topics, self._setup = topics, setup
         self._begins = True
         self._time_us = 0
@@ -65,14 +63,9 @@ class AutopilotLog:
         self._fallback: Fallback | None = None
 
     def write(self, step: Step, datagram: bytes | None = None) -> None:
-        """Append a control sample; of a frame between two of them, the command, and the check of the filter.
+        """Append a control sample; for a frame between samples, only the command and the filter check.
 
-        Args:
-            step: Of the autopilot.
-            datagram: The frame as it was received; None where a replay cannot have it.
-
-        Raises:
-            LogError: It cannot be written.
+        `datagram` is the frame as received, which a replay lacks.
         """
         time_us = step.command.time_us
         if time_us < self._time_us:
@@ -104,7 +97,7 @@ class AutopilotLog:
         self._recorder = Recorder(self.topics, name, self._setup.system_id, parameters, with_battery=False)
 
     def beginning(self) -> bytes:
-        """Return the beginning of a file, with the parameters as they are now."""
+        """Return the start of a file, with the current parameters."""
         if self._recorder is not None:
             return self._recorder.begin()
         profile, vehicle = self._setup.profile_tables, self._setup.vehicle_tables
@@ -113,33 +106,19 @@ class AutopilotLog:
         return beginning(vehicle.name, Parameters(definitions(profile, vehicle, self._setup.system_id)).values)
 
     def write_snapshot(self, snapshot: Snapshot) -> None:
-        """Append what ground stations are told.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         if self._recorder is not None:
             self._recorder.update(snapshot)
 
     def say(self, time_us: int, severity: int, text: str) -> None:
-        """Append a status text.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self.topics.append(messages.logged_string(time_us, severity, text))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
-        """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
+        """Record a new vehicle from the next frame on, with these parameters and this history."""
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
         self._begins = True
 
     def recorded(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
-        """Yield what ground stations sent, and record it.
-
-        Raises:
-            LogError: Once all is yielded, if something could not be recorded.
-        """
+        """Record and yield datagrams of ground stations; LogError is raised only after the last one."""
         failed: LogError | None = None
         for received in datagrams:
             datagram, link, address, loopback = received
@@ -153,26 +132,21 @@ class AutopilotLog:
             raise failed
 
     def flush(self) -> None:
-        """Write what waits.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self.topics.flush()
 
     def close(self) -> None:
-        """Write what waits, if that can be done, and close the log."""
+        """Write waiting data if possible, and close the log."""
         self.topics.close()
 
     def _begin_anew(self) -> None:
-        """Begin anew, as time begins again: another plant flies another flight."""
+        """Start a new flight, because the plant's time has restarted."""
         self.topics.close()
         self._status_us, self._thinning = -1, Thinning()
         self._fallback = None
         self._begins = True
 
     def _write_input(self, step: Step, datagram: bytes | None) -> None:
-        """Write what a replay needs; a datagram with nothing but the state follows from the truth."""
+        """Write the inputs of a replay; a datagram with only the state is reconstructed from the truth."""
         time_us, controls, armed = step.command
         if self._begins:
             self._begins = False
@@ -186,7 +160,6 @@ class AutopilotLog:
         self.topics.add(COMMAND, (time_us / 1e6, *controls, armed))
 
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
-        """Write status and texts that are due."""
         setup = self._setup
         if self._status_us < 0:
             self.say(time_us, INFO, f"{setup.track or 'no track'}, profile {setup.profile}, {setup.controller}")
@@ -213,14 +186,14 @@ class AutopilotLog:
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
 
     def _check_row(self, check: Check) -> tuple[float, ...]:
-        """Return the row of `FILTER`; kinds of measurements that the vehicle lacks are not a number."""
+        """Return the row of `FILTER`, with nan for absent measurements."""
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
         return (check.time_us / 1e6, *check.state, *check.covariance, *counts)
 
 
 def log_in(folder: Path, setup: Setup) -> AutopilotLog:
-    """Return what records into `flight.ulg` in the folder of a flight; the file begins with the first frame."""
+    """Return the log of `flight.ulg` in a folder; the file is created with the first frame."""
     log = AutopilotLog(FileLog(lambda: SharedLog(folder / FILE, log.beginning())), setup)
     return log
 
@@ -235,7 +208,7 @@ def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
 
 
 def _first(references: Horizon) -> tuple[float, ...]:
-    """Return position, velocity, acceleration, yaw and its rate of the first reference."""
+    """Return position, velocity, acceleration, yaw and yaw rate of the first reference."""
     position, velocity, acceleration, _, _, yaw, yaw_rate, _ = references
     p, v, a = position.item, velocity.item, acceleration.item
     return (p(0), p(1), p(2), v(0), v(1), v(2), a(0), a(1), a(2), yaw.item(0), yaw_rate.item(0))

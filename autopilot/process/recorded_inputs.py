@@ -1,4 +1,4 @@
-"""What an autopilot was started with and received: enough to replay a recorded flight."""
+"""Setup and inputs of an autopilot, for the replay of a flight."""
 
 from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
@@ -16,32 +16,27 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class InputsError(AutopilotError):
-    """A log has no such inputs; the message is the one line that a user needs."""
+    """A log without such inputs; the message is for the user."""
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="began", tag_field="what"):
-    """How an autopilot began.
+    """Setup of an autopilot.
 
     Attributes:
         profile: Name or file.
-        controller: Of the profile's control laws.
-        solver: QP solver chosen; None for the profile's.
-        delay_s: Delay chosen; None for the profile's.
-        vehicle: That it controls, name or file.
-        feedback: Kind of the frames, states or sensors.
-        track: What it flew from the start; None where ground stations say what to fly.
-        floor_m: Below which no track might lead; None for the ground of the vehicle.
-        origin: Of the ENU frame.
-        boot_unix_us: Unix time at simulated time 0, which dates the telemetry log; 0 where it has simulated time.
-        system_id: MAVLink system.
-        identity: Towards ground stations.
+        solver: Chosen QP solver; None for the profile's.
+        delay_s: Chosen delay; None for the profile's.
+        vehicle: Assumed vehicle, name or file.
+        track: Track flown from the start; None with ground stations.
+        floor_m: Lowest height of the track; None for the vehicle's ground.
+        origin: Origin of the ENU frame.
+        boot_unix_us: Unix time at simulated time 0; 0 for simulated time.
         ground: Whether it served ground stations.
-        values: Of parameters that were changed before.
-        history: What had been kept of the same flight, where it was killed in it; else empty.
-        first_us: The first frame that it answered.
-        profile_tables: What was in the profile; None in logs of before it was kept.
-        vehicle_tables: What was in the vehicle's file; None as well.
-        track_file: What was in the file that the track names, if it names one.
+        values: Changed parameters.
+        history: Saved state of the same flight, after a kill.
+        first_us: First answered frame.
+        profile_tables, vehicle_tables: Contents of the files; None in old logs.
+        track_file: Content of the track's file.
     """
 
     profile: str
@@ -66,7 +61,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file: str | None) -> Setup:
-    """Return the record of how an autopilot begins; `track_file` is the text of its track's file."""
+    """Return the setup; `track_file` is the content of the track's file."""
     return Setup(
         profile=name_of(spec.profile),
         controller=profile.controller,
@@ -90,14 +85,7 @@ def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file
 class ReceivedDatagram(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="heard", tag_field="what"
 ):
-    """A datagram of a ground station.
-
-    Attributes:
-        link: Number of the link.
-        address: Where from.
-        loopback: Whether from this computer.
-        datagram: The bytes; in base 64 in the log.
-    """
+    """A datagram of a ground station; base 64 in the log."""
 
     link: int
     address: tuple[str, int] | None
@@ -110,17 +98,16 @@ _DECODER = msgspec.json.Decoder(Input)
 
 
 def encoded(what: Input) -> bytes:
-    """Return an input as JSON."""
     return msgspec.json.encode(what)
 
 
 class Inputs(NamedTuple):
-    """What an autopilot received in a flight.
+    """Inputs of an autopilot in a flight, by the time of a frame.
 
     Attributes:
-        setups: How it began, by the first frame that it answered; a restart in flight is another beginning.
-        datagrams: What ground stations sent, by the frame after which it was served.
-        frames: Datagrams of the plant, by their frames.
+        setups: By the first answered frame; a restart in flight is another setup.
+        datagrams: From ground stations, by the preceding frame.
+        frames: Datagrams of the plant.
     """
 
     setups: dict[int, Setup]
@@ -132,7 +119,7 @@ def read_inputs(records: Iterable[InputRecord]) -> Inputs:
     """Return the inputs of a log.
 
     Raises:
-        InputsError: A record is none of these, or the autopilot never began.
+        InputsError: A record is malformed, or the setup is missing.
     """
     inputs = Inputs({}, {}, {})
     for time_us, kind, content in records:

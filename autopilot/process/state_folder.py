@@ -1,4 +1,4 @@
-"""What outlives the autopilot's process, in the folder of --state: parameters, key, files, logs, plans, the flight."""
+"""Persistent state in the folder of --state: parameters, key, files, logs, plans, flight."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,16 +29,15 @@ LOG_QUOTA = Quota(512 << 20, 200)
 
 
 class GroundError(AutopilotError):
-    """Ground stations cannot be served as the command line has it; the message is the one line that a user needs."""
+    """Ground stations cannot be served; the message is for the user."""
 
 
 class StateFolder:
-    """The folder of --state; without one nothing is kept.
+    """The folder of --state; without one, state is not kept.
 
     Attributes:
-        signing: The key and the last timestamp, at least `tick` at first.
-        files: What ground stations may read and write.
-        logs: What they may download.
+        signing: Key and last timestamp, initially at least `tick`.
+        files, logs: For file transfer and download.
     """
 
     def __init__(
@@ -52,13 +51,11 @@ class StateFolder:
         tick: int,
         params: Mapping[str, float] = {},
     ) -> None:
-        """Read the key, of the file `signing_key` if there is one, and open what is kept.
-
-        `params` are initial values of parameters, until others are saved.
+        """Read the signing key and open the folder; `params` are initial parameters until others are saved.
 
         Raises:
-            FolderInUseError: Another vehicle keeps its state there.
-            GroundError: Something of it cannot be used.
+            FolderInUseError: Another vehicle uses the folder.
+            GroundError: A file cannot be used.
         """
         self._path = path
         self._profile = profile
@@ -76,34 +73,33 @@ class StateFolder:
 
     @property
     def keeps_flights(self) -> bool:
-        """Whether a flight is kept, to go on after a restart."""
+        """Whether flights are saved, to continue after a restart."""
         return self._flight is not None
 
     def history(self) -> History | None:
-        """Return what was kept of the last flight: it goes on if this is the same one."""
+        """Return the saved state of the last flight."""
         content = self._flight.newest() if self._flight else None
         kept = of_bytes(Checkpoint, content) if content else None
         return None if kept is None else History(kept, self._read_plans())
 
     def keep(self, record: Checkpoint) -> bool:
-        """Keep what the flight needs to go on; return whether there was room."""
+        """Save the state of the flight; return whether it fitted."""
         return self._flight is None or self._flight.write(to_bytes(record))
 
     def save_plans(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
-        """Keep the items of mission, geofence and rally points."""
         if self._path is not None:
             _replace(self._path / PLANS, to_bytes(dict(plans)))
 
     def parameter_path(self) -> Path:
-        """Return the file of parameters: each control law and vehicle has its own."""
+        """Return the parameter file, one for each control law and vehicle."""
         assert self._path is not None, "called only where something is kept"
         return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
 
     def parameters(self) -> dict[str, Value]:
-        """Return the parameters that were saved.
+        """Return the saved parameters.
 
         Raises:
-            GroundError: Their file cannot be read, or an initial value is impossible.
+            GroundError: The file cannot be read, or an initial value is impossible.
         """
         if self._path is None:
             return self._initial()
@@ -120,11 +116,7 @@ class StateFolder:
             raise GroundError(f"{path}: {error}; correct or remove it") from error
 
     def _initial(self) -> dict[str, Value]:
-        """Return the initial values, as a file would keep them.
-
-        Raises:
-            GroundError: A parameter is unknown, or cannot have its value.
-        """
+        """Return the initial values, rounded as in a file."""
         parameters = Parameters(definitions(self._profile, self._vehicle, self._system_id))
         for name, value in self._params.items():
             if name not in parameters:
@@ -135,12 +127,11 @@ class StateFolder:
         return {each.name: parameters[each.name] for each in parameters if parameters[each.name] != each.default}
 
     def save_parameters(self, parameters: Parameters) -> None:
-        """Save them."""
         if self._path is not None:
             _replace(self.parameter_path(), write(parameters, self._system_id).encode())
 
     def save_signing(self) -> None:
-        """Save the timestamp of the last signature, and the key if a ground station has changed it."""
+        """Save the last timestamp, and the key if a ground station changed it."""
         if self._path is None or not (self.signing.active or self.signing.key_changed):
             return
         _replace(self._path / TIMESTAMP, str(self.signing.timestamp).encode())
@@ -154,7 +145,6 @@ class StateFolder:
                 (self._path / KEY).chmod(0o600)
 
     def close(self) -> None:
-        """Let go of everything."""
         for kept in (self.files, self.logs, self._flight, self._lock):
             if kept:
                 kept.close()
@@ -178,7 +168,7 @@ class StateFolder:
             raise GroundError(f"signing key {path}: {error}") from error
 
     def _read_timestamp(self) -> int:
-        """Return the last timestamp of the run before: none of it may be signed with again."""
+        """Return the last timestamp of the previous run, because signatures must not repeat one."""
         if self._path is None:
             return 0
         path = self._path / TIMESTAMP
@@ -193,7 +183,7 @@ class StateFolder:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; what cannot be written is not worth a crash."""
+    """Replace a file atomically; errors are ignored."""
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

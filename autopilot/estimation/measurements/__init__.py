@@ -1,1 +1,1 @@
-"""Each sensor that the filter fuses as it comes, a file: what it measures, its Jacobian, variance, gate and health."""
+"""Sensors that the filter fuses without delay, one file each."""

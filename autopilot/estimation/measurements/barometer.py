@@ -1,4 +1,4 @@
-"""The barometer: height, up to an offset that drifts."""
+"""The barometer: height with a drifting offset."""
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
@@ -22,11 +22,7 @@ _TYPICAL_PA = 95e3
 
 
 class Barometer(Instrument):
-    """The barometer of one flight.
-
-    Attributes:
-        height_m: Of the last pressure.
-    """
+    """The barometer of one flight; `height_m` is of the last pressure."""
 
     part, name, numbers = "barometer", "pressure", 1
     source, bit, ratio = Source.BAROMETER, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Ratio.HEIGHT
@@ -40,18 +36,17 @@ class Barometer(Instrument):
 
     @property
     def variance(self) -> float:
-        """Of a height near the sea, m²."""
+        """Height variance near sea level, m²."""
         return square(max(self._noise_pa * METRES_PER_PASCAL, _MIN_NOISE_M))
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
-        """Return a pressure, Pa."""
+        """Return the pressure, Pa."""
         if frame.updated & self.group != self.group:
             return None
         value = (frame.pressure_pa,)
         return value if self._watch.accepts(value, frame.time_us, rejected) and self._watch.is_new else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a pressure, Pa."""
         (pressure_pa,) = value
         height = self.height_m = altitude_m(pressure_pa)
         variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _MIN_NOISE_M))
@@ -59,5 +54,4 @@ class Barometer(Instrument):
         return None if accepted else Reason.INNOVATION
 
     def typical(self) -> Value:
-        """Return the pressure of a place that is not high."""
         return (_TYPICAL_PA,)

@@ -1,4 +1,4 @@
-"""The interface of a sensor to the estimator: a value read from each frame, and that value fused."""
+"""The interface of a sensor to the estimator."""
 
 from enum import IntEnum
 from typing import ClassVar, Protocol, TypeAlias
@@ -10,11 +10,11 @@ from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.vehicle.sensors import Sensors
 
 Value: TypeAlias = tuple[float, ...]
-"""What a sensor measured at one instant, in SI."""
+"""Measurement at one instant, in SI."""
 
 
 class Ratio(IntEnum):
-    """A ratio of ESTIMATOR_STATUS, in the order of its fields; the largest of its kinds is reported."""
+    """A ratio of ESTIMATOR_STATUS, in field order; the largest of its measurements is reported."""
 
     VELOCITY = 0
     POSITION = 1
@@ -25,17 +25,16 @@ class Ratio(IntEnum):
 
 
 class Instrument(Protocol):
-    """A sensor as the filter fuses it: a class for each that may be fitted, an instance for each flight.
+    """A sensor fused without delay: one class for each sensor, one instance for each flight.
 
     Attributes:
-        part: Table of the vehicle file's sensors; a vehicle without it has no such instrument.
-        name: Of its measurement in tests and logs.
-        numbers: How many it measures at once.
-        source: Whose rejections are counted.
+        part: Table in the vehicle file; without it the sensor is not fitted.
+        name: Name of the measurement in tests and logs.
+        numbers: Values in a measurement.
+        source: Sensor name in rejections.
         bit: MAV_SYS_STATUS_SENSOR.
-        ratio: By which ESTIMATOR_STATUS reports its tests.
-        group: Of `Updated`; 0 where it is measured in a message of its own.
-        smoothed: Whether its corrections are given in with time, as those of GPS are.
+        group: Flag of `Updated`; 0 for a sensor with its own message.
+        smoothed: Whether its corrections pass the output smoothing, like those of GPS.
     """
 
     part: ClassVar[str]
@@ -48,14 +47,13 @@ class Instrument(Protocol):
     smoothed: ClassVar[bool] = False
     kind: Kind
 
-    def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
-        """Begin a flight with `sensors` where the earth's magnetic field is `field_enu_gauss`."""
+    def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None: ...
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
-        """Return what it measured at a frame; None where there is nothing new, or nothing that can be."""
+        """Return a new and plausible measurement."""
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse what it measured at the filter's time; return why it was rejected, if it was."""
+        """Fuse a measurement at the filter's time; return the reason of a rejection."""
 
     def typical(self) -> Value:
-        """Return a value of a vehicle that rests at the origin, by which what is compiled is loaded."""
+        """Return a value at rest at the origin, to load compiled code."""

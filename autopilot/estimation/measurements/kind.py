@@ -1,4 +1,4 @@
-"""One kind of measurement: its gate and its last test, and when what is rejected for long is accepted again."""
+"""One kind of measurement: gate, last test, and forced acceptance after a long rejection."""
 
 from collections.abc import Callable
 from math import inf
@@ -11,11 +11,11 @@ from colibri.autopilot.estimation.estimate import Test
 from colibri.common.types import Array
 
 FIVE_SIGMA = (25.0, 28.74, 31.81)
-"""χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
+"""χ² of one, two and three degrees of freedom, as improbable as five standard deviations."""
 
 
 class KindRecord(NamedTuple):
-    """When a kind of measurement was last accepted, since when it is rejected, and how often it was forced."""
+    """State of a measurement for a restart."""
 
     accepted_us: int
     rejected_us: int | None
@@ -23,19 +23,17 @@ class KindRecord(NamedTuple):
 
 
 class Kind:
-    """One kind of measurement: its last test, and for how long it has been rejected.
+    """One kind of measurement.
 
     Attributes:
-        test: The last.
-        accepted_us: When it was last accepted.
-        rejected_us: Since when it is not; None while it is.
-        resets: How often it was accepted by force.
-        nis: Sum of the normalised innovations squared that were accepted at once.
-        accepted: How many they are.
+        accepted_us: Time of the last acceptance.
+        rejected_us: Start of the current rejection.
+        resets: Number of forced acceptances.
+        nis, accepted: Sum and number of the normalised innovations squared that passed the test.
     """
 
     def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:
-        """After `patience_us` of rejections, inflate (first state, count, σ) and accept."""
+        """After `patience_us` of rejection, inflate (first state, count, σ) and accept."""
         self.name = name
         self.gate = FIVE_SIGMA[numbers - 1]
         self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
@@ -49,14 +47,14 @@ class Kind:
         self.accepted = 0
 
     def fuse(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Fuse a measurement into state and covariance; return whether it was accepted."""
+        """Fuse a measurement; return whether it was accepted."""
         nis = kernel(x, P, *arguments, self.gate, self._y)
         if self.note(time_us, tuple(self._y.tolist()), nis):
             return True
         return self.force_accept(x, P, time_us, kernel, *arguments)
 
     def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
-        """Note a test; return whether the measurement was accepted."""
+        """Record a test; return whether it passed."""
         self.test = Test(time_us, innovation, nis, self.gate)
         if nis <= self.gate:
             self.accepted_us, self.rejected_us = time_us, None
@@ -66,7 +64,7 @@ class Kind:
         return False
 
     def force_accept(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Reject a measurement, but accept it by force if this has lasted too long; return whether that was so."""
+        """Reject a measurement, but accept it by force after a long rejection; return whether it was."""
         if not self.reject(time_us):
             return False
         first, count, sigma = self._inflated
@@ -76,25 +74,22 @@ class Kind:
         return True
 
     def reset(self, time_us: int) -> None:
-        """Note that what it measures was reset to it."""
+        """Record a reset to the measured value."""
         self.resets += 1
         self.accept(time_us)
 
     def accept(self, time_us: int) -> None:
-        """Note that a measurement was accepted."""
         self.accepted_us = time_us
         self.rejected_us = None
 
     def reject(self, time_us: int) -> bool:
-        """Note that a measurement was rejected; return whether this has lasted too long."""
+        """Record a rejection; return whether it has lasted too long."""
         if self.rejected_us is None:
             self.rejected_us = time_us
         return time_us - self.rejected_us >= self._patience_us
 
     def record(self) -> KindRecord:
-        """Return when it was accepted, and what else a restart needs."""
         return KindRecord(self.accepted_us, self.rejected_us, self.resets)
 
     def resume(self, record: KindRecord) -> None:
-        """Go on from a record."""
         self.accepted_us, self.rejected_us, self.resets = record

@@ -1,4 +1,4 @@
-"""The magnetometer: the earth's field, and the vehicle's own."""
+"""The magnetometer: the earth's field plus the vehicle's own."""
 
 from math import radians
 
@@ -20,17 +20,13 @@ _MAX_GAUSS = 4.0
 _FROZEN_US = 500_000
 _MIN_NOISE_GAUSS = 1e-6
 _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
-"""By how much the field may differ from the earth's in strength and inclination."""
+"""Allowed deviations from the earth's field in strength and inclination."""
 _PATIENCE_US = 10_000_000
 _INFLATED_GAUSS = 0.3
 
 
 class Magnetometer(Instrument):
-    """The magnetometer of one flight.
-
-    Attributes:
-        variance: Of a value, gauss².
-    """
+    """The magnetometer of one flight; `variance` in gauss²."""
 
     part, name, numbers = "magnetometer", "field", 3
     source, bit, ratio = Source.MAGNETOMETER, mav.MAV_SYS_STATUS_SENSOR_3D_MAG, Ratio.FIELD
@@ -43,14 +39,13 @@ class Magnetometer(Instrument):
         self._watch = Watch(self.source, -_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
-        """Return a field, gauss FLU."""
+        """Return the field, gauss FLU."""
         if frame.updated & self.group != self.group:
             return None
         value = frame.magnetic_field_flu_gauss
         return value if self._watch.accepts(value, frame.time_us, rejected) and self._watch.is_new else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a field, gauss FLU."""
         measured = np.array(value)
         is_of_earth = update.is_of_earth(x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
         if not is_of_earth and not self.kind.reject(time_us):
@@ -59,5 +54,5 @@ class Magnetometer(Instrument):
         return None if accepted else Reason.INNOVATION
 
     def typical(self) -> Value:
-        """Return the earth's field of a level vehicle that looks east."""
+        """Return the field of a level vehicle heading east."""
         return tuple(self._field.tolist())

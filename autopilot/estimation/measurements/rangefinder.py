@@ -1,8 +1,8 @@
-"""The rangefinder: height above the ground, which is flat, seen down the vehicle's own axis.
+"""The rangefinder: distance along the body axis to flat ground.
 
-Near the ground, and upright, its distance is that height over the cosine of the tilt, less half of the beam. The ground
-is where the vehicle stands at the start, height 0, until the distance contradicts that for long: it is then reset,
-and height stays.
+Near the ground and upright, the distance is the height over the cosine of the tilt, less half of the beam. The ground
+is at the start position, height 0, until the distance contradicts that for long; then the ground is reset, not the
+height.
 """
 
 from math import inf, sqrt
@@ -24,9 +24,9 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.sensors import Sensors
 
 _USED_BELOW_M = 5.0
-"""Of height above the ground, as PX4's EKF2_RNG_A_HMAX: farther below, the ground need not be that of the start."""
+"""Height limit, as PX4's EKF2_RNG_A_HMAX: higher up, the ground may differ from that at the start."""
 _MIN_COSINE = 0.7
-"""Of the tilt: beyond 45° the beam meets the ground somewhere else."""
+"""Of the tilt: beyond 45° the beam meets the ground elsewhere."""
 _ROUGHNESS_M = 0.01
 _WIRE_STEP_M = 0.01
 _FROZEN_US = 500_000
@@ -34,10 +34,10 @@ _PATIENCE_US = 7_000_000
 
 
 class RangefinderBelow(Instrument):
-    """The rangefinder of one flight; smoothed, as one that comes near the ground again may be off by decimetres.
+    """The rangefinder of one flight; smoothed, because its first corrections near the ground may be decimetres.
 
     Attributes:
-        ground_m: Where the ground is, z of ENU, less what the vehicle stands on.
+        ground_m: Ground height, z of ENU.
     """
 
     part, name, numbers = "rangefinder", "distance", 1
@@ -55,14 +55,14 @@ class RangefinderBelow(Instrument):
         self.ground_m = 0.0
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
-        """Return a distance, m; infinity where it sees nothing."""
+        """Return the distance, m; infinity out of range."""
         if frame.distance is None:
             return None
         value = (frame.distance.distance_m,)
         return value if value == (inf,) or self._watch.accepts(value, frame.time_us, rejected) else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a distance, m, where it is that of the ground below."""
+        """Fuse a distance to the ground, m."""
         (distance_m,) = value
         height_m = float(x[2]) + self._part.height_m - self.ground_m
         if distance_m == inf or distance_m > _USED_BELOW_M or height_m > _USED_BELOW_M or not is_upright(x):
@@ -79,12 +79,10 @@ class RangefinderBelow(Instrument):
         return Reason.INNOVATION
 
     def typical(self) -> Value:
-        """Return the distance of a vehicle that stands."""
         return (self._part.height_m,)
 
 
 def is_upright(x: Array) -> bool:
-    """Whether the beam points near enough to straight down."""
     return bool(1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) >= _MIN_COSINE)
 
 
@@ -92,10 +90,10 @@ def is_upright(x: Array) -> bool:
 def fuse_distance(
     x: Array, P: Array, measured: float, height: float, beam: Array, variance: float, gate: float, y: Array
 ) -> float:
-    """Correct by the distance to flat ground along -z of the body, m; return NIS.
+    """Fuse the distance to flat ground along -z of the body, m; return NIS.
 
-    d = h / cos(ϑ - β), with the tilt ϑ and half the beam β, whose cosine and sine are `beam`; of a tilt within the
-    beam, d = h. `height` is that of the sensor above the ground by the state, m.
+    d = h / cos(ϑ - β) with tilt ϑ and half beam β, whose cosine and sine are `beam`; within the beam d = h. `height` is
+    h by the state, m.
     """
     w, a, b, c = x[6:10]
     up_x, up_y, up_z = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)

@@ -1,4 +1,4 @@
-"""The table of what the filter fuses: a sensor that is added is a row here and a file beside."""
+"""The table of fused sensors: a new sensor is a row here and a file beside."""
 
 from colibri.autopilot.estimation.measurements.barometer import Barometer
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio
@@ -8,16 +8,16 @@ from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
 ROWS: tuple[type[Instrument], ...] = (Magnetometer, Barometer, RangefinderBelow)
-"""In the order in which what was measured at one instant is fused. Every vehicle has the first two."""
+"""In the order of fusion within an instant; every vehicle has the first two."""
 
 GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}
-"""A fix is three measurements."""
+"""The three measurements of a fix."""
 KINDS: dict[str, int] = {
     **GPS_KINDS,
     Barometer.name: Barometer.numbers,
     **{row.name: row.numbers for row in ROWS},
 }
-"""Every kind of measurement and how many numbers it has, in the order of logs and tables."""
+"""Values in each kind of measurement, in the order of logs and tables."""
 RATIOS: dict[str, Ratio] = {
     "velocity": Ratio.VELOCITY,
     "position": Ratio.POSITION,
@@ -27,13 +27,13 @@ RATIOS: dict[str, Ratio] = {
 
 
 def kinds_of(sensors: Sensors) -> list[str]:
-    """Return what a vehicle measures, in the order of `KINDS`."""
+    """Return a vehicle's kinds of measurement, in the order of `KINDS`."""
     missing = {row.name for row in ROWS if getattr(sensors, row.part) is None}
     return [kind for kind in KINDS if kind not in missing]
 
 
 def instruments_of(sensors: Sensors, field_enu_gauss: Vector) -> tuple[Magnetometer, Barometer, tuple[Instrument, ...]]:
-    """Return the instruments of one flight: the two that every vehicle has, and all of them."""
+    """Return the two instruments of every vehicle, and all of this vehicle's."""
     field, pressure = Magnetometer(sensors, field_enu_gauss), Barometer(sensors, field_enu_gauss)
     others = [row(sensors, field_enu_gauss) for row in ROWS[2:] if getattr(sensors, row.part) is not None]
     return field, pressure, (field, pressure, *others)

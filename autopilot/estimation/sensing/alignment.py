@@ -1,4 +1,4 @@
-"""How the estimator begins: means over a second in which the vehicle rests, and the attitude that they show."""
+"""Start of the estimator at rest: means over a second, and the attitude from them."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -17,24 +17,22 @@ WINDOW_S = 1.0
 _FEWEST_SAMPLES = 20
 _FEWEST_FIELDS = 5
 _UNREST = 3.0
-"""A vehicle that rests shows no more than this many times the noise of its sensors, and these beside:"""
+"""Allowed spread at rest: this multiple of the sensor noise, plus the next two."""
 _UNREST_M_S2, _UNREST_RAD_S = 0.1, 0.01
 _BIASES = 5.0
-"""Standard deviations of the turn-on bias that a mean may differ by from what rest would show, and these beside:"""
+"""Allowed deviation of a mean at rest: this multiple of the turn-on bias, plus the next two."""
 _TILT_M_S2, _TURN_RAD_S = 0.3, 0.04
 _FIELD_PART = 0.25
-"""By how much the strength of the field may differ from the earth's."""
+"""Allowed deviation of the field strength from the earth's."""
 
 
 class Aligned(NamedTuple):
     """Means of a vehicle at rest.
 
     Attributes:
-        duration_s: Over how long.
-        force, rate: Specific force, m/s² FLU, and rad/s FLU.
-        field, fields: Magnetic field, gauss FLU; of how many.
-        pressure_height_m, heights: Of the barometer; None without one; of how many.
-        attitude: That the force and the field show.
+        force, rate: m/s² and rad/s, FLU.
+        field: gauss FLU.
+        fields, heights: Number of samples in a mean.
     """
 
     duration_s: float
@@ -72,7 +70,7 @@ class Alignment:
     def feed(
         self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Aligned | None:
-        """Take what was measured at one frame; return the means when the vehicle has rested and has a fix."""
+        """Process a frame; return the means after a second of rest with a fix."""
         if not (reading.force_good and reading.rate_good):
             self._begin()
             return None
@@ -120,7 +118,7 @@ class Alignment:
 
 
 def attitude_of(force: NDArray[np.float64], field: NDArray[np.float64], earth_field: NDArray[np.float64]) -> Quaternion:
-    """Return the attitude in which specific force shows up and the field's level part is the earth's (TRIAD)."""
+    """Return the attitude from specific force (up) and horizontal magnetic field (TRIAD)."""
     body = _triad(force, field)
     earth = _triad(np.array([0.0, 0.0, 1.0]), earth_field)
     return _quaternion(matmul(earth, body.T))
@@ -135,7 +133,7 @@ def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _quaternion(R: NDArray[np.float64]) -> Quaternion:
-    """Return the quaternion of a rotation matrix, by its largest component (Shepperd)."""
+    """Convert a rotation matrix by its largest component (Shepperd)."""
     trace = float(np.trace(R))
     squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
     largest = int(np.argmax(squares))

@@ -1,9 +1,8 @@
-"""How the estimator begins in the air: a vehicle whose rotors were stopped only now falls, and none that stands does.
+"""Start of the estimator in the air, in free fall with the rotors stopped.
 
-Who was restarted in flight and has nothing to go on with cannot rest for a second. But until there is an estimate the
-rotors stand, so a vehicle in the air falls at once; accelerometer and GPS both show it. In a fall nothing shows where
-up is: the vehicle is taken to have been level, its heading is the magnetic field's, and the covariance holds how little
-that is worth. The first corrections by GPS find the tilt.
+After a restart in flight without a record, the vehicle cannot rest for a second. Rotors stand until the first estimate,
+so it falls, as accelerometer and GPS both show. Attitude is unobservable in a fall: assumed level, heading by the
+magnetic field, with a large covariance. The first GPS corrections find the tilt.
 """
 
 from math import hypot
@@ -17,23 +16,20 @@ from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix
 
 _FALLS_PART = 0.35
-"""Of gravity: more is felt by nothing that falls with rotors at rest, but in a wind that has long been noticed."""
+"""Of gravity: largest specific force in a fall with stopped rotors, apart from storms."""
 _FALLS_FOR_US = 40_000
 _SINKS_M_S = 0.5
 _SURELY_US = 400_000
-"""GPS sees a fall late; after so long it is assumed without, so that one that was rising is caught, too."""
+"""GPS shows a fall late; after this time it is not required, so that a rising vehicle is caught too."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 class Caught(NamedTuple):
-    """A vehicle that falls.
+    """A falling vehicle.
 
     Attributes:
-        velocity_enu_m_s: Now.
-        moved_m: From the place of the fix to where it is now, ENU.
-        attitude: As guessed.
-        fix: The last.
-        pressure_height_m: Of the barometer; None without one.
+        moved_m: Displacement since the fix, ENU.
+        attitude: Guess.
     """
 
     velocity_enu_m_s: Vector
@@ -44,10 +40,10 @@ class Caught(NamedTuple):
 
 
 class Falling:
-    """Waits for a fall, from a frame on that is not a flight's first."""
+    """Waits for a fall, unless the first frame is at time 0."""
 
     def __init__(self, gravity_m_s2: float, field_enu_gauss: Vector, delay_s: float) -> None:
-        """Fixes are received `delay_s` after they were measured."""
+        """Fixes are received `delay_s` after their measurement."""
         self._gravity = gravity_m_s2
         self._earth_field = np.array(field_enu_gauss)
         self._delay_us = round(delay_s * 1e6)
@@ -59,7 +55,7 @@ class Falling:
     def feed(
         self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Caught | None:
-        """Take what was measured at one frame; return the vehicle if it falls, there is a fix, and a field."""
+        """Process a frame; return the vehicle if it falls, with a fix and a field."""
         if self._begins_in_flight is None:
             self._begins_in_flight = time_us > 0
         self._field = field or self._field

@@ -1,4 +1,4 @@
-"""Accelerometer and gyroscope: frames in, samples for the filter out, whatever the sensors do."""
+"""Accelerometer and gyroscope: frames in, samples for the filter out."""
 
 from math import inf
 from typing import NamedTuple
@@ -10,17 +10,17 @@ from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
 
 Sample = tuple[float, ...]
-"""`eskf_predict.SAMPLE`: interval, mean specific force, mean rate, and whether either is unknown."""
+"""Columns of `eskf_predict.SAMPLE`."""
 
 _BEYOND_RANGE = 1.01
-"""The bits of the wire and of a converter may lie a little above the range."""
+"""Tolerance for resolution at the end of the range."""
 _PATIENCE_US = 100_000
 _BRIDGED_US = 20_000
-"""How long the last good value stands for those that are missing."""
+"""Validity of the last good value when values are missing."""
 
 
 class _Axes:
-    """One of the two, watched."""
+    """One of the two sensors."""
 
     def __init__(self, source: Source, group: int, maximum: float, noise: float) -> None:
         self._group = group
@@ -30,7 +30,7 @@ class _Axes:
         self.value: Vector = (0.0, 0.0, 0.0)
 
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
-        """Read a value; return whether the one that is held can be used at this frame."""
+        """Read a value; return whether the current one is usable."""
         if frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected):
             self.value, self._time_us = value, frame.time_us
             return True
@@ -38,7 +38,7 @@ class _Axes:
 
 
 class Reading(NamedTuple):
-    """What accelerometer and gyroscope measured at one frame: m/s² and rad/s, FLU, and whether either can be used."""
+    """Accelerometer and gyroscope at one frame: m/s² and rad/s, FLU, and whether each is usable."""
 
     force: Vector
     rate: Vector
@@ -47,7 +47,7 @@ class Reading(NamedTuple):
 
 
 class Inertial:
-    """Reads frames."""
+    """Reads both sensors."""
 
     def __init__(self, sensors: Sensors, rejected: Rejected) -> None:
         accel, gyro = sensors.accelerometer, sensors.gyroscope
@@ -58,14 +58,13 @@ class Inertial:
         self._rate = _Axes(Source.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz)
 
     def read(self, frame: SensorFrame) -> Reading:
-        """Read one frame."""
         force_good = self._force.read(frame, frame.specific_force_flu_m_s2, self._rejected)
         rate_good = self._rate.read(frame, frame.rate_flu_rad_s, self._rejected)
         return Reading(self._force.value, self._rate.value, force_good, rate_good)
 
 
 def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
-    """Return the sample from one frame to the next, by the trapezoidal rule."""
+    """Return the sample between two frames, by the trapezoidal rule."""
     (ax, ay, az), (bx, by, bz) = before.force, now.force
     (ap, aq, ar), (bp, bq, br) = before.rate, now.rate
     return (

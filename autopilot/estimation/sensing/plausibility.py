@@ -1,4 +1,4 @@
-"""Plausibility of what frames hold: values finite, in range and alive; fixes; time that follows."""
+"""Plausibility of frames: finite, in range, changing values; fixes; increasing time."""
 
 from math import inf, isfinite
 
@@ -11,28 +11,28 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -1000.0, 30e3
 _MIN_FIX, _BEST_FIX = 3, 6
 _GPS_PATIENCE_US = 2_000_000
 _NOWHERE = (0.0, 0.0)
-"""Latitude and longitude that receivers without a fix report, in the Gulf of Guinea."""
+"""Latitude and longitude of receivers without a fix."""
 MAX_GAP_US = 1_000_000
 _SETTLED = 25
-"""Stray frames after which the clock counts as reset."""
+"""Frames out of sequence after which the clock counts as reset."""
 
 
 class Watch:
-    """Watches one sensor.
+    """Checks one sensor.
 
     Attributes:
-        is_new: Whether the last value differs from the one before: what a simulator sends twice is measured once.
+        is_new: Whether the last value changed: simulators repeat values.
     """
 
     def __init__(self, source: str, minimum: float, maximum: float, patience_us: float) -> None:
-        """Accept values from `minimum` to `maximum`, unless they stay the same to the last bit for `patience_us`."""
+        """Accept values from `minimum` to `maximum`, unless identical for `patience_us`."""
         self._source, self._minimum, self._maximum, self._patience_us = source, minimum, maximum, patience_us
         self._last: tuple[float, ...] = ()
         self._changed_us = 0
         self.is_new = False
 
     def accepts(self, values: tuple[float, ...], time_us: int, rejected: Rejected) -> bool:
-        """Whether `values`, measured at `time_us`, can be; those that cannot are counted in `rejected`."""
+        """Check a value, and count a rejection in `rejected`."""
         for value in values:
             if not self._minimum <= value <= self._maximum:
                 rejected.add(self._source, _reason(values))
@@ -47,10 +47,10 @@ class Watch:
 
 
 class GpsWatch:
-    """Watches a GPS receiver.
+    """Checks a GPS receiver.
 
     Attributes:
-        time_us: Of the last fix that can be; None before the first.
+        time_us: Time of the last plausible fix.
     """
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class GpsWatch:
         self._alive = Watch(Source.GPS, -inf, inf, _GPS_PATIENCE_US)
 
     def accepts(self, fix: GpsFix, now_us: int, rejected: Rejected) -> bool:
-        """Whether a fix, received by `now_us`, can be; one that cannot is counted in `rejected`."""
+        """Check a fix received by `now_us`, and count a rejection in `rejected`."""
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
             rejected.add(Source.GPS, Reason.NO_FIX)
@@ -73,21 +73,21 @@ class GpsWatch:
 
 
 class ClockResets:
-    """Counts frames that follow one another and not the clock: a few are strays, many a clock that was reset."""
+    """Counts frames out of sequence: few are strays, many are a clock reset."""
 
     def __init__(self) -> None:
         self._time_us: int | None = None
         self._count = 0
 
     def settle(self, time_us: int) -> bool:
-        """Take the time of a stray frame; return whether enough of them agree on another clock."""
+        """Count a stray frame; return whether enough agree on another clock."""
         follows = self._time_us is not None and 0 < time_us - self._time_us <= MAX_GAP_US
         self._count = self._count + 1 if follows else 1
         self._time_us = time_us
         return self._count >= _SETTLED
 
     def clear(self) -> None:
-        """Reset: a frame has followed the clock."""
+        """Reset after a frame in sequence."""
         self._time_us = None
 
 

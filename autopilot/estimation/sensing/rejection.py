@@ -1,4 +1,4 @@
-"""Which measurement was rejected, and why."""
+"""Counts of rejected measurements by sensor and reason."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 
 class Source(StrEnum):
-    """Where a value came from that was rejected; a sensor that only some vehicles have is a word beside."""
+    """Source of a rejected value; optional sensors use their names."""
 
     CLOCK = "clock"
     ACCELEROMETER = "accelerometer"
@@ -32,19 +32,18 @@ Rejections = Mapping[tuple[str, Reason], int]
 
 
 class Rejected:
-    """Counts what was rejected."""
+    """Counts rejections."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, Reason], int] = {}
         self._published: Rejections = MappingProxyType({})
 
     def add(self, source: str, reason: Reason) -> None:
-        """Count one value."""
         key = (source, reason)
         self._counts[key] = self._counts.get(key, 0) + 1
         self._published = MappingProxyType(dict(self._counts))
 
     @property
     def counts(self) -> Rejections:
-        """How many values were rejected, by sensor and reason; what is given out does not change any more."""
+        """Rejections by sensor and reason, as an immutable copy."""
         return self._published
