@@ -1,1 +1,1 @@
-"""References shaped within limits: position chain, attitude slew, landing detection."""
+"""References within limits: position chain, attitude slew, landing detection, tracks, missions, tasks."""

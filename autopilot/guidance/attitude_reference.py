@@ -1,9 +1,8 @@
-"""From sticks, or a client's attitude or body rates, to a smooth attitude demand over the control law's preview.
+"""Attitude demands from sticks, or a client's attitude or body rates, over the control law's preview.
 
-Each angle is slewed like a critically damped second-order system, its rate and acceleration bounded, so that the
-vehicle can follow and the MPC previews it. The direction of thrust is reached first: roll and pitch are those about the
-yaw that has been reached. Body rates are integrated by THESIS [2.7], the tilt limited. The demanded yaw stays near the
-vehicle's.
+Each angle is slewed like a critically damped second-order system with bounded rate and acceleration, so that the
+vehicle can follow and the MPC can preview it. Roll and pitch refer to the reached yaw: the thrust direction is reached
+first. Body rates are integrated by THESIS [2.7], with the tilt limited.
 """
 
 from math import isnan, nan, radians
@@ -25,7 +24,7 @@ STICK_MIDDLE = 0.5
 
 
 class AttitudeLimits(NamedTuple):
-    """Limits of attitude commands: of full sticks, of the demanded yaw ahead of the vehicle's, and of the slew."""
+    """Limits of full sticks, of the demanded yaw ahead of the vehicle's, and of the slew."""
 
     stick_tilt_rad: float = radians(35.0)
     stick_yaw_rate_rad_s: float = radians(100.0)
@@ -46,7 +45,6 @@ DEFAULT_LIMITS = AttitudeLimits()
 
 
 def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
-    """Return the limits by the parameters."""
     yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
     slew = DEFAULT_LIMITS.slew
     return DEFAULT_LIMITS._replace(
@@ -57,13 +55,7 @@ def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
 
 
 class ReferenceMemory(NamedTuple):
-    """Memory of the generator from one control sample to the next.
-
-    Attributes:
-        angles: phi, theta, psi demanded now, rad, (3,).
-        rates: Their derivatives, rad/s, (3,).
-        thrust_n: Demanded now, N.
-    """
+    """State of the generator between control samples: phi, theta, psi, rad, (3,), their rates, and thrust."""
 
     angles: Array
     rates: Array
@@ -71,13 +63,7 @@ class ReferenceMemory(NamedTuple):
 
 
 class AttitudeReference:
-    """Generator of attitude demands for one vehicle and one control law's preview.
-
-    Attributes:
-        weight_n: Of the vehicle.
-        limits: Of the commands.
-        max_thrust_n: Of all rotors at their top speed.
-    """
+    """Generator of attitude demands for one vehicle and one preview."""
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
         self.adopt(vehicle)
@@ -87,16 +73,14 @@ class AttitudeReference:
         self.step(self.initial(AT_REST), AT_REST, tilt_command(0.0, 0.0, 0.0, self.weight_n))
 
     def obey(self, behaviour: Behaviour) -> None:
-        """Adopt other limits."""
         self.limits = attitude_limits(behaviour)
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Adopt other numbers of the vehicle."""
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self.max_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
-        """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""
+        """Start at the vehicle's attitude, with its weight as default thrust."""
         angles, rates = np.array(state.euler), np.zeros(3)
         limit_tilt(angles, rates, self.limits.slew.max_tilt_rad)
         return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
@@ -104,7 +88,7 @@ class AttitudeReference:
     def step(
         self, memory: ReferenceMemory, state: VehicleState, command: AttitudeCommand
     ) -> tuple[ReferenceMemory, AttitudeDemand]:
-        """Return the memory for the next control sample, and the demand from now on if `command` stays."""
+        """Return the next state, and the demand from now on under a constant `command`."""
         angles, rates = np.empty((self._samples + 1, 3)), np.empty((self._samples + 1, 3))
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
@@ -114,16 +98,15 @@ class AttitudeReference:
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
 
     def from_sticks(self, sticks: Sticks) -> AttitudeCommand:
-        """Return the command of sticks in stabilized flight."""
+        """Convert sticks in stabilized flight."""
         tilt = self.limits.stick_tilt_rad
         yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
         return tilt_command(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
     def from_setpoint(self, setpoint: AttitudeSetpoint) -> AttitudeCommand:
-        """Return the command of a client's setpoint, its thrust as a stick's: half of it hovers.
+        """Convert a client's setpoint, with thrust as for a stick.
 
-        An attitude goes before body rates, of which yaw's alone is then fed forward. A rate that is not given beside
-        others is zero.
+        An attitude takes precedence over body rates, of which only yaw's is then fed forward. Missing rates are zero.
         """
         thrust_n = nan if isnan(setpoint.thrust) else self.thrust_for_stick(setpoint.thrust)
         p, q, r = (0.0 if isnan(rate) else rate for rate in setpoint.rate_flu_rad_s)
@@ -132,9 +115,9 @@ class AttitudeReference:
         return attitude_command(setpoint.attitude, thrust_n, r)
 
     def thrust_for_stick(self, stick: float) -> float:
-        """Return the thrust, N, of a stick at 0..1: none at the bottom, hover in the middle, all there is at the top.
+        """Convert a stick at 0..1 to thrust, N: 0, hover in the middle, maximum.
 
-        With half for hover it is what ground stations for PX4 expect, whose normalised thrust hovers near 0.5.
+        Hover at half is expected by ground stations for PX4.
         """
         if stick <= STICK_MIDDLE:
             return self.weight_n * max(stick, 0.0) / STICK_MIDDLE
@@ -142,22 +125,21 @@ class AttitudeReference:
         return self.weight_n + (self.max_thrust_n - self.weight_n) * part
 
     def _near(self, psi: float, yaw_rad: float) -> float:
-        """Return the demanded yaw in the vehicle's own full turn, no further from its yaw than allowed."""
+        """Return the demanded yaw in the vehicle's full turn, limited to the allowed distance ahead."""
         max_ahead = self.limits.yaw_ahead_rad
         return min(max(nearest_turn(psi, yaw_rad), yaw_rad - max_ahead), yaw_rad + max_ahead)
 
 
 def tilt_command(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> AttitudeCommand:
-    """Roll and pitch, rad, about the heading that there is, turning at a rate counter-clockwise."""
+    """Roll and pitch, rad, at the present heading; yaw rate counter-clockwise."""
     return AttitudeCommand(TILT, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
 
 
 def attitude_command(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> AttitudeCommand:
-    """An attitude, FLU to ENU; its yaw is reached more slowly than its thrust's direction."""
+    """Attitude, FLU to ENU; yaw is reached more slowly than the thrust direction."""
     (_, _, x), (_, _, y), (_, _, z) = rotation_matrix(attitude)
     return AttitudeCommand(ATTITUDE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
 
 
 def rate_command(rate_flu_rad_s: Vector, thrust_n: float) -> AttitudeCommand:
-    """Body rates."""
     return AttitudeCommand(RATE, rate_flu_rad_s, 0.0, 0.0, thrust_n)

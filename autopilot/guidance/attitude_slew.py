@@ -1,8 +1,8 @@
-"""Kernels that slew an attitude demand from sample to sample towards a command.
+"""Kernels that slew an attitude demand towards a command.
 
-An angle x with rate v goes by v' = w² (target - x) + 2 w (target' - v), bounded in acceleration and rate; one of which
-only the rate is commanded by v' = 2 w (target' - v). A largest acceleration of w times the largest rate or more leaves
-the braking to the first of them, so that nothing overshoots.
+An angle x with rate v follows v' = w² (target - x) + 2 w (target' - v), bounded in acceleration and rate; under a rate
+command v' = 2 w (target' - v). With a maximum acceleration of at least w times the maximum rate, the linear law brakes
+alone, without overshoot.
 """
 
 from math import floor, isnan, pi, sqrt
@@ -19,7 +19,7 @@ _NO_DIRECTION = 1e-9
 
 
 class Slew(NamedTuple):
-    """Limits of a demand: the largest tilt of the thrust axis, rates and accelerations; w as frequencies."""
+    """Limits of tilt, rates and accelerations; w as frequencies."""
 
     max_tilt_rad: float
     tilt_frequency_rad_s: float
@@ -32,14 +32,14 @@ class Slew(NamedTuple):
 
 
 class AttitudeCommand(NamedTuple):
-    """The attitude or body rates that a demand goes towards.
+    """Target of a demand.
 
     Attributes:
         kind: TILT, ATTITUDE or RATE.
-        vector: TILT: phi, theta, rad, and 0. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s.
-        yaw_rad: ATTITUDE: to reach.
-        yaw_rate_rad_s: TILT: to turn at. ATTITUDE: feed-forward.
-        thrust_n: To reach; nan for what carries the weight, whatever the tilt.
+        vector: TILT: phi, theta, rad, and 0. ATTITUDE: thrust direction, ENU. RATE: p, q, r, rad/s.
+        yaw_rad: ATTITUDE only.
+        yaw_rate_rad_s: TILT: turn rate. ATTITUDE: feed-forward.
+        thrust_n: nan: the thrust that carries the weight at any tilt.
     """
 
     kind: int
@@ -59,7 +59,7 @@ def slew_on(
     rates: Array,
     thrusts: Array,
 ) -> None:
-    """Fill angles phi, theta, psi, rad, (n, 3), their rates, (n, 3), and thrusts, N, (n,), from their first rows on."""
+    """Fill angles phi, theta, psi, rad, and rates, (n, 3), and thrusts, N, (n,), starting from their first rows."""
     kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
@@ -103,7 +103,7 @@ def _move(
     angles: Array,
     rates: Array,
 ) -> None:
-    """Move angle i and its rate on by one interval, in place."""
+    """Advance angle i and its rate by one interval, in place."""
     acceleration = min(max(pull + 2.0 * w * (wanted_rate - rates[i]), -max_acceleration), max_acceleration)
     rate = min(max(rates[i] + interval_s * acceleration, -max_rate), max_rate)
     angles[i] += 0.5 * interval_s * (rates[i] + rate)
@@ -122,7 +122,7 @@ def _euler_rates(angles: Array, rate: Vector, out: Array) -> None:
 
 @compiled
 def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) -> None:
-    """Write roll and pitch, rad, that point body z along `direction`, ENU, at yaw `psi`; less where too steep."""
+    """Write roll and pitch, rad, that point body z along `direction`, ENU, at yaw `psi`, within the tilt limit."""
     x, y, z = direction[0], direction[1], direction[2]
     horizontal = sqrt(x * x + y * y)
     if horizontal < _NO_DIRECTION:
@@ -137,10 +137,7 @@ def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) ->
 
 @compiled
 def limit_tilt(angles: Array, rates: Array, max_tilt_rad: float) -> None:
-    """Bring the thrust axis back to the largest tilt, and remove the rates that lead beyond.
-
-    In place: angles are phi, theta, psi, rad, (3,), rates their derivatives.
-    """
+    """Limit the tilt in place, and remove rates beyond it; angles phi, theta, psi, rad, and rates, (3,)."""
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
     if c * ct >= cos(max_tilt_rad):
         return

@@ -1,4 +1,4 @@
-"""The numbers that a flight is flown by, apart from those of the control law: speeds, heights, times."""
+"""Numbers of the vehicle's behaviour: speeds, heights, times."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,11 +12,10 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """Numbers of the vehicle's behaviour: each is a parameter, described in `parameters/behaviour.py`.
+    """Numbers of the vehicle's behaviour; each is a parameter, described in `parameters/behaviour.py`.
 
-    Heights are above home, but for a take-off's, which is above where the vehicle stands. 0 is no limit of a distance
-    or height, and no disarming of a time. The solve time is what the control law is declared to take. The delay is that
-    of commands, compensated; negative: the profile's, which is measured unless it says one.
+    Heights are above home; take-off's is above the ground. 0 switches a distance or height limit or a disarming time
+    off. `solve_time_s` is declared. `delay_s` of commands is compensated; negative: the profile's, or measured.
     """
 
     limits: Limits = _LIMITS
@@ -50,5 +49,4 @@ class Behaviour:
 
 @lru_cache(maxsize=8)
 def at_speed(behaviour: Behaviour, speed_m_s: float) -> Behaviour:
-    """Return behaviour of which only the horizontal speed is another."""
     return replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed_m_s))

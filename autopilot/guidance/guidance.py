@@ -1,4 +1,4 @@
-"""Guidance: the references of one control sample, as the control law takes them."""
+"""References of one control sample for the control law."""
 
 from typing import NamedTuple
 
@@ -6,13 +6,11 @@ from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace
 
 
 class Guidance(NamedTuple):
-    """References for the control law; neither horizon nor attitude while the rotors stand or idle.
+    """References for the control law; empty while the rotors stand or idle.
 
     Attributes:
-        horizon: References of position and yaw.
-        attitude: References of attitude and thrust.
         begins: Whether the rotors leave idle now: the control law is reset.
-        pace: How time passes along the horizon.
+        pace: Progress of time along the horizon.
     """
 
     horizon: Horizon | None = None

@@ -1,16 +1,15 @@
-"""The chain of integrators that leads the reference to its target, as compiled kernels.
+"""Chain of integrators that leads the reference to its target, as compiled kernels.
 
-With e = reference - target, each step of the cascade demands of the next
+With e = reference - target, each loop of the cascade commands the next:
 
-    velocity      v_t - approach(e)         as fast as it can still stop: sqrt(2 a d) far away, k d close by
+    velocity      v_t - approach(e)         the fastest that can still stop: sqrt(2 a d) far away, k d close by
     acceleration  a_t + d/dt of that + k_v (wanted velocity - v)
     jerk          j_t + k_a (wanted acceleration - a)
     snap          s_t + k_j (wanted jerk - j)
 
-and bounds what it adds to the target's own motion. The acceleration is bounded by what the jerk can end within 1 / k_v,
-too: more could not be taken back in time, and would overshoot. The snap is bounded, since it is what the moments
-are made for: a target that jumps must not ask for all of them at once. A target that is reached is followed exactly,
-whatever it does.
+and bounds its addition to the target's own motion. The acceleration is also bounded so that the jerk can end it within
+1 / k_v: more would overshoot. The snap is bounded because the moments produce it: a jumping target must not demand all
+of them. A reached target is followed exactly.
 """
 
 from functools import lru_cache
@@ -26,33 +25,21 @@ from colibri.common.types import Array
 Integers: TypeAlias = NDArray[np.int64]
 
 K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
-"""Each loop about three times as fast as the one around it, 1/s."""
+"""Gains, 1/s: each loop is about three times as fast as the outer one."""
 K_YAW, K_YAW_RATE = 2.0, 8.0
 _MAX_STEP_S = 0.02
-"""The quickest loop, of the jerk, must not become unstable: 36 / s times this is below 1."""
+"""Stability limit of the jerk loop: 36 / s times this is below 1."""
 _JERK_ENDS_S = 0.11
-"""In which the largest jerk can be ended by the largest snap: less than 1 / k_a would be of use to nobody, and with
-more a target is overshot."""
+"""Time to end the largest jerk by the largest snap: less than 1 / k_a is useless, more overshoots."""
 _STOPPING = 0.6
-"""Part of the acceleration that stopping may count on; the rest is for keeping to it."""
+"""Part of the acceleration planned for stopping; the rest is for tracking it."""
 
 _JERK, _JERK_SCALE = 3, 1e-2
-"""Jerk is the last of the chain to settle, and the largest number of it."""
+"""Jerk settles last, and has the largest numbers."""
 
 
 class Limits(NamedTuple):
-    """How fast the reference approaches a target.
-
-    Attributes:
-        speed_m_s: Horizontally.
-        climb_m_s: Upwards.
-        sink_m_s: Downwards.
-        acceleration_m_s2: Horizontally.
-        lift_m_s2: Vertically.
-        jerk_m_s3: In every direction.
-        yaw_rate_rad_s: Turning.
-        yaw_acceleration_rad_s2: Beginning and ending a turn.
-    """
+    """Limits of the approach: horizontal, upward and downward speed, horizontal and vertical acceleration."""
 
     speed_m_s: float = 5.0
     climb_m_s: float = 3.0
@@ -66,24 +53,22 @@ class Limits(NamedTuple):
 
 @lru_cache(maxsize=64)
 def packed_limits(limits: Limits) -> Packed:
-    """Return limits as a record: a kernel takes three times as long to recognise them as a tuple."""
+    """Return limits as a record, which kernels unbox three times as fast as a tuple."""
     return packed(limits)
 
 
 @lru_cache(maxsize=64)
 def at_speed(limits: Limits, speed_m_s: float) -> Limits:
-    """Return limits of which only the horizontal speed is another."""
     return limits._replace(speed_m_s=speed_m_s)
 
 
 @lru_cache(maxsize=64)
 def climbing_at(limits: Limits, climb_m_s: float) -> Limits:
-    """Return limits of which only the speed upwards is another."""
     return limits._replace(climb_m_s=climb_m_s)
 
 
 class Axes(NamedTuple):
-    """Axes that share their limits: from `first` to before `last`."""
+    """Axes `first` to before `last`, with their limits."""
 
     first: int
     last: int
@@ -103,19 +88,18 @@ def advance(
     limits: Packed,
     dt: float,
 ) -> tuple[Array, Array]:
-    """Return motion, (5, n, 3), and heading, (3, n), from now on; snap and yaw acceleration act until the next instant.
+    """Return motion, (5, n, 3), and heading, (3, n), from now on; snap and yaw acceleration are piecewise constant.
 
-    Between instants that are too far apart for its loops the chain takes several steps.
+    Widely spaced instants are integrated in several steps.
 
     Args:
-        motion: Position, velocity, acceleration, jerk now, ENU, (4, 3).
+        motion: Position to jerk now, ENU, (4, 3).
         heading: Yaw, rad, and its rate now, (2,).
-        target: To follow at n instants: position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
-        kinds: Which of the first three binds, for x, y and z, (3,).
-        target_heading: Yaw, rate, acceleration to follow, (n, 3).
-        turns: Whether yaw itself binds; otherwise its rate.
-        limits: Of the approach, packed.
-        dt: Between two instants, s.
+        target: Position to snap at n instants, ENU, (n, 5, 3).
+        kinds: Binding derivative, 0 to 2, for x, y and z, (3,).
+        target_heading: Yaw, rate, acceleration, (n, 3).
+        turns: Whether yaw binds; otherwise its rate.
+        dt: Between instants, s.
     """
     count = target.shape[0]
     out, out_heading = np.empty((5, count, 3)), np.empty((3, count))
@@ -144,7 +128,7 @@ def advance(
 
 @compiled
 def is_near(motion: Array, target: Array, within: float) -> bool:
-    """Whether position, velocity, acceleration and jerk, ENU, (4, 3), differ by less than `within` from a target's."""
+    """Whether position to jerk, ENU, (4, 3), differ by less than `within` from a target's."""
     for order in range(motion.shape[0]):
         scale = _JERK_SCALE if order == _JERK else 1.0
         for i in range(3):
@@ -155,10 +139,7 @@ def is_near(motion: Array, target: Array, within: float) -> bool:
 
 @compiled
 def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, wanted: Array, snap: Array) -> None:
-    """Write the snap, (3,): the horizontal axes share their limits, the vertical one has its own.
-
-    `wanted` is written to, too, (3,): what one loop demands of the next.
-    """
+    """Write the snap and the commands between loops, (3,): x and y share their limits, z has its own."""
     vertically = limits.sink_m_s if motion[0, 2] > target[0, 2] else limits.climb_m_s
     jerk = limits.jerk_m_s3
     _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), wanted, snap)
@@ -167,7 +148,6 @@ def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, wanted
 
 @compiled
 def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wanted: Array, snap: Array) -> None:
-    """Write the snap of the axes from `first` to before `last`."""
     p, v, a, j = motion[0], motion[1], motion[2], motion[3]
     first, last = axes.first, axes.last
     distance_squared = 0.0
@@ -199,7 +179,7 @@ def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wante
 
 @compiled
 def _approach(distance: float, stopping: float, max_speed: float, gain: float) -> tuple[float, float]:
-    """Return the speed towards a place at `distance`, and how it changes with it."""
+    """Return the speed towards a place at `distance`, and its derivative with distance."""
     near = stopping / gain**2
     if distance <= near:
         speed, slope = gain * distance, gain
@@ -213,7 +193,6 @@ def _approach(distance: float, stopping: float, max_speed: float, gain: float) -
 
 @compiled
 def _bound(vector: Array, first: int, last: int, maximum: float) -> None:
-    """Shorten the part of a vector from `first` to before `last` to `maximum`, in place."""
     squared = 0.0
     for i in range(first, last):
         squared += vector[i] ** 2

@@ -1,4 +1,4 @@
-"""Landing detection: the vehicle stands if its reference sinks on while it does not."""
+"""Landing detection: the reference sinks while the vehicle stays still."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
 _DRIFTING_FOR_US = 600_000
 CARRIED = 0.5
-"""Thrust in parts of the weight, below which a vehicle of unknown velocity must be falling, or stand."""
+"""Thrust relative to weight below which a vehicle of unknown velocity falls or stands."""
 
 _CLEAR_M = 0.3
 
@@ -19,7 +19,7 @@ STANDING_SLOWER_M_S = 0.3
 
 
 class Landing(NamedTuple):
-    """Memory of the detector: since when the vehicle has been still, None if it moves; and its climb then."""
+    """State of the detector: start of the stillness, and the climb rate then."""
 
     since_us: int | None = None
     climb_m_s: float = 0.0
@@ -31,13 +31,10 @@ _MOVES = Landing()
 def watch(
     landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
 ) -> tuple[Landing, bool]:
-    """Return the memory, and whether the vehicle stands: it has been still for long enough.
+    """Return the state, and whether the vehicle stands: still for long enough while it `sinks`.
 
-    Only the ground can hold a vehicle that `sinks`: one commanded to, or whose rotors do not turn, and yet still.
-
-    Where the estimate of the velocity `drifts`, as without GPS, only its changes count, which the accelerometer gives.
-    Such a vehicle sinks where its thrust carries half of it, and would fall faster and faster: the ground holds one
-    whose climb does not change.
+    If the velocity estimate `drifts`, as without GPS, only its changes count, from the accelerometer. Such a vehicle
+    sinks at half thrust and would accelerate; a constant climb rate means that the ground holds it.
     """
     if not sinks:
         return _MOVES, False
@@ -54,19 +51,16 @@ def watch(
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:
-    """Whether a reference, z of ENU, is so far below the vehicle that it must sink."""
+    """Whether a reference, z of ENU, makes the vehicle sink."""
     return height_m < state.position_enu_m[2] - _BELOW_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
-    """Guess whether a vehicle that is seen for the first time stands: low and still."""
+    """Guess whether a vehicle stands at its first state: low and still."""
     still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
 
 
 def is_clear(landing: Landing, state: VehicleState, ground_m: float) -> bool:
-    """Whether a vehicle in flight does not touch the ground: nothing holds it, and it is away from where it last stood.
-
-    One that is below that height is as clear of it as one above: there the ground is lower.
-    """
+    """Whether a vehicle in flight is clear of the ground, above or below its last standing height."""
     return landing.since_us is None and abs(state.position_enu_m[2] - ground_m) > _CLEAR_M

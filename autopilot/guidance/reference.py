@@ -1,7 +1,7 @@
-"""The reference that the vehicle follows: it moves towards a target smoothly, within limits.
+"""The reference of the vehicle, which moves smoothly towards a target within limits.
 
-The chain of integrators of `integrator_chain` follows a target that may itself move; once on it, the target itself is
-the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity.
+The chain of `integrator_chain` follows a target that may move; once reached, the target itself is the reference, exact
+to the last bit, until it jumps. An axis may lack a target position, or position and velocity.
 """
 
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
 _REACHED = 1e-5
-"""How far off a moving target the chain, whose snap changes once a sample, stays at most."""
+"""Largest distance of the chain, whose snap changes once a sample, from a moving target."""
 _CARRIED = 1e-2
-"""How far off it one is at most that was carried there by its derivatives."""
+"""The same for a reference extrapolated by its derivatives."""
 
 
 class Kind(IntEnum):
-    """What of a target binds an axis."""
+    """Binding derivative of a target's axis."""
 
     POSITION = 0
     VELOCITY = 1
@@ -36,7 +36,7 @@ ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
 
 
 class Reference(NamedTuple):
-    """State of the chain of integrators.
+    """State of the chain.
 
     Attributes:
         motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
@@ -48,7 +48,7 @@ class Reference(NamedTuple):
 
     @property
     def height_m(self) -> float:
-        """Position, z of ENU."""
+        """Height, z of ENU."""
         return float(self.motion[0, 2])
 
 
@@ -56,10 +56,10 @@ class Target(NamedTuple):
     """Target of the reference at every instant of the preview.
 
     Attributes:
-        motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
-        kinds: What of it binds, for x, y and z.
+        motion: Position to snap, ENU, (n, 5, 3).
+        kinds: Binding derivatives of x, y and z.
         heading: Yaw, rate, acceleration, (n, 3).
-        turns: Whether yaw itself binds; otherwise its rate.
+        turns: Whether yaw binds; otherwise its rate.
     """
 
     motion: Array
@@ -69,21 +69,20 @@ class Target(NamedTuple):
 
 
 def at_rest(state: VehicleState) -> Reference:
-    """Return a reference that stands still where the vehicle is."""
     motion = np.zeros((4, 3))
     motion[0] = state.position_enu_m
     return Reference(motion, np.array([state.euler[2], 0.0]))
 
 
 def moving_with(state: VehicleState) -> Reference:
-    """Return a reference that takes over the vehicle's motion."""
+    """Start from the vehicle's motion."""
     motion = np.zeros((4, 3))
     motion[0], motion[1] = state.position_enu_m, state.velocity_enu_m_s
     return Reference(motion, np.array([state.euler[2], 0.0]))
 
 
 def slowed(reference: Reference, speed: float) -> Reference:
-    """Return a reference that moves as it does where time passes at `speed` along it."""
+    """Scale the motion to a time that passes at `speed`."""
     powers = np.array([[1.0], [speed], [speed * speed], [speed * speed * speed]])
     return Reference(reference.motion * powers, reference.heading * np.array([1.0, speed]))
 
@@ -91,7 +90,6 @@ def slowed(reference: Reference, speed: float) -> Reference:
 def still_target(
     position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: tuple[Kind, Kind, Kind] | None = None
 ) -> Target:
-    """Return a target that stays at a place."""
     motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
     motion[:, 0] = position_enu_m
     heading[:, 0] = yaw_rad
@@ -99,7 +97,6 @@ def still_target(
 
 
 def target_of(horizon: Horizon) -> Target:
-    """Return a planned horizon as a target."""
     p, v, a, j, s, yaw, rate, acceleration = horizon
     motion, heading = np.empty((len(yaw), 5, 3)), np.empty((len(yaw), 3))
     motion[:, 0], motion[:, 1], motion[:, 2], motion[:, 3], motion[:, 4] = p, v, a, j, s
@@ -110,9 +107,9 @@ def target_of(horizon: Horizon) -> Target:
 def lead(
     reference: Reference, target: Target, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """Return the references from now on, one for each instant of the target, and the chain's state at the second.
+    """Return the references at each instant of the target, and the chain's state at the second.
 
-    A reference that has `waited` was carried to where it is by its derivatives.
+    A reference that has `waited` was extrapolated by its derivatives.
     """
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
@@ -136,7 +133,7 @@ def _integers(kinds: tuple[Kind, Kind, Kind]) -> Integers:
 
 
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
-    """Return the target itself, its yaw turned in full turns to where the reference's is."""
+    """Return the target, with yaw in the reference's full turn."""
     heading = target.heading
     turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
     if turns:
@@ -150,7 +147,7 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
 def lead_along(
     reference: Reference, plan: Horizon, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """Do the same for a plan; once it is reached, without the arrays of a target, which take time every sample."""
+    """`lead` for a plan; once it is reached, without the slow arrays of a target."""
     if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0]), waited=waited):
         return lead(reference, target_of(plan), limits, interval_s, waited=waited)
     turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
@@ -164,13 +161,13 @@ def _motion_at(plan: Horizon, sample: int) -> Array:
 
 
 def stays(reference: Reference, after: Reference) -> bool:
-    """Whether a reference is, a sample later, where it was, to the last bit."""
+    """Whether the reference is unchanged after a sample, to the last bit."""
     moved = reference.motion.tobytes() != after.motion.tobytes()
     return not moved and reference.heading.tobytes() == after.heading.tobytes()
 
 
 def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:
-    """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
+    """Whether the reference has reached a target: a target may jump, a reference may not."""
     reached = _CARRIED if waited else _REACHED
     yaw, rate = reference.heading.tolist()
     if max(abs(yaw - nearest_turn(float(heading[0]), yaw)), abs(rate - float(heading[1]))) >= reached:

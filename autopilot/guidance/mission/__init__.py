@@ -1,1 +1,1 @@
-"""A mission flown: item rules, legs, executor, geofence."""
+"""Missions: item rules, legs, executor, geofence."""

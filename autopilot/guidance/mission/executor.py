@@ -1,8 +1,7 @@
-"""The mission executor, a state machine: the state of the flight and the time in, an order and events out.
+"""The mission executor, a state machine: flight state and time in, an order and events out.
 
-States are those of MISSION_STATE
-(https://mavlink.io/en/messages/common.html#MISSION_STATE). Items follow each other whatever their autocontinue says, as
-on ArduPilot: DroneKit tells its users to leave that 0.
+States are those of MISSION_STATE (https://mavlink.io/en/messages/common.html#MISSION_STATE). Autocontinue is ignored,
+as in ArduPilot, because DroneKit recommends 0 for it.
 """
 
 from collections.abc import Sequence
@@ -24,16 +23,16 @@ PAUSED: int = mav.MISSION_STATE_PAUSED
 COMPLETE: int = mav.MISSION_STATE_COMPLETE
 
 MAX_ITEMS_A_STEP = 16
-"""Items begun in one step at most; the next one goes on."""
+"""Maximum of items started in a step."""
 REST_US = 1_000_000
-"""Time between jumps of a mission that jumps again without having flown in between."""
+"""Delay between jumps of a mission without flight between them."""
 _HOLD = Hold()
 _DEFAULTS = Defaults()
 _FLYING, _SUSPENDED = 1, 2
 
 
 class Reached(NamedTuple):
-    """The item of this sequence number is reached; one that takes no time is done."""
+    """An item is reached, or done if it takes no time."""
 
     seq: int
 
@@ -48,12 +47,11 @@ MissionEvent: TypeAlias = Reached | SetHome
 
 
 class Step(NamedTuple):
-    """Output of the mission.
+    """Output of a step.
 
     Attributes:
-        order: To fly; the same object while it is the same order.
-        events: Since the step before.
-        flying: Whether the mission goes on; not once it is complete, paused or gone.
+        order: The same object until the order changes.
+        flying: False once the mission is complete, paused or cleared.
     """
 
     order: Order
@@ -66,14 +64,11 @@ class MissionRecord(NamedTuple):
 
     Attributes:
         state: MISSION_STATE.
-        order: Of the phase that is flown.
-        speed_m_s: Set by the mission; None for the cruise speed.
-        jumps: How often each jump is still to be made.
-        mission_context: As the current item began, like `defaults` and `order_before`; None where it has not.
-        phases: How many of the item's are left.
-        since_us: When the phase began; `fresh` if that was in the last step.
-        jumped: Whether nothing was flown since the last jump.
-        rest_until_us: When a mission that only jumps goes on.
+        jumps: Remaining jumps by item.
+        mission_context: At the start of the current item, as are `defaults` and `order_before`.
+        phases: Remaining phases of the item.
+        since_us: Start of the phase; `fresh` if in the last step.
+        jumped: Whether the last jump was without flight since.
     """
 
     seq: int
@@ -92,11 +87,11 @@ class MissionRecord(NamedTuple):
 
 
 class MissionExecutor:
-    """Executor of one plan: a method for each event, and for each effect of an item.
+    """Executor of one plan.
 
     Attributes:
-        progress: State, current item; a new object whenever that changes.
-        defaults: Where items give no number.
+        progress: Replaced on every change.
+        defaults: Numbers for items without.
     """
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
@@ -116,27 +111,24 @@ class MissionExecutor:
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """The plan."""
         return self._items
 
     @property
     def active(self) -> bool:
-        """Whether the mission is being flown."""
         return self.progress.state == ACTIVE
 
     def load(self, items: Sequence[MissionItem]) -> None:
-        """Replace the plan by one of valid items; if it is being flown, from its first item."""
+        """Replace the plan; an active mission restarts with the first item."""
         flying = self.active
         self._items = tuple(items)
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
 
     def adopt(self, defaults: Defaults) -> None:
-        """Adopt other defaults, from the next item on."""
         self.defaults = defaults
 
     def start(self) -> Refusal | None:
-        """Fly the mission: go on at the current item, from the first if it is complete. Return why not."""
+        """Fly from the current item on, or from the first if complete."""
         if not self._items:
             return Refusal("mission: there is none")
         if self.progress.state == COMPLETE:
@@ -149,7 +141,7 @@ class MissionExecutor:
         return None
 
     def pause(self, *, item_flown: bool = False) -> tuple[MissionEvent, ...]:
-        """Stop flying it; `start` goes on with the current item, or after it if it is a return that another flies."""
+        """Pause at the current item, or after it if it is a return that mode return flies."""
         if not self.active:
             return ()
         seq = self.progress.seq
@@ -163,7 +155,7 @@ class MissionExecutor:
         return (Reached(seq),)
 
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` resets the counts of jumps. Return why not."""
+        """Go to an item, -1 for the current one; `reset` resets the jump counters."""
         if not self._items:
             return Refusal("mission: there is none")
         seq = self.progress.seq if seq == -1 else seq
@@ -176,7 +168,6 @@ class MissionExecutor:
         return None
 
     def step(self, mission_context: MissionContext, now_us: int) -> Step:
-        """Return what to fly now."""
         events: list[MissionEvent] = []
         for _ in range(MAX_ITEMS_A_STEP):
             if not self.active or now_us < self._rest_until_us or not self._fly(mission_context, now_us, events):
@@ -186,7 +177,6 @@ class MissionExecutor:
         return Step(self._order, tuple(events), self.active)
 
     def record(self) -> MissionRecord:
-        """Return the progress for a restart."""
         context = self._context if self._phases else None
         return MissionRecord(
             self.progress.seq,
@@ -221,7 +211,7 @@ class MissionExecutor:
         self._since_us, self._fresh = record.since_us, record.fresh
 
     def _fly(self, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> bool:
-        """Fly the current item; return whether it is done and another is current."""
+        """Fly the current item; return whether the next one is current."""
         seq = self.progress.seq
         item = self._items[seq]
         if self._phases is None:
@@ -245,7 +235,7 @@ class MissionExecutor:
         return True
 
     def _begin(self, now_us: int) -> None:
-        """Begin the next phase; `arrived` and `turns` of this step are still those of the one before."""
+        """Start the next phase; `arrived` and `turns` of this step still belong to the previous one."""
         self._since_us = now_us
         if self._phases and self._phases[0].order is not None:
             self._order = self._phases[0].order
@@ -266,7 +256,7 @@ class MissionExecutor:
         self._advance()
 
     def _jump(self, item: MissionItem, now_us: int) -> bool:
-        """Jump while the count of the item lasts, -1 for ever; return whether it did."""
+        """Jump while the item's count lasts, -1 for ever; return whether it did."""
         seq = self.progress.seq
         left = self._jumps.get(seq, int(item.p2))
         if left == 0:

@@ -1,8 +1,8 @@
-"""The geofence: polygons and circles that the vehicle must stay inside or outside of.
+"""The geofence: polygons and circles that bound the flight.
 
-Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and those after it. The vehicle must
-be inside all inclusion zones of a group, of at least one group (their parameter 2), and outside every exclusion zone.
-Zones reach from the ground to the sky. A circle of radius 0 is none: clients that must send some circle send that one.
+Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and following. The vehicle must be
+inside all inclusion zones of at least one group (parameter 2), and outside every exclusion zone, at any height. Circles
+of radius 0 are ignored: some clients send one as a placeholder.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,11 +29,11 @@ CIRCLES: tuple[int, ...] = (mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_
 INCLUSIONS: tuple[int, ...] = (POLYGONS[0], CIRCLES[0])
 FEWEST_VERTICES = 3
 EDGE_M = 1e-6
-"""So close to an edge counts as inside: what rounding leaves of a point that lies on it."""
+"""Tolerance for points on an edge, which count as inside."""
 
 
 def check_fence_item(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of an item of a geofence."""
+    """Return the MAV_MISSION_RESULT of an item."""
     if item.command not in (RETURN_POINT, *POLYGONS, *CIRCLES):
         return int(mav.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GLOBAL_FRAMES:
@@ -48,7 +48,7 @@ def check_fence_item(item: MissionItem) -> int:
 
 
 def check_fence(items: Sequence[MissionItem]) -> int:
-    """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, of one kind and group."""
+    """Return the MAV_MISSION_RESULT of all items: each polygon must be complete, of one kind and group."""
     for vertices in _zones(items):
         first = vertices[0]
         if len(vertices) < _length(first) or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
@@ -65,27 +65,26 @@ class Zone(Protocol):
     """An area of the ground."""
 
     def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return how far a point is inside, m; negative outside."""
+        """Return the distance to the edge, m; negative outside."""
         ...
 
 
 class Disc(NamedTuple):
-    """A circle's inside: its centre, and its radius."""
+    """The inside of a circle."""
 
     east_m: float
     north_m: float
     radius_m: float
 
     def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return how far a point is inside, m; negative outside."""
         return self.radius_m - hypot(east_m - self.east_m, north_m - self.north_m)
 
 
 class Polygon:
-    """A polygon's inside: where a ray to infinity crosses its edges an odd number of times, whichever way they turn."""
+    """The inside of a polygon, by the even-odd rule."""
 
     def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
-        """Take the corners, east and north, m."""
+        """Corners are east and north, m."""
         self._from: Array = np.array(list(vertices_m), dtype=float)
         self._to = np.roll(self._from, -1, axis=0)
         self._along = self._to - self._from
@@ -93,7 +92,6 @@ class Polygon:
         self._squared = np.where(squared > 0.0, squared, 1.0)
 
     def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return how far a point is inside, m; negative outside."""
         to = np.array((east_m, north_m)) - self._from  # each edge's start to the point
         part = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
         away = to - part[:, None] * self._along
@@ -107,11 +105,11 @@ class Polygon:
 
 
 class Geofence:
-    """A fence, seen from the origin of the ENU frame.
+    """A fence in ENU.
 
     Attributes:
-        return_point_enu_m: East and north of where to fly after a breach, m; None where the fence names no such place.
-        max_height_m: No higher than this, z of ENU; infinite without limit.
+        return_point_enu_m: East and north of the return point, if any, m.
+        max_height_m: z of ENU.
     """
 
     def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
@@ -135,7 +133,7 @@ class Geofence:
             self._exclusions.append(zone)
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return how far a position is from the nearest breach, m; negative by how much it breaches the fence."""
+        """Return the distance to the nearest breach, m; negative outside."""
         east, north, up = position_enu_m
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
@@ -146,25 +144,24 @@ class Geofence:
         return min(margin, *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
 
     def inside(self, position_enu_m: Vector) -> bool:
-        """Whether a position is within the fence; its edge is."""
+        """Whether a position is within the fence or on its edge."""
         return self.margin_m(position_enu_m) >= -EDGE_M
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
-        """Return why the vehicle may not fly to a position; None if it may."""
         if position_enu_m[2] > self.max_height_m + EDGE_M:
             return Refusal(f"higher than the {self.max_height_m:g} m of the geofence")
         return None if self.inside(position_enu_m) else Refusal("outside the geofence")
 
 
 class AroundHome(NamedTuple):
-    """The fence that needs no upload: a circle around home, and a height above it; 0 is no limit."""
+    """The fence set by parameters: a circle around home, and a height above it; 0 for off."""
 
     home_enu_m: Vector
     max_distance_m: float
     max_height_m: float
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return how far a position is inside, m; negative outside."""
+        """Return the distance to the edge, m; negative outside."""
         east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
@@ -172,7 +169,6 @@ class AroundHome(NamedTuple):
         return min(away_m, self.max_height_m - up) if self.max_height_m > 0.0 else away_m
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
-        """Return why the vehicle may not fly to a position; None if it may."""
         if self.margin_m(position_enu_m) >= -EDGE_M:
             return None
         too_high = 0.0 < self.max_height_m < position_enu_m[2] - self.home_enu_m[2]

@@ -1,7 +1,7 @@
-"""The mission items that this vehicle flies or skips, and the values that their parameters may have.
+"""The accepted mission items, and the allowed values of their parameters.
 
-Parameters: https://mavlink.io/en/messages/common.html#mav_commands; answers: MAV_MISSION_RESULT of the same page.
-A parameter that is nan means the default; a value that the command has no use for is refused, never guessed.
+Parameters: https://mavlink.io/en/messages/common.html#mav_commands; answers: MAV_MISSION_RESULT of the same page. nan
+means the default; useless values are refused.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ MAX_HEIGHT_M = 10_000.0
 MAX_DISTANCE_M = 100_000.0
 
 _ABOVE_SEA = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
-"""Altitudes of the other global frames are above home; above terrain is taken as that: there is no terrain map."""
+"""Altitudes of the other global frames are above home, even above-terrain ones, without a terrain map."""
 
 _PAYLOAD = (
     "NAV_ROI CONDITION_DISTANCE DO_SET_RELAY DO_REPEAT_RELAY DO_SET_SERVO DO_REPEAT_SERVO DO_SET_ACTUATOR "
@@ -32,7 +32,7 @@ _PAYLOAD = (
     "VIDEO_START_CAPTURE VIDEO_STOP_CAPTURE VIDEO_START_STREAMING VIDEO_STOP_STREAMING PANORAMA_CREATE"
 )
 SKIPPED = frozenset[int](getattr(mav, f"MAV_CMD_{name}") for name in _PAYLOAD.split())
-"""For cameras, gimbals and other payload that this vehicle does not carry: accepted with any parameters, and passed."""
+"""Commands to absent payload: accepted with any parameters, and skipped."""
 
 _Check: TypeAlias = Callable[[float], bool]
 
@@ -62,17 +62,16 @@ def _whole(minimum: int, maximum: int) -> _Check:
 
 
 def _a_speed(value: float) -> bool:
-    """-1 is no change, -2 the default."""
+    """-1 keeps the speed, -2 selects the default."""
     return isnan(value) or value in (-1.0, -2.0) or (value > 0.0 and isfinite(value))
 
 
 class _Allowed(NamedTuple):
-    """The rules of one command's items.
+    """Rules for the items of one command.
 
     Attributes:
-        place: Whether x and y must be a latitude and a longitude.
-        p1: Of the first parameter, and so on.
-        here: Whether x and y may also be 0, 0 or not given.
+        place: Whether x and y must be latitude and longitude.
+        here: Whether x and y may also be 0, 0 or missing.
     """
 
     place: bool = False
@@ -104,7 +103,7 @@ FLOWN: frozenset[int] = frozenset(_ALLOWED)
 
 
 def check_item(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of an item of a mission."""
+    """Return the MAV_MISSION_RESULT of an item."""
     allowed = _ALLOWED.get(item.command)
     if allowed is None:
         return int(ACCEPTED if item.command in SKIPPED else mav.MAV_MISSION_UNSUPPORTED)
@@ -126,13 +125,12 @@ def check_item(item: MissionItem) -> int:
 
 
 def check_mission(items: Sequence[MissionItem]) -> int:
-    """Return the MAV_MISSION_RESULT of a mission whose items are valid: no jump may lead out of it."""
+    """Return the MAV_MISSION_RESULT of all items: jumps must stay inside."""
     outside = any(item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items) for item in items)
     return int(mav.MAV_MISSION_INVALID_PARAM1 if outside else ACCEPTED)
 
 
 def check_rally_item(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of a rally point."""
     if item.command != mav.MAV_CMD_NAV_RALLY_POINT:
         return int(mav.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GLOBAL_FRAMES:
@@ -141,37 +139,35 @@ def check_rally_item(item: MissionItem) -> int:
 
 
 def check_place(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of a latitude and a longitude."""
     if abs(item.x * DEGREES) > MAX_LATITUDE_DEG:
         return int(mav.MAV_MISSION_INVALID_PARAM5_X)
     return int(mav.MAV_MISSION_INVALID_PARAM6_Y if abs(item.y * DEGREES) > MAX_LONGITUDE_DEG else ACCEPTED)
 
 
 def check_height(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of an altitude."""
     return int(ACCEPTED if abs(item.z) <= MAX_HEIGHT_M else mav.MAV_MISSION_INVALID_PARAM7)
 
 
 def is_here(item: MissionItem) -> bool:
-    """Whether a take-off or a landing names no place: 0, 0 is what ground stations send that know none."""
+    """Whether a take-off or landing has no place: ground stations send 0, 0."""
     return (item.x == 0 and item.y == 0) or NOT_GIVEN in (item.x, item.y)
 
 
 def place_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> Vector:
-    """Return where an item with a valid place is, m, ENU; at home's height where it gives no altitude."""
+    """Return the place of an item, m, ENU; without altitude at home's height."""
     x, y, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
     return (x, y, height_of(item, home_enu_m, origin))
 
 
 def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
-    """Return the height of an item, m, ENU; home's where it gives none."""
+    """Return the height of an item, m, ENU; by default home's."""
     if not isfinite(item.z):
         return home_enu_m[2]
     return item.z - origin.altitude_m if item.frame in _ABOVE_SEA else home_enu_m[2] + item.z
 
 
 def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
-    """Yield the sequence number and the place, m, ENU, of every item that the vehicle would fly to."""
+    """Yield sequence number and place, m, ENU, of every item with a destination."""
     for seq, item in enumerate(items):
         allowed = _ALLOWED.get(item.command)
         if allowed is None or not allowed.place:

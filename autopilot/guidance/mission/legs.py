@@ -1,4 +1,4 @@
-"""How each mission item is flown: as phases, each an order and what ends it."""
+"""Mission items as phases, each with an order and an end condition."""
 
 from collections.abc import Callable, Mapping
 from math import dist, inf, isfinite, isnan, nan, pi, radians, remainder, tau
@@ -14,18 +14,17 @@ from colibri.mavlink.wire.dialect import mav
 MIN_RADIUS_M = 1.0
 _TURNED_RAD = radians(5.0)
 _TURN_WITHIN_S = 30.0
-"""A turn that takes longer is not waited for."""
+"""Timeout of a turn."""
 
 
 class MissionContext(NamedTuple):
-    """State of the flight that a mission depends on.
+    """State of the flight for a mission.
 
     Attributes:
         yaw_rad: Counter-clockwise from east.
-        landed: Whether the vehicle stands on the ground.
-        arrived: Whether the order of the step before is fulfilled.
-        turns: How often the circle of the step before was flown around.
-        origin: Of the ENU frame.
+        landed: Whether the vehicle is on the ground.
+        arrived: Whether the previous order is fulfilled.
+        turns: Turns on the circle of the previous order.
     """
 
     position_enu_m: Vector
@@ -39,12 +38,12 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Numbers that hold where an item gives none.
+    """Defaults of items.
 
     Attributes:
-        acceptance_m: Closer to a place than this it is reached.
-        takeoff_height_m: Above the ground, where a mission begins there without a take-off.
-        orbit_radius_m: Of LOITER_TURNS.
+        acceptance_m: Radius of a reached place.
+        takeoff_height_m: Above the ground, for missions without a take-off.
+        orbit_radius_m: For LOITER_TURNS.
     """
 
     acceptance_m: float = 0.5
@@ -53,7 +52,7 @@ class Defaults(NamedTuple):
 
 
 class ItemContext(NamedTuple):
-    """State of the mission as an item begins, with the last order; the speed is None for the cruise speed."""
+    """State of the mission at the start of an item, with the previous order."""
 
     mission_context: MissionContext
     defaults: Defaults
@@ -61,17 +60,16 @@ class ItemContext(NamedTuple):
     speed_m_s: float | None
 
     def place(self, item: MissionItem) -> Vector:
-        """Return the place of an item, m, ENU."""
         return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
 
 
 class Phase(NamedTuple):
-    """A part of flying an item.
+    """A part of an item.
 
     Attributes:
-        order: What to do; None for what was done before.
-        ends: (situation, seconds since the phase began) -> whether it is over.
-        reaches: Whether the item counts as reached then.
+        order: None keeps the previous order.
+        ends: End condition, of the context and the seconds since the start.
+        reaches: Whether its end counts as reaching the item.
     """
 
     order: Order | None
@@ -83,7 +81,7 @@ Leg: TypeAlias = Callable[[MissionItem, ItemContext], tuple[Phase, ...]]
 
 
 def phases_of(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Return how an item is flown; nothing where that takes no time."""
+    """Return the phases of an item; empty if it takes no time."""
     leg = _LEGS.get(item.command)
     return () if leg is None else leg(item, context)
 
@@ -98,7 +96,7 @@ def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Pha
 
 
 def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
-    """Fly to a place, heading by p4, and stay; stay_s 0 flies through."""
+    """Fly to a place with heading p4, and stay; stay_s 0 flies through."""
     place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
@@ -117,7 +115,7 @@ def _circle(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
 
 
 def _take_off(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Straight up, then to the place if it names one."""
+    """Climb vertically, then fly to the place, if any."""
     mission_context, defaults = context.mission_context, context.defaults
     height = height_of(item, mission_context.home_enu_m, mission_context.origin)
     yaw = _yaw(item.p4)
@@ -141,7 +139,7 @@ def _delay(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
 
 
 def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Turn on the spot; p1 counts clockwise from north, or from the heading now where p4 is 1."""
+    """Turn on the spot; p1 is clockwise from north, or relative to the heading if p4 is 1."""
     mission_context = context.mission_context
     if mission_context.landed:
         return ()
@@ -174,7 +172,7 @@ _LEGS: Mapping[int, Leg] = {
 
 
 def _off_the_ground(height_m: float, context: ItemContext) -> tuple[Phase, ...]:
-    """Take off first where the vehicle stands: a mission may begin with a waypoint, as MAVSDK's do."""
+    """Prepend a take-off on the ground: MAVSDK's missions begin with a waypoint."""
     mission_context, defaults = context.mission_context, context.defaults
     if not mission_context.landed:
         return ()

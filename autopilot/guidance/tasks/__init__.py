@@ -1,1 +1,1 @@
-"""Flight tasks: each way to fly (PX4's word), updated once a sample to a motion or an attitude."""
+"""Flight tasks (PX4's term), each updated once a sample to a motion or an attitude."""

@@ -1,4 +1,4 @@
-"""Flight tasks by attitude and thrust, from sticks or setpoints; and the descent without a position."""
+"""Flight tasks by attitude and thrust, from sticks or setpoints; and the descent without position."""
 
 import numpy as np
 
@@ -13,27 +13,26 @@ from colibri.common.kernels import cos
 from colibri.mavlink.setpoints.setpoints import Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
-"""Thrust in parts of the weight from which on a vehicle takes off, and below which it must sink."""
+"""Thrust relative to weight: take-off above, certain sinking below."""
 _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
-"""Poles of the height loop near -3 and -2, 1/s; the integral removes what a wrong mass or a tired battery leave."""
+"""Poles of the height loop near -3 and -2, 1/s; the integral compensates a wrong mass or a weak battery."""
 _MAX_LIFT_M_S2, _MAX_OFFSET_M_S2 = 6.0, 4.0
 _MIN_UPRIGHT = 0.5
 _RESTS_M_S = 0.025
 
 
 class TiltLoop:
-    """Attitude and thrust as a generator of demands slews them."""
+    """Slews attitude and thrust by a generator."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         self._generator = generator
         self._memory: ReferenceMemory | None = None
 
     def forget(self) -> None:
-        """Reset at the next demand."""
+        """Reset before the next demand."""
         self._memory = None
 
     def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
-        """Return the motion by a command."""
         if self._memory is None:
             self._memory = self._generator.initial(context.state)
         self._memory, demand = self._generator.step(self._memory, context.state, command)
@@ -43,7 +42,7 @@ class TiltLoop:
 
 
 class StabilizedTask(EndlessTask):
-    """Sticks to tilt, yaw rate and thrust."""
+    """Sticks to tilt, yaw rate and thrust; without sticks, stop."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         self._tilt = TiltLoop(generator)
@@ -51,7 +50,6 @@ class StabilizedTask(EndlessTask):
         self._stop = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return the motion by the sticks; without them, stop."""
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
@@ -59,7 +57,7 @@ class StabilizedTask(EndlessTask):
 
 
 class AltitudeTask(EndlessTask):
-    """Sticks to tilt, yaw rate and climb; height is held while its stick is in the middle."""
+    """Sticks to tilt, yaw rate and climb, with height hold; without sticks, stop."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
@@ -69,7 +67,6 @@ class AltitudeTask(EndlessTask):
         self._height_m: float | None = None
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return the motion by the sticks; without them, stop."""
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
@@ -81,7 +78,7 @@ class AltitudeTask(EndlessTask):
         return motion._replace(reference=reference, lifts=lifting, sinks=is_below(reference.height_m, context.state))
 
     def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
-        """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
+        """Return the reference of height, and whether the vehicle must leave the ground."""
         climb_m_s = stick_climb(sticks, context)
         if climb_m_s != 0.0:
             self._height_m = None
@@ -92,7 +89,7 @@ class AltitudeTask(EndlessTask):
 
 
 class DescentTask(EndlessTask):
-    """Level, and down at the speed of landings: for a vehicle of unknown position or heading."""
+    """Level descent at landing speed, for an unknown position or heading."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
@@ -100,7 +97,6 @@ class DescentTask(EndlessTask):
         self._loop = HeightLoop(self._weight_n, gravity_m_s2)
 
     def update(self, context: TaskContext) -> AttitudeMotion:
-        """Return a level attitude, and the thrust that sinks."""
         reference, _ = vertically(context, -sinking_m_s(context), None)
         thrust_n = self._loop.thrust_n(reference, context)
         motion = self._tilt.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
@@ -109,14 +105,14 @@ class DescentTask(EndlessTask):
 
 
 class HeightLoop:
-    """The height loop: the thrust that follows the height of a reference, whatever the tilt."""
+    """The height loop, compensated for tilt."""
 
     def __init__(self, weight_n: float, gravity_m_s2: float) -> None:
         self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
         self._offset_m_s2 = 0.0
 
     def thrust_n(self, reference: Reference, context: TaskContext) -> float:
-        """Return the thrust, N, that brings the vehicle to the height of `reference`."""
+        """Return the thrust, N, to the height of `reference`."""
         height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
         state = context.state
         height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
@@ -129,10 +125,7 @@ class HeightLoop:
 
 
 def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
-    """Return a reference that climbs, or goes to a height where one is given, and where it leads.
-
-    Horizontally it is where the vehicle is.
-    """
+    """Return reference and target of a climb, or of a height if given; horizontally at the vehicle."""
     kind = Kind.VELOCITY if height_m is None else Kind.POSITION
     place = (*context.place[:2], context.place[2] if height_m is None else height_m)
     target = still_target(place, context.yaw_rad, context.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))

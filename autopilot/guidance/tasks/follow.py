@@ -1,4 +1,4 @@
-"""The flight task that follows the target of FOLLOW_TARGET, at a distance, on a chosen side."""
+"""The flight task that follows the target of FOLLOW_TARGET."""
 
 from math import hypot, pi, radians
 
@@ -12,20 +12,19 @@ from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
 MIN_HEIGHT_M = 1.0
-"""Above home, whatever the target's height: PX4's MINIMUM_SAFETY_ALTITUDE."""
+"""Above home: PX4's MINIMUM_SAFETY_ALTITUDE."""
 ABOVE_TARGET = 2
-"""Of `Behaviour.follow_altitude_mode`; the ground that the others count from is flat."""
+"""Value of `Behaviour.follow_altitude_mode`; the others refer to flat ground."""
 
 
 class FollowTargetTask(EndlessTask):
-    """A place relative to the target; without one, stop."""
+    """A place relative to the target, looking at it; without a target, stop."""
 
     def __init__(self) -> None:
         self._stop = HoldTask()
         self._ahead_rad: float | None = None
 
     def update(self, context: TaskContext) -> Motion:
-        """Return the place that moves with the target, looking at it."""
         followed = context.steered.followed
         if followed is None:
             return self._stop.update(context)

@@ -1,4 +1,4 @@
-"""The flight task of offboard mode: setpoints of a companion, within the limits of speed and acceleration."""
+"""The flight task of offboard mode: a companion's setpoints, within the limits."""
 
 from math import hypot, isnan
 
@@ -14,18 +14,17 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoi
 
 UP = 2
 _BRAKE_1_S = 2.0
-"""How fast an acceleration fades where the speed comes near what is allowed."""
+"""Rate at which an acceleration fades near the speed limit."""
 
 
 class OffboardTask(EndlessTask):
-    """The setpoints of an offboard companion; where they end, stop."""
+    """Setpoints of a companion; at their end, stop."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
         self._attitude, self._tilt = attitude, TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return the motion by the latest setpoint."""
         setpoint = context.steered.setpoint
         if isinstance(setpoint, PositionSetpoint):
             if self._tilt:
@@ -39,7 +38,7 @@ class OffboardTask(EndlessTask):
 
 
 def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
-    """Return a setpoint as a target: each axis bound by the lowest derivative that is given."""
+    """Return the target of a setpoint: each axis is bound by its lowest given derivative."""
     target = still_target(context.place, context.yaw_rad, context.samples)
     velocity = allowed_velocity(setpoint.velocity_m_s, context)
     ahead_s = (context.now_us - setpoint.time_us) * 1e-6 + context.interval_s * np.arange(context.samples)
@@ -65,7 +64,7 @@ def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
 
 
 def allowed_velocity(velocity: Vector, context: TaskContext) -> Vector:
-    """Return a velocity, or the part of it that may be flown; nan stays nan."""
+    """Limit a velocity; nan stays nan."""
     x, y, z = velocity
     fast = hypot(*(0.0 if isnan(v) else v for v in (x, y)))
     share = min(1.0, context.behaviour.max_speed_m_s / fast) if fast > 0.0 else 1.0
@@ -74,7 +73,7 @@ def allowed_velocity(velocity: Vector, context: TaskContext) -> Vector:
 
 
 def allowed_acceleration(acceleration: float, axis: int, context: TaskContext) -> float:
-    """Return an acceleration, or the part of it that leads to no forbidden speed and that may be flown."""
+    """Limit an acceleration, also by the speed that it leads to."""
     limits, speed = context.behaviour.limits, context.velocity[axis]
     up, down, maximum = context.behaviour.max_speed_m_s, context.behaviour.max_speed_m_s, limits.acceleration_m_s2
     if axis == UP:

@@ -1,4 +1,4 @@
-"""The flight task around a centre: to the circle, then along it."""
+"""The flight task of a circle."""
 
 from math import copysign, hypot, pi, sqrt
 
@@ -15,17 +15,17 @@ from colibri.common.types import Array, Vector
 from colibri.mavlink.wire.dialect import mav
 
 _SHARE = 0.8
-"""Part of the horizontal acceleration that a circle may need."""
+"""Part of the horizontal acceleration allowed for the circle."""
 _ON_IT_M, _ON_IT_M_S = 0.3, 0.5
-"""So close to the circle's line, and crossing it no faster, the reference goes on along it."""
+"""Distance to the circle and radial speed at which the circle is joined."""
 
 
 class OrbitTask(EndlessTask):
-    """Around a centre: to the nearest point of the circle, then along it. On the circle already, it goes on at once.
+    """Fly to the nearest point of the circle, then along it.
 
     Attributes:
-        order: The order that begins the task again.
-        turns: How often it went around.
+        order: Order that restarts the task.
+        turns: Turns flown.
     """
 
     def __init__(self, order: Circle, context: TaskContext) -> None:
@@ -42,7 +42,6 @@ class OrbitTask(EndlessTask):
         self.turns = 0.0
 
     def update(self, context: TaskContext) -> Motion:
-        """Return the way to the circle, then the motion along it."""
         if not self._circles:
             if not self._joins(context):
                 return self._way.update(context)
@@ -56,7 +55,7 @@ class OrbitTask(EndlessTask):
         return Motion(target, context.behaviour.limits, Pace.WAITING)
 
     def _angle_of(self, place: Vector) -> float:
-        """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""
+        """Return the direction from the centre, counter-clockwise from east; the centre itself counts as east."""
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
     def _rate_of(self, context: TaskContext) -> float:

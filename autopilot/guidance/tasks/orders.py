@@ -1,4 +1,4 @@
-"""Orders: the next thing to fly, by a mission's item, a command, or a mode."""
+"""Orders of mission items, commands and modes."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias
@@ -9,11 +9,10 @@ from colibri.common.types import Vector
 
 
 class GoTo(NamedTuple):
-    """Fly to a place and stay there.
+    """Fly to a place and stay.
 
     Attributes:
-        position_enu_m: The place, m, ENU.
-        yaw_rad: Heading, counter-clockwise from east; None: along the way there.
+        yaw_rad: Counter-clockwise from east; None: along the way.
         speed_m_s: None: the cruise speed.
     """
 
@@ -23,12 +22,11 @@ class GoTo(NamedTuple):
 
 
 class Circle(NamedTuple):
-    """Fly around a centre.
+    """Fly around a centre, at its height.
 
     Attributes:
-        center_enu_m: The centre, at the height to fly at, m, ENU.
-        radius_m: Positive flies clockwise seen from above, negative counter-clockwise.
-        speed_m_s: Along the circle; None: the cruise speed.
+        radius_m: Positive is clockwise from above.
+        speed_m_s: None: the cruise speed.
         yaw_behaviour: ORBIT_YAW_BEHAVIOUR.
     """
 
@@ -39,24 +37,14 @@ class Circle(NamedTuple):
 
 
 class TakeOff(NamedTuple):
-    """Fly straight up.
-
-    Attributes:
-        height_enu_m: z to reach, m.
-        yaw_rad: Heading, counter-clockwise from east; None: as it is.
-    """
+    """Climb vertically; a `yaw_rad` of None keeps the heading."""
 
     height_enu_m: float
     yaw_rad: float | None = None
 
 
 class Land(NamedTuple):
-    """Sink until the ground is reached.
-
-    Attributes:
-        position_enu_m: Where, m, ENU; None: here.
-        yaw_rad: Heading, counter-clockwise from east; None: as it is.
-    """
+    """Sink to the ground, by default here and with the present heading."""
 
     position_enu_m: Vector | None = None
     yaw_rad: float | None = None
@@ -67,7 +55,7 @@ class Return(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """Stop, and stay where that is."""
+    """Stop and stay."""
 
 
 Order: TypeAlias = GoTo | Circle | TakeOff | Land | Return | Hold
@@ -75,19 +63,18 @@ _KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Circ
 
 
 class OrderRecord(NamedTuple):
-    """An order as plain data: the name of its class, and its fields."""
+    """An order as plain data: class name and fields."""
 
     kind: str
     fields: tuple[Any, ...]
 
 
 def record_of(order: Order) -> OrderRecord:
-    """Return an order as plain data."""
     return OrderRecord(type(order).__name__, tuple(order))
 
 
 def order_of(record: OrderRecord) -> Order:
-    """Return the order of this record; Hold where there is none such."""
+    """Return the order of a record; Hold if it is invalid."""
     try:
         return msgspec.convert(record.fields, _KINDS[record.kind])
     except (KeyError, msgspec.ValidationError):

@@ -1,4 +1,4 @@
-"""Flight tasks by position: how each order is flown, as a target of the reference."""
+"""Flight tasks by position."""
 
 from collections.abc import Callable
 from math import dist, hypot
@@ -21,20 +21,20 @@ from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 
 Leg: TypeAlias = Callable[[TaskContext], FlightTask]
-"""Begins a task, given the context."""
+"""Starts a task."""
 
 _ALONG_BEYOND_M = 1.0
-"""A way shorter than this does not turn the vehicle."""
+"""Shorter ways keep the heading."""
 _THERE_M, _THERE_M_S = 0.3, 0.5
-"""So close to a place, and so slow, the vehicle is there: the rest is for the reference to settle."""
+"""Distance and speed at arrival; the reference settles the rest."""
 _REST_M_S = 0.05
 _REST_RAD_S = 0.05
 _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
-"""A descent slows down in proportion to the height, to the speed of landings at this height."""
+"""Descent speed per height, down to the landing speed at this height."""
 
 
 class GoToTask:
-    """Straight to a place, and stay."""
+    """Fly straight to a place, and stay."""
 
     def __init__(self, order: GoTo, context: TaskContext) -> None:
         self._place = order.position_enu_m
@@ -46,23 +46,20 @@ class GoToTask:
 
     @property
     def order(self) -> GoTo:
-        """The order that begins the task again."""
         return GoTo(self._place, self._yaw_rad, self._speed_m_s)
 
     def update(self, context: TaskContext) -> Motion:
-        """Return the place."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = at_speed(limits, min(self._speed_m_s, context.behaviour.max_speed_m_s))
         return Motion(self._target, limits, Pace.WAITING)
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether the vehicle is there, and slow."""
         return dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
 
 
 class HoldTask:
-    """Stop, and stay where that is."""
+    """Stop and stay; `order` restarts a task."""
 
     def __init__(self) -> None:
         self._place: Vector | None = None
@@ -71,11 +68,10 @@ class HoldTask:
 
     @property
     def order(self) -> Order:
-        """The order that begins the task again."""
         return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
-        """Return rest: of the velocity first, then of the place that it led to."""
+        """Brake to rest, then hold the place reached."""
         limits = context.behaviour.limits
         if self._target is not None:
             return Motion(self._target, limits)
@@ -88,18 +84,17 @@ class HoldTask:
         return Motion(braking._replace(turns=False), limits)
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether it stands."""
         del context
         return self._place is not None
 
 
 class TakeoffTask:
-    """Straight up to a height, above where the reference comes to rest; one that is higher already stays there."""
+    """Climb vertically to a height, or stay if already higher."""
 
     def __init__(
         self, height_enu_m: float, yaw_rad: float | None, context: TaskContext, speed_m_s: float | None = None
     ) -> None:
-        """Climb at `speed_m_s`; None: at the parameter's speed."""
+        """`speed_m_s` None: the parameter's climb speed."""
         self._height_m = max(height_enu_m, context.place[2])
         self._yaw_rad = context.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
@@ -107,11 +102,10 @@ class TakeoffTask:
 
     @property
     def order(self) -> TakeOff:
-        """The order that begins the task again."""
         return TakeOff(self._height_m, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
-        """Return the height, and rest in the plane until that is reached."""
+        """Climb, horizontally braking first."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = climbing_at(limits, self._speed_m_s)
@@ -125,20 +119,18 @@ class TakeoffTask:
         return Motion(self._way.update(context).target, limits)
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether the vehicle is there, and slow."""
         return self._way is not None and self._way.arrived(context)
 
 
 class LandTask(EndlessTask):
-    """Straight down, slower towards the ground, until that ends it."""
+    """Sink vertically, slower near the ground, until stopped by it."""
 
     def __init__(self, xy: tuple[float, float], yaw_rad: float | None) -> None:
-        """Keep the heading where `yaw_rad` is None."""
+        """Keep the heading if `yaw_rad` is None."""
         self._xy = xy
         self._yaw_rad = yaw_rad
 
     def update(self, context: TaskContext) -> Motion:
-        """Return a descent."""
         behaviour = context.behaviour
         yaw = context.yaw_rad if self._yaw_rad is None else self._yaw_rad
         kinds = (Kind.POSITION, Kind.POSITION, Kind.VELOCITY)
@@ -148,16 +140,16 @@ class LandTask(EndlessTask):
 
 
 def sinking_m_s(context: TaskContext) -> float:
-    """Return how fast to sink at this height, m/s."""
+    """Return the sink rate at this height, m/s."""
     flare = _FLARE_1_S * (context.place[2] - context.home_enu_m[2] - _FLARE_ABOVE_M)
     return min(max(flare, context.behaviour.land_speed_m_s), context.behaviour.limits.sink_m_s)
 
 
 class TaskSequence:
-    """Tasks one after another, each from where the one before has led.
+    """Tasks in sequence, each from the end of the previous one.
 
     Attributes:
-        task: The one that is flown; None before the first sample.
+        task: The current task; None before the first sample.
     """
 
     def __init__(self, first: Leg, *others: Leg) -> None:
@@ -167,19 +159,18 @@ class TaskSequence:
 
     @property
     def left(self) -> tuple[int, ...]:
-        """How many legs are left from the one that is flown on; then the same of that, where it has legs itself."""
+        """Remaining legs with the current one, followed by those of a nested sequence."""
         inner = self.task.left if isinstance(self.task, TaskSequence) else ()
         return (len(self._ahead) + (self.task is not None), *inner)
 
     def skip(self, left: tuple[int, ...]) -> "TaskSequence":
-        """Begin with the leg after which so many are left, itself among them; return this."""
+        """Start with `left` remaining legs; return self."""
         if left:
             self._ahead = self._ahead[max(len(self._ahead) - left[0], 0) :]
             self._inner = left[1:]
         return self
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return the output of the leg that is flown."""
         if self.task is None or (self._ahead and self.task.arrived(context)):
             self.task = self._ahead.pop(0)(context)
             if isinstance(self.task, TaskSequence):
@@ -188,16 +179,14 @@ class TaskSequence:
         return self.task.update(context)
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether the last leg is flown to its end."""
         return not self._ahead and self.task is not None and self.task.arrived(context)
 
 
 class TrackTask:
-    """A track, from a moment on; past its end, its last point.
+    """A track from `began_us` on, then its last point.
 
     Attributes:
-        began_us: That moment.
-        start: Where the reference is set as the track is begun in mid-flight; None where it is led there.
+        start: Reference set at a start in mid-flight; None if led there.
     """
 
     def __init__(
@@ -208,7 +197,7 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        """Fly a track from `began_us` on; `planner_for_law` is for a law that previews at another interval."""
+        """`planner_for_law` is for a law with another preview interval."""
         self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law
@@ -216,19 +205,17 @@ class TrackTask:
         self.began_us = began_us
 
     def update(self, context: TaskContext) -> PlannedMotion:
-        """Return the track."""
         since_us = context.now_us - self.began_us
         grid_us = self._planner.preview.interval_us
         for_law = self._planner_for_law.horizon_at(since_us, grid_us) if self._planner_for_law else None
         return PlannedMotion(self._planner.horizon_at(since_us, grid_us), context.behaviour.limits, for_law)
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether the track has ended."""
         return context.now_us - self.began_us > self._duration_s * 1e6
 
 
 def landing(order: Land) -> TaskSequence:
-    """Return how to land: above the place first, or at rest, then down."""
+    """Land above a place, or at rest."""
     place, yaw_rad = order
     if place is None:
         return TaskSequence(lambda _: HoldTask(), lambda context: LandTask(context.place[:2], yaw_rad))
@@ -240,9 +227,9 @@ def landing(order: Land) -> TaskSequence:
 
 
 def homeward(context: TaskContext) -> TaskSequence:
-    """Return how to return: up where home is far, there, and down.
+    """Return: climb if home is far, fly there, land.
 
-    Nothing holds a return back, neither the geofence nor how far it is: there is no better place to go.
+    The geofence and the distance do not restrict a return: other places are worse.
     """
     x, y, z = context.home_enu_m
     down = landing(Land((x, y, z)))
@@ -253,7 +240,7 @@ def homeward(context: TaskContext) -> TaskSequence:
 
 
 def to_track(planner: Planner, duration_s: float) -> TaskSequence:
-    """Return how to fly a track from wherever the vehicle is: up to its first point's height, there, and along it."""
+    """Fly to a track's start height, its first point, then along it."""
     first = planner.horizon(0)
     x, y, z = first.position_enu_m[0].tolist()
     yaw_rad = float(first.yaw_rad[0])

@@ -1,4 +1,4 @@
-"""The flight task of position mode: sticks to velocity."""
+"""The flight task of position mode."""
 
 from math import hypot
 
@@ -12,7 +12,7 @@ _MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
 
 
 class PositionTask(EndlessTask):
-    """Sticks to velocity; an axis whose stick is in the middle is held where it came to rest."""
+    """Sticks to velocity along the heading; a centred axis holds its rest position."""
 
     def __init__(self) -> None:
         self._xy: tuple[float, float] | None = None
@@ -20,7 +20,6 @@ class PositionTask(EndlessTask):
         self._yaw_rad: float | None = None
 
     def update(self, context: TaskContext) -> Motion:
-        """Return velocities along the heading, or places."""
         sticks = context.steered.sticks or _MIDDLE
         target = still_target(context.place, context.yaw_rad, context.samples)
         horizontally = self._move(target, stick_velocity(sticks, context), context)
@@ -62,7 +61,7 @@ class PositionTask(EndlessTask):
 
 
 def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
-    """Return the velocity east and north, m/s, by sticks: of full sticks, in any direction, the largest."""
+    """Return the velocity east and north, m/s; full sticks give the same speed in any direction."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
     behaviour = context.behaviour
     speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
@@ -71,22 +70,20 @@ def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
 
 
 def stick_climb(sticks: Sticks, context: TaskContext) -> float:
-    """Return the speed upwards, m/s, by sticks."""
     up = dead(2.0 * sticks.thrust - 1.0)
     return up * (context.behaviour.limits.climb_m_s if up > 0.0 else context.behaviour.limits.sink_m_s)
 
 
 def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:
-    """Return the yaw rate, rad/s, by sticks."""
     return -dead(sticks.yaw) * context.behaviour.stick_yaw_rate_rad_s
 
 
 def without_play(sticks: Sticks) -> Sticks:
-    """Return sticks whose play around the middle does nothing; thrust has none."""
+    """Remove the dead zone; thrust has none."""
     return sticks._replace(pitch=dead(sticks.pitch), roll=dead(sticks.roll), yaw=dead(sticks.yaw))
 
 
 def dead(stick: float) -> float:
-    """Return a stick's deflection, -1..1, without the play around its middle."""
+    """Remove the dead zone from a deflection, -1..1."""
     beyond = max(abs(stick) - _DEADZONE, 0.0) / (1.0 - _DEADZONE)
     return beyond if stick > 0.0 else -beyond

@@ -1,4 +1,4 @@
-"""The interface of flight tasks: given the context once a control sample, a task returns a motion."""
+"""The interface of flight tasks: context in, motion out, once a control sample."""
 
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -13,7 +13,7 @@ _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
 class Steered(NamedTuple):
-    """Latest input of clients: a pilot's sticks, a companion's setpoint, the target to follow; None without."""
+    """Latest client inputs: sticks, setpoint, target to follow."""
 
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
@@ -27,13 +27,11 @@ class TaskContext(NamedTuple):
     """Inputs of a task.
 
     Attributes:
-        now_us: Simulated time at which what is decided takes effect, less the control law's lag: path time.
+        now_us: Path time: simulated time at which commands take effect, minus the control law's lag.
         state: The vehicle then.
-        interval_s: Between two instants of a target.
-        samples: How many instants a target has.
-        steered: Latest input of clients.
-        ground_m: Height of where it last stood, z of ENU.
-        blind: Whether the position is not to be flown by: a landing is level then.
+        interval_s, samples: Instants of a target.
+        ground_m: Height of the last standing position, z of ENU.
+        blind: Whether the position is unusable: landings are then level.
     """
 
     now_us: int
@@ -50,24 +48,21 @@ class TaskContext(NamedTuple):
 
     @property
     def yaw_rad(self) -> float:
-        """Heading of the reference."""
         return float(self.reference.heading[0])
 
     @property
     def place(self) -> Vector:
-        """Position of the reference."""
         x, y, z = self.reference.motion[0].tolist()
         return (x, y, z)
 
     @property
     def velocity(self) -> Vector:
-        """Velocity of the reference."""
         x, y, z = self.reference.motion[1].tolist()
         return (x, y, z)
 
 
 class Motion(NamedTuple):
-    """Motion by position and yaw: the target of the reference, the limits on the way there, and its pace."""
+    """Motion by position and yaw: target, limits of the approach, pace."""
 
     target: Target
     limits: Limits
@@ -75,10 +70,10 @@ class Motion(NamedTuple):
 
 
 class PlannedMotion(NamedTuple):
-    """Motion along a plan: the horizon that the reference is to reach, and the limits on the way there.
+    """Motion along a plan: horizon and limits of the approach.
 
     Attributes:
-        for_law: The horizon at the control law's instants, where those differ.
+        for_law: The horizon at the control law's instants, if different.
     """
 
     horizon: Horizon
@@ -88,7 +83,6 @@ class PlannedMotion(NamedTuple):
 
     @property
     def target(self) -> Target:
-        """The plan as a target."""
         return target_of(self.horizon)
 
 
@@ -96,9 +90,9 @@ class AttitudeMotion(NamedTuple):
     """Motion by attitude and thrust.
 
     Attributes:
-        reference: Where the reference stands meanwhile.
-        lifts: Whether a vehicle that stands must leave the ground for it.
-        sinks: Whether a vehicle in the air must sink.
+        reference: Position reference meanwhile.
+        lifts: Whether a standing vehicle must take off.
+        sinks: Whether an airborne vehicle must sink.
         drifts: Whether the velocity is unreliable: see `landing_detector.watch`.
     """
 
@@ -116,25 +110,24 @@ class FlightTask(Protocol):
     """A way to fly."""
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return what is to be flown from now on. Called once a control sample."""
+        """Return the motion from now on. Called once a control sample."""
         ...
 
     def arrived(self, context: TaskContext) -> bool:
-        """Whether it is flown to its end."""
+        """Whether it has ended."""
         ...
 
 
 class EndlessTask:
-    """A task that something else ends: the ground, a command, silence."""
+    """A task ended from outside: by the ground, a command, a timeout."""
 
     def arrived(self, context: TaskContext) -> bool:
-        """Never by itself."""
         del context
         return False
 
 
 def lifts(target: Target, state: VehicleState) -> bool:
-    """Whether a vehicle that stands must leave the ground for this target."""
+    """Whether a standing vehicle must take off for this target."""
     end = target.motion[-1, :, 2]
     kind = target.kinds[2]
     if kind is Kind.POSITION:

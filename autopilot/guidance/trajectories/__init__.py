@@ -1,1 +1,1 @@
-"""Tracks as formulas of time with every derivative, waypoints with minimum snap, sampled as horizons."""
+"""Tracks as formulas of time with all derivatives, waypoints with minimum snap, horizons."""

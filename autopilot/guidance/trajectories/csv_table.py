@@ -1,4 +1,4 @@
-"""Numbers from a CSV file with a header, read strictly: what is wrong is said by file, line and column."""
+"""Strict reading of numbers from a CSV file with a header; errors name file, line and column."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from colibri.common.types import Array
 MAX_DURATION_S = 3600.0
 
 _MAX_NUMBER = 1e4
-"""Of every number in a file, in its unit."""
+"""Limit of every number, in its unit."""
 _ROUNDING_S = 1e-6
 
 
 class TrackFileError(AutopilotError):
-    """A file that cannot be flown; the message names it, and the line and column, or the leg."""
+    """A file that cannot be flown; the message names it, and line and column, or leg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,8 @@ class CsvTable:
     """The numbers of a file.
 
     Attributes:
-        values: The columns, (n,) each, n >= 2.
-        lines: On which each row stands.
+        values: Columns, (n,) each, n >= 2.
+        lines: Line of each row.
     """
 
     path: Path
@@ -35,7 +35,6 @@ class CsvTable:
     lines: list[int]
 
     def error(self, row: int, column: str, what: str) -> TrackFileError:
-        """Return what is wrong with a number."""
         return TrackFileError(f"{self.path}: line {self.lines[row]}, column {column}: {what}")
 
     def matrix(self, columns: Sequence[str]) -> Array:
@@ -44,12 +43,12 @@ class CsvTable:
 
     @property
     def yaw_rad(self) -> Array | None:
-        """Column yaw, unwrapped the shorter way round, rad, (n,); None without one."""
+        """Column yaw, unwrapped, rad, (n,)."""
         yaw = self.values.get("yaw")
         return None if yaw is None else np.unwrap(np.radians(yaw))
 
     def times(self, min_step_s: float) -> Array:
-        """Return column t, s, from 0 on, each at least `min_step_s` after the one before, or raise a TrackFileError."""
+        """Return column t, s: it must start at 0 and increase by at least `min_step_s`."""
         times_s = self.values["t"]
         if times_s[0] != 0.0:
             raise self.error(0, "t", f"the first time must be 0, not {times_s[0]:g}")
@@ -59,16 +58,16 @@ class CsvTable:
         return times_s
 
     def check_duration(self, column: str, times_s: Array) -> None:
-        """Raise a TrackFileError, said of `column`, if a row is reached too late."""
+        """Raise a TrackFileError for `column` if a row is reached too late."""
         for row in np.flatnonzero(times_s > MAX_DURATION_S)[:1]:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 
 
 def read_table(path: Path, required: Collection[str], optional: Collection[str], text: str | None = None) -> CsvTable:
-    """Read a CSV file, or its `text`: at least two rows, all columns `required`, and any of those `optional`.
+    """Read a CSV file, or its `text`, with at least two rows.
 
     Raises:
-        TrackFileError: The file cannot be read, or is not that.
+        TrackFileError: The file cannot be read, or is malformed.
     """
     try:
         lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
@@ -97,7 +96,7 @@ def _header(path: Path, cells: list[str], required: Collection[str], known: Coll
 
 
 def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int, list[float]]]:
-    """Yield line number and numbers of each row that is not blank."""
+    """Yield line number and numbers of each row."""
     for line, text in enumerate(lines, start=2):
         cells = text.split(",")
         if not text.strip():

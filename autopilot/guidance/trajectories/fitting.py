@@ -1,8 +1,7 @@
-"""A path through waypoints made such that a vehicle can fly it: held above the floor, and as slow as it must be.
+"""Minimum-snap paths adapted to a vehicle: held above the floor, and slowed down as required.
 
-Where the least snap dips below the floor, the height passes a point above it there, and is as smooth at that as at any
-waypoint. Where it asks for more than the vehicle has, the legs concerned are stretched in time. What was fine is left
-as it is, bit for bit.
+Where the path dips below the floor, its height passes an additional point above it, as smoothly as at a waypoint. Legs
+beyond the vehicle's limits are stretched in time. Feasible paths stay unchanged, bit for bit.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,27 +17,21 @@ from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array
 
 ROUNDING_M = 1e-3
-"""What is so little below the floor is on it."""
+"""Tolerance below the floor."""
 
 _CLEARANCE_M = 0.25
-"""Above the floor at which a dip is held, where both ends of its leg are at least twice as high."""
+"""Height of a corrected dip above the floor, if both ends of its leg are at least twice as high."""
 _HOLDS = 20
 _STRETCHES = 80
 _STRETCH = (1.02, 1.25)
-"""By which a leg is stretched in one pass."""
+"""Stretch of a leg in one pass."""
 _WIDENING = 4
-"""Passes after which twice as many neighbours are stretched along: in the end all alike, which leads to a hover."""
+"""Passes after which twice as many neighbours are stretched too: finally all, which leads to a hover."""
 _LISTED = 3
 
 
 class Dip(NamedTuple):
-    """The lowest point of a path where it is below the floor.
-
-    Attributes:
-        leg: Number of the leg, from 0 on.
-        time_s: When.
-        height_m: How high.
-    """
+    """The lowest point of a path below the floor; legs count from 0."""
 
     leg: int
     time_s: float
@@ -46,11 +39,11 @@ class Dip(NamedTuple):
 
 
 def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
-    """Return the track through waypoints that a vehicle can fly, and in words what was changed for it, if anything.
+    """Return the feasible track through waypoints, and its changes as text.
 
     Raises:
-        TrackFileError: A waypoint is below the floor, or there is no such track; or the file says when to be where, and
-            the track would have to be changed.
+        TrackFileError: A waypoint is below the floor, the search fails, or the file prescribes times and the track
+            would change.
     """
     check_heights(waypoints, floor_m)
     if waypoints.timed:
@@ -80,7 +73,7 @@ def check_heights(waypoints: Waypoints, floor_m: float) -> None:
 
 
 def dips_of(track: Track, floor_m: float) -> Iterator[tuple[float, float]]:
-    """Yield time, s, and height, m, of the lowest point of a track each time that it is below the floor."""
+    """Yield time, s, and height, m, of the lowest point of each dip below the floor."""
     t = times(track)
     z = position(track, t)[:, 2]
     below = np.concatenate([[0], z < floor_m - ROUNDING_M, [0]]).astype(np.int8)
@@ -103,7 +96,7 @@ def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
 
 
 def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> tuple[Array, Demand]:
-    """Return how many times too much each leg asks for, (n - 1,), and the demand that is the furthest beyond."""
+    """Return each leg's relative demand, (n - 1,), and the most exceeded demand."""
     excess = np.array([demand.excess(margin) for demand in demands])
     worst = demands[int(excess.max(axis=1).argmax())]
     begins = np.ceil(waypoints.times_s[:-1] / INTERVAL_S).astype(np.intp)
@@ -111,14 +104,14 @@ def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> t
 
 
 def _widened(excess: Array, neighbours: int) -> Array:
-    """Return the largest excess of each leg and as many neighbours on either side, (n,)."""
+    """Return the maximum over each leg and its neighbours on both sides, (n,)."""
     neighbours = min(neighbours, len(excess))
     widened: Array = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
     return widened
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track held above the floor, and where it would have been below; TrackFileError if none is found."""
+    """Return the track held above the floor, and its original dips."""
     track = through(waypoints)
     dips = found = _dips(track, waypoints, floor_m)
     heights = np.empty((0, 2))

@@ -1,4 +1,4 @@
-"""A track by its name as one vehicle will fly it: checked, and where it may be, changed, before anything flies."""
+"""Loading of a track for one vehicle: checked, and adapted if possible, before the flight."""
 
 from math import inf
 from pathlib import Path
@@ -16,11 +16,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class LoadedTrack(NamedTuple):
-    """A track to fly.
-
-    Attributes:
-        note: What a user should know of it: what was changed, or which limit it exceeds; empty for nothing.
-    """
+    """A track, with a note on changes or exceeded limits for the user."""
 
     track: Track
     note: str
@@ -29,18 +25,18 @@ class LoadedTrack(NamedTuple):
 def load_track(
     name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None, text: str | None = None
 ) -> LoadedTrack:
-    """Return the track of that name as `vehicle` will fly it under `profile`.
+    """Load a track for a vehicle under a profile.
 
-    One through waypoints is held above the floor and slowed down to what the vehicle can fly, or made as fast as that.
-    Any other is flown as it is, also beyond the limits.
+    Waypoint tracks are held above the floor and slowed down to the vehicle's limits, or made as fast as these. Other
+    tracks are flown unchanged, even beyond the limits.
 
     Args:
         name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
-        floor_m: Below which no track may lead, m, ENU; None for the ground, if the vehicle has any.
-        text: What was in the track's file; None for what is in it now.
+        floor_m: Lowest height, m, ENU; None for the ground, if any.
+        text: Content of the track's file; None to read it.
 
     Raises:
-        TrackError: There is no such track, its file cannot be flown, or it leads below the floor.
+        TrackError: The track is unknown, infeasible, or below the floor.
     """
     found = track(name, text)
     if found.waypoints is not None:
@@ -56,7 +52,7 @@ def load_track(
 def track_through(
     waypoints: Waypoints, vehicle: Vehicle, profile: Profile, floor_m: float | None = None
 ) -> LoadedTrack:
-    """Return the track through waypoints as `load_track` does; TrackError if they cannot be flown."""
+    """Return the track through waypoints as in `load_track`; TrackError if infeasible."""
     reach = Reach(vehicle, profile, exact_drag=waypoints.fastest)
     try:
         fitted, changed = (fastest if waypoints.fastest else fit)(waypoints, reach, _floor(vehicle, floor_m))
@@ -70,7 +66,7 @@ def _floor(vehicle: Vehicle, floor_m: float | None) -> float:
 
 
 def file_text(name: str) -> str | None:
-    """Return the file that the track of a name goes through, None if none; TrackError if it cannot be read."""
+    """Return the content of a track's file, if it has one; TrackError if unreadable."""
     path = _file(name)
     if path is None:
         return None
@@ -83,7 +79,7 @@ def file_text(name: str) -> str | None:
 
 
 def with_file(name: str, path: Path) -> str:
-    """Return the name of the same track through another file."""
+    """Return the name with another file."""
     given = _file(name)
     return name if given is None else name.replace(given, str(path), 1)
 

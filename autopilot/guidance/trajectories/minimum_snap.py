@@ -1,10 +1,10 @@
-"""The smoothest way through points at given times: piecewise polynomials that minimise the integral of a derivative.
+"""Piecewise polynomials through points at given times that minimise the integral of a squared derivative.
 
-Sources: D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011, for the
-problem: snap for the position, acceleration for yaw. C. Richter, A. Bry and N. Roy, "Polynomial trajectory planning for
-aggressive quadrotor flight", ISRR 2013, for its solution: the unknowns are the derivatives at the inner points, so that
-every equality constraint holds by construction and the KKT system becomes symmetric positive definite. It couples only
-neighbours, and each segment is written in its own time from 0 to 1.
+Problem (snap for position, acceleration for yaw): D. Mellinger and V. Kumar, "Minimum snap trajectory generation and
+control for quadrotors", ICRA 2011. Solution: C. Richter, A. Bry and N. Roy, "Polynomial trajectory planning for
+aggressive quadrotor flight", ISRR 2013: the unknowns are the derivatives at inner points, so that equality constraints
+hold by construction and the KKT system is symmetric positive definite, coupling only neighbours. Each segment has its
+own time from 0 to 1.
 """
 
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ ACCELERATION = 2
 
 @dataclass(frozen=True, slots=True)
 class PiecewisePolynomial:
-    """Polynomials that follow one another in time.
+    """Consecutive polynomials.
 
     Attributes:
-        times_s: Where they meet, with both ends, s, strictly increasing, (n,).
-        coefficients: Of each in its own time from 0 to 1, lowest power first, (n - 1, powers, axes).
+        times_s: Knots with both ends, s, strictly increasing, (n,).
+        coefficients: In own time from 0 to 1, lowest power first, (n - 1, powers, axes).
     """
 
     times_s: Array
     coefficients: Array
 
     def __call__(self, t: TaylorSeries) -> tuple[TaylorSeries, ...]:
-        """Return each axis at time `t`, s; the first and the last polynomial go on beyond the ends."""
+        """Return each axis at time `t`, s; the ends are extrapolated."""
         piece = self._piece(t.coefficients[0])
         tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
         return tuple(_horner(self.coefficients[piece, :, axis], tau) for axis in range(self.coefficients.shape[2]))
@@ -44,21 +44,21 @@ class PiecewisePolynomial:
 
 
 def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
-    """Return the curve through `points` with the least integral of its squared derivative of that order.
+    """Return the curve through `points` with the least integral of its squared derivative of an order.
 
-    It is at rest at both ends: its derivatives from the first to that below `order` are zero. Between polynomials
-    those derivatives are continuous because they are shared, and those up to 2 order - 2 because it is the minimum.
+    It is at rest at both ends. Derivatives below `order` are continuous because they are shared, those up to 2 order -
+    2 by optimality.
 
     Args:
-        order: Which derivative: `SNAP` or `ACCELERATION`.
-        times_s: When it passes the points, s, strictly increasing, (n,), n >= 2.
-        points: What it passes, (n, axes).
+        order: `SNAP` or `ACCELERATION`.
+        times_s: Times of the points, s, strictly increasing, (n,), n >= 2.
+        points: (n, axes).
     """
     return interpolate(times_s, minimal_knots(elements(np.diff(times_s), stiffness(order)), points))
 
 
 def minimal_knots(elements: Array, points: Array) -> Array:
-    """Return the derivatives at `points` (n, axes) where the cost is least, that of order 0 first, (n, order, axes)."""
+    """Return the optimal derivatives at `points` (n, axes), order 0 first, (n, order, axes)."""
     knots = np.zeros((len(points), elements.shape[2], points.shape[1]))
     knots[:, 0] = points
     if len(points) > 2:
@@ -67,9 +67,9 @@ def minimal_knots(elements: Array, points: Array) -> Array:
 
 
 def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
-    """Return the polynomials of least degree that have these derivatives at these times: Hermite's interpolation.
+    """Hermite interpolation: return the polynomials of least degree with these derivatives at the knots.
 
-    `times_s` strictly increase, (n,), n >= 2; `knots` are the derivatives, order 0 first, (n, order, axes).
+    `times_s` strictly increase, (n,), n >= 2; `knots` are derivatives, order 0 first, (n, order, axes).
     """
     _, order, axes = knots.shape
     durations = np.diff(times_s)
@@ -80,7 +80,7 @@ def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
 
 
 def from_ends(order: int) -> Array:
-    """Return the matrix from a polynomial's derivatives at 0, then at 1, to its coefficients."""
+    """Return the matrix from derivatives at 0, then at 1, to coefficients."""
     columns = range(2 * order)
     at_0 = [[float(factorial(k)) if power == k else 0.0 for power in columns] for k in range(order)]
     at_1 = [[float(perm(power, k)) for power in columns] for k in range(order)]
@@ -99,14 +99,14 @@ def stiffness(order: int) -> Array:
 
 
 def powers(durations: Array, order: int) -> Array:
-    """Return what turns derivatives per second into those per segment, (segments, order)."""
+    """Return the factors from derivatives per second to derivatives per segment, (segments, order)."""
     powers = np.ones((len(durations), order))
     powers[:, 1:] = durations[:, None]
     return np.cumprod(powers, axis=1, dtype=np.float64)
 
 
 def elements(durations: Array, stiffness: Array) -> Array:
-    """Return each segment's cost as a form of the derivatives at its ends: (segments, end, order, end, order)."""
+    """Return each segment's cost as a form of its end derivatives: (segments, end, order, end, order)."""
     order = len(stiffness) // 2
     scale = np.tile(powers(durations, order), 2)
     forms = stiffness * scale[:, :, None] * scale[:, None, :] / powers(durations, 2 * order)[:, -1:, None]
@@ -114,7 +114,7 @@ def elements(durations: Array, stiffness: Array) -> Array:
 
 
 def _free_derivatives(elements: Array, points: Array) -> Array:
-    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes)."""
+    """Return the optimal derivatives at the inner points, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
     pull = (
         before[:, 1, 1:, 0, :1] * points[:-2, None]
@@ -125,10 +125,9 @@ def _free_derivatives(elements: Array, points: Array) -> Array:
 
 
 def balanced(elements: Array, forces: Array) -> Array:
-    """Return the derivatives at the inner points whose product with the cost's curvature is `forces`.
+    """Solve curvature · derivatives = `forces`, (n - 2, order - 1, axes), n > 2, for the inner points.
 
-    The blocks of the curvature couple only neighbours: block elimination forwards, then backwards. `forces` are
-    (n - 2, order - 1, axes), n > 2.
+    The curvature is block tridiagonal: block elimination, then back substitution.
     """
     before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
@@ -146,7 +145,7 @@ def balanced(elements: Array, forces: Array) -> Array:
 
 
 def _horner(coefficients: Array, x: TaylorSeries) -> TaylorSeries:
-    """Return a polynomial of a series, coefficients (n, powers) of its own at each time."""
+    """Evaluate a polynomial of a series, with coefficients (n, powers) for each time."""
     value = x * 0.0 + coefficients[:, -1]
     for coefficient in coefficients[:, -2::-1].T:
         value = value * x + coefficient

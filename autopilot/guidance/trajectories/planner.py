@@ -1,4 +1,4 @@
-"""Setpoints: a track, tabulated at equal intervals, handed out as a horizon."""
+"""Tracks tabulated at equal intervals, and horizons from the table."""
 
 from math import hypot
 
@@ -15,19 +15,18 @@ from colibri.common.types import Array
 _VERTICAL_SPEED_DECIMALS = 8
 _SNAP, _YAW_ACCELERATION = 4, 2
 _STILL = 1e-3
-"""Slower than this, in m/s (and so on for higher derivatives), there is no direction to look along."""
+"""Speed in m/s (likewise for higher derivatives) below which the direction is undefined."""
 _BLOCK_SAMPLES = 512
 _START = Preview(interval_us=100_000, samples=1)
 
 
 class Planner:
-    """References at equal intervals along a track; after its end the last point is held.
+    """References at equal intervals along a track; after its end, its last point.
 
-    A track that ends is tabulated once. One that does not is tabulated block by block when a horizon needs it: a
-    horizon depends on the time alone, not on those before.
+    A finite track is tabulated once, an endless one in blocks on demand: a horizon depends only on its time.
 
     Attributes:
-        table: The block that the last horizon began in, and as many references as a horizon may reach beyond it.
+        table: The current block, plus the reach of a horizon beyond it.
     """
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
@@ -41,7 +40,7 @@ class Planner:
         self.table = self._tabulate(0)
 
     def horizon(self, time_us: int) -> Horizon:
-        """Return the reference of the sample that `time_us` lies in, and those that follow it."""
+        """Return the references from the sample at or before `time_us` on."""
         sample = time_us // self.preview.interval_us
         block, first = divmod(sample if self._rest is None else min(sample, self._rest), self._length)
         if block != self._block:
@@ -50,7 +49,7 @@ class Planner:
         return Horizon._make([column[ahead] for column in self.table])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
-        """Return the same for a time between two instants that are `grid_us` apart: each reference carried on."""
+        """Return `horizon` for a time between instants `grid_us` apart, extrapolated."""
         if self._ahead and self._ahead[:2] == (time_us, grid_us):
             return self._ahead[2]
         past_us = time_us % grid_us
@@ -58,11 +57,11 @@ class Planner:
         return carried(horizon, past_us * 1e-6) if past_us else horizon
 
     def prepare(self, time_us: int, grid_us: int) -> None:
-        """Do what `horizon_at` does before it is asked for that."""
+        """Precompute `horizon_at`."""
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        """Tabulate a block and what follows; for the differences from one sample before, if there is one."""
+        """Tabulate a block and its horizon; differences need the sample before."""
         first, lead = block * self._length, min(block, 1)
         samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
         interval_s = self.preview.interval_us * 1e-6
@@ -71,7 +70,7 @@ class Planner:
 
 
 def carried(horizon: Horizon, by_s: float) -> Horizon:
-    """Return references a moment later each, by their derivatives."""
+    """Extrapolate references by their derivatives."""
     p, v, a, j, s, yaw, yaw_rate, yaw_acceleration = horizon
     half, third, quarter = by_s / 2.0, by_s / 3.0, by_s / 4.0
     return Horizon(
@@ -87,12 +86,12 @@ def carried(horizon: Horizon, by_s: float) -> Horizon:
 
 
 def start_yaw(track: Track, references: References) -> float:
-    """Return the first yaw reference, rad: with it a flight starts."""
+    """Return the first yaw reference, rad."""
     return float(Planner(track, references, _START).horizon(0).yaw_rad[0])
 
 
 def _rest(track: Track, interval_us: int) -> int | None:
-    """Return the first sample after the end of a track, from which on nothing changes; None if it has no end."""
+    """Return the first sample after the end of a track."""
     return None if np.isinf(track.duration_s) else round(track.duration_s * 1e6) // interval_us + 1
 
 
@@ -110,7 +109,7 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
 
 
 def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
-    """Return yaw along the horizontal velocity, its rate and acceleration; held, both zero, where it is still."""
+    """Return yaw along the horizontal velocity, its rate and acceleration; held at standstill, all rates 0."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
     moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
     direction = atan2(TaylorSeries(np.where(moving, vy, 0.0)), TaylorSeries(np.where(moving, vx, 0.0)))
@@ -122,7 +121,7 @@ def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
 
 
 def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
-    """Return which way the first sample leaves, rad: along its first derivative that is not still; None if all are."""
+    """Return the direction of the first non-zero derivative of the first sample, rad."""
     for order in range(1, len(x.coefficients)):
         ahead, left = float(x.derivative(order)[0]), float(y.derivative(order)[0])
         if hypot(ahead, left) >= _STILL:
@@ -131,7 +130,7 @@ def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
 
 
 def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
-    """Return yaw without jumps; where unknown the last one known, before there is any the first, and 0 if none is."""
+    """Return continuous yaw; unknown values repeat the previous known one, or the first one, or 0."""
     if not known.any():
         return np.zeros_like(yaw)
     latest = np.maximum.accumulate(np.where(known, np.arange(len(yaw)), np.argmax(known)))
@@ -140,11 +139,10 @@ def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def _by_differences(track: Track, t: Array, interval_s: float) -> Horizon:
-    """Velocity and yaw from the step before, as the thesis has them.
+    """Compute velocity and yaw by differences, as in the thesis.
 
-    Velocity is the backward difference (the first sample's the forward one); yaw points along the horizontal one, but
-    for the first sample's, which is the tangent of a circle about the origin. There are no higher derivatives. A track
-    with a formula of its yaw has that one.
+    Velocity is the backward difference (forward for the first sample); yaw is along the horizontal velocity, for the
+    first sample tangential to a circle about the origin. Higher derivatives are 0. A yaw formula takes precedence.
     """
     points = position(track, t)
     backward = np.diff(points, axis=0) / interval_s

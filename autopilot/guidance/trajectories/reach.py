@@ -1,8 +1,8 @@
-"""What a vehicle can fly: the thrust, tilt and body rate that a track asks for, beside those that there are.
+"""Thrust, tilt and body rate required by a track, and the vehicle's limits.
 
-Position is a flat output: acceleration, gravity and drag give the thrust and its direction, jerk the rate at which that
-direction turns, snap its acceleration, and so the moment of the rotors. Source: Mellinger and Kumar, ICRA 2011; with
-drag: Faessler et al., RA-L 2018. Yaw is left out: a law gives way in it, so the rotors' moment about z is not counted.
+Position is a flat output: acceleration, gravity and drag give the thrust vector, jerk its turn rate, snap its angular
+acceleration and thus the rotors' moment. Source: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
+The moment about z is left out because control laws sacrifice yaw.
 """
 
 from dataclasses import dataclass
@@ -22,30 +22,29 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 INTERVAL_S = 0.01
-"""Between the times at which a track is looked at."""
+"""Sampling of a track."""
 
 _SNAP = 4
 _MAX_TILT_DEG = 80.0
-"""Of a law that names no limit: further over, hardly any thrust is left to carry the vehicle."""
+"""For control laws without a tilt limit: beyond, the vertical thrust is too small."""
 _SMALL_N = 1e-3
 _LEAST_THRUST = 0.05
-"""Part of the weight: the direction of less thrust than that turns at no rate worth a number."""
+"""Part of the weight: for less thrust, the turn rate is meaningless."""
 _CHARGE_SAMPLES = 10
-"""Charge is summed up at so many times `INTERVAL_S`."""
+"""Step of the charge integration, in multiples of `INTERVAL_S`."""
 _REFINEMENTS = 3
 _RESPONSE_SAMPLES = 20
-"""A law comes back to its reference within about 0.2 s."""
+"""Control laws return to the reference within about 0.2 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """One quantity that a track asks for, and its limit.
+    """A required quantity and its limit.
 
     Attributes:
         values: At each time, (n,).
-        limit: The most that there is; the least if `falls`.
+        limit: Maximum; minimum if `falls`.
         span: Range of the quantity.
-        falls: Whether less is asked for than there may be.
     """
 
     name: str
@@ -56,26 +55,26 @@ class Demand:
     falls: bool = False
 
     def excess(self, margin: float) -> Array:
-        """Return how many times too much is asked for if `margin` of the range is to be left, (n,)."""
+        """Return the ratio to the limit with `margin` of the range reserved, (n,)."""
         if self.falls:
             return (self.limit + margin * self.span) / np.maximum(self.values, _SMALL_N)
         excess: Array = self.values / (self.limit - margin * self.span)
         return excess
 
     def beyond(self, margin: float) -> Array:
-        """Return by how much of its range too much is asked for if `margin` of it is to be left, (n,); < 0 if not."""
+        """Return the excess over the limit in parts of the range, with `margin` reserved, (n,); < 0 if feasible."""
         too_much = self.limit - self.values if self.falls else self.values - self.limit
         beyond: Array = too_much / self.span + margin
         return beyond
 
     def __str__(self) -> str:
-        """Return the most that is asked for, beside the limit."""
+        """Return the extreme value and the limit."""
         value, most = (self.values.min(), "least") if self.falls else (self.values.max(), "most")
         return f"{self.name} of {value:.3g} {self.unit}, where {self.limit:.3g} is the {most}"
 
 
 class Motion(NamedTuple):
-    """Velocity, acceleration, jerk and snap at each time, m, s, ENU, (n, 3) each."""
+    """Velocity, acceleration, jerk and snap, ENU, (n, 3) each."""
 
     velocity: Array
     acceleration: Array
@@ -84,7 +83,7 @@ class Motion(NamedTuple):
 
 
 class _Pulled(NamedTuple):
-    """What moves a vehicle: a force along the thrust, N, ENU, (n, 3); drag, N s/m, and thrust, N, (n, 1) each."""
+    """Force along the thrust, N, ENU, (n, 3); drag, N s/m, and thrust, N, (n, 1) each."""
 
     force: Array
     drag: Array
@@ -95,11 +94,10 @@ class Reach:
     """The limits of one vehicle under one profile."""
 
     def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
-        """Take the limits of rotors, and of tilt and body rates if the profile's law has any.
+        """Read the limits of rotors, and of tilt and body rates if the control law has any.
 
         Args:
-            exact_drag: Drag by the thrust and tilt of each moment, not by those of hover in every direction: beyond
-                10 m/s they differ by newtons.
+            exact_drag: Compute drag from actual thrust and tilt, not from hover: beyond 10 m/s they differ by newtons.
         """
         self._exact_drag = exact_drag
         self._vehicle = vehicle
@@ -112,13 +110,13 @@ class Reach:
         self._max_rate = float(min(predicted.get("max_rate_rad_s", (inf,))[:2]))
 
     def charge_of_hover(self, duration_s: float) -> float:
-        """Return the charge taken by a hover, Ah."""
+        """Return the charge for a hover, Ah."""
         rotors = self._vehicle.rotors
         hovering = np.full(len(rotors.position_m), self._vehicle.hover_speed / rotors.max_speed)
         return self._battery.charge_after(0.0, hovering, duration_s)
 
     def charge_of(self, motion: Motion) -> float:
-        """Return the charge taken by a motion given at every `INTERVAL_S`, all rotors alike, Ah."""
+        """Return the charge for a motion sampled at `INTERVAL_S`, with equal rotors, Ah."""
         rotors, interval_s, charge_ah = self._vehicle.rotors, _CHARGE_SAMPLES * INTERVAL_S, 0.0
         some = Motion(*(column[::_CHARGE_SAMPLES] for column in motion))
         thrust = np.maximum(self._pulled(some).thrust_n[:, 0], 0.0)
@@ -128,7 +126,7 @@ class Reach:
         return charge_ah
 
     def demands(self, motion: Motion, charge_ah: float) -> list[Demand]:
-        """Return what a motion asks for, beside what there is once `charge_ah` was taken from the battery."""
+        """Return the demands of a motion, with limits after `charge_ah` was taken from the battery."""
         _, a, j, s = motion
         mass = self._airframe.mass_kg
         pulled = self._pulled(motion)
@@ -147,10 +145,10 @@ class Reach:
         return demands
 
     def _pulled(self, motion: Motion) -> "_Pulled":
-        """Split what moves the vehicle into thrust and drag.
+        """Split the force into thrust and drag.
 
-        Drag across the rotors' axis is c (v - (v·z) z) with c = c_xy + c_r √T, along it c_z (v·z) z, so that
-        T z = m (a + g) + c v + (c_z - c) (v·z) z: the thrust points along m (a + g) + c v.
+        Drag across the rotor axis is c (v - (v·z) z) with c = c_xy + c_r √T, along it c_z (v·z) z, so that T z = m (a +
+        g) + c v + (c_z - c) (v·z) z: the thrust points along m (a + g) + c v.
         """
         airframe, v = self._airframe, motion.velocity
         drag: Array = np.full((len(v), 1), self._drag_n_s_m)
@@ -170,7 +168,7 @@ class Reach:
         return force
 
     def _of_rotors(self, thrust_n: Array, turn_rad_s2: Array, charge_ah: float) -> list[Demand]:
-        """Return what is asked of the rotors: the moment may be about any axis of their plane."""
+        """Return the demands on the rotors; the moment may be about any horizontal axis."""
         share, lever = self._mixed[:, 0], _length(self._mixed[:, 1:3])
         moment = max(self._vehicle.body.inertia_kg_m2[:2]) * turn_rad_s2
         rotors = self._vehicle.rotors
@@ -189,20 +187,19 @@ class Reach:
 
 
 def times(track: Track) -> Array:
-    """Return the times at which a track is looked at, s, (n,); of one without end its first 100 s."""
+    """Return the sampling times of a track, s, (n,); the first 100 s of an endless one."""
     return np.arange(0.0, DURATION_S if track.duration_s == inf else track.duration_s, INTERVAL_S)
 
 
 def exact_motion(track: Track) -> Motion:
-    """Return the motion of a track as it is."""
     axes = track.position(track.clock(times(track), _SNAP))
     return Motion(*(np.stack([axis.derivative(order) for axis in axes], axis=1) for order in range(1, _SNAP + 1)))
 
 
 def mean_motion(track: Track) -> Motion:
-    """Return the motion of a track by differences, over as long as a law takes to come back to it.
+    """Return the motion by differences over the response time of a control law.
 
-    What a path asks for is then what a vehicle cannot evade, and not the start of a step that it cuts short.
+    This excludes steps that a vehicle rounds off.
     """
     t, apart = times(track), _RESPONSE_SAMPLES
     around = INTERVAL_S * np.arange(-2 * apart, len(t) + 2 * apart)

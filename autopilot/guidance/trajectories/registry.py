@@ -1,7 +1,4 @@
-"""Tracks by name and options: Colibri's own, and those of other packages, found as entry points.
-
-A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none.
-"""
+"""Tracks by name and options: Colibri's own, and those of other packages by entry points."""
 
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -28,14 +25,14 @@ GROUP = "colibri.tracks"
 
 
 class TrackError(AutopilotError):
-    """There is no such track, or it cannot be flown; one line says what there is."""
+    """Unknown or infeasible track; the message lists the choices."""
 
 
 def track(name: str, text: str | None = None) -> Track:
-    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`; `text` stands for what its file has now.
+    """Return the track of a name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`; `text` replaces the content of its file.
 
     Raises:
-        TrackError: There is no such track or option, a value is impossible, or its file cannot be flown.
+        TrackError: The track or an option is unknown, a value is impossible, or the file cannot be flown.
     """
     base, colon, given = name.partition(":")
     if base in THESIS_TRACKS and not colon:
@@ -76,7 +73,7 @@ def _load_installed(name: str) -> Any:
 
 
 def _tried(name: str, options: TrackOptions) -> Track:
-    """Return the track of another package; TrackError unless it gives three coordinates at the start."""
+    """Return the track of another package, checked for three finite coordinates at the start."""
     try:
         given = options.track()
         found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
@@ -93,7 +90,6 @@ def _tried(name: str, options: TrackOptions) -> Track:
 
 
 def read_options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
-    """Read the options of a track strictly."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     given = _pairs(name, kind, text)
     for key in given:
@@ -109,7 +105,7 @@ def read_options(name: str, kind: type[TrackOptions], text: str | None) -> Track
 
 
 def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
-    """Take options apart; the first may be a value alone, if the track has a lone option."""
+    """Split options; the first may be a value alone, for a track's lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
         key, equals, value = item.partition("=")

@@ -1,4 +1,4 @@
-"""A track as it was sampled elsewhere: where, how fast and how accelerated, flown as it is; read strictly from CSV."""
+"""Externally sampled tracks, read strictly from CSV and flown unchanged."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,18 +13,18 @@ _REQUIRED = ("t", *_PLACE, *_VELOCITY, *_ACCELERATION)
 _OPTIONAL = ("yaw",)
 _MIN_STEP_S = 1e-3
 _TOLERANCE = 0.1
-"""Part of what a quantity goes by at its rate from one row to the next, by which the two may disagree."""
+"""Allowed contradiction between columns, relative to the change between rows."""
 _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """A track at some times.
+    """A sampled track.
 
     Attributes:
         times_s: Strictly increasing from 0, s, (n,), n >= 2.
         motion_enu: Position, velocity and acceleration, m, m/s and m/s², (n, 3, 3).
-        yaw_rad: Unwrapped the shorter way round, (n,), rad; None to look along the path.
+        yaw_rad: Unwrapped, rad, (n,); None: along the path.
     """
 
     times_s: Array
@@ -33,7 +33,7 @@ class Samples:
 
 
 def read_samples(path: Path, text: str | None = None) -> Samples:
-    """Read a CSV file with a header of t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and if wanted yaw (degrees).
+    """Read a CSV file with columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and optionally yaw (degrees).
 
     Raises:
         TrackFileError: The file cannot be read, or its columns contradict each other.
@@ -46,7 +46,7 @@ def read_samples(path: Path, text: str | None = None) -> Samples:
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
-    """By the trapezoidal rule; for the positions with the accelerations' correction at both ends."""
+    """Compare columns by the trapezoidal rule, for positions with the end correction by accelerations."""
     x, v, a = np.moveaxis(motion, 1, 0)
     goes = np.diff(x, axis=0) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     for columns, change, rate, rounding, unit in (

@@ -1,8 +1,8 @@
-"""Derivatives of a track without deriving: arithmetic on truncated Taylor series.
+"""Derivatives of a track by arithmetic on truncated Taylor series.
 
-A series holds x(t + h) = c0 + c1 h + c2 h² + … at many times t at once. Sums, products, sines, cosines, directions of
-series are exact to the last coefficient kept, so a track that is written as a formula of its time has every derivative.
-Source: Griewank and Walther, "Evaluating Derivatives" (2008), chapter 13.
+A series holds x(t + h) = c0 + c1 h + c2 h² + … at many times t. Sums, products, sines, cosines and directions are exact
+to the last coefficient, so that a formula of time has every derivative. Source: Griewank and Walther, "Evaluating
+Derivatives" (2008), chapter 13.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from colibri.common.types import Array
 
 
 class TaylorSeries:
-    """A quantity and its derivatives with respect to time.
+    """A quantity and its time derivatives.
 
     Attributes:
         coefficients: Taylor coefficients, lowest order first, (order + 1, n).
@@ -25,7 +25,6 @@ class TaylorSeries:
     __slots__ = ("coefficients",)
 
     def __init__(self, coefficients: Array) -> None:
-        """Wrap Taylor coefficients, (order + 1, n)."""
         self.coefficients = coefficients
 
     @classmethod
@@ -37,17 +36,17 @@ class TaylorSeries:
         return cls(coefficients)
 
     def derivative(self, order: int) -> Array:
-        """Return the derivative of that order, (n,); order 0 is the value."""
+        """Return the derivative of an order, (n,); order 0 is the value."""
         derivative: Array = factorial(order) * self.coefficients[order]
         return derivative
 
     def rate(self) -> "TaylorSeries":
-        """Return the series of the derivative with respect to time, of one order less."""
+        """Return the series of the time derivative, one order shorter."""
         orders = np.arange(1.0, len(self.coefficients))
         return TaylorSeries(orders[:, None] * self.coefficients[1:])
 
     def padded_rate(self) -> "TaylorSeries":
-        """Return the series of the derivative with respect to time, its highest coefficient unknown and left at 0."""
+        """Return the series of the time derivative, with 0 for its unknown highest coefficient."""
         return TaylorSeries(np.concatenate([self.rate().coefficients, np.zeros_like(self.coefficients[:1])]))
 
     def __add__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
@@ -90,12 +89,12 @@ class TaylorSeries:
 
 
 def held(t: TaylorSeries, value: TaylorSeries | float) -> TaylorSeries:
-    """Return a number as a series at the times of `t` that it stays the same at; a series as it is."""
+    """Return a constant as a series at the times of `t`; a series as it is."""
     return value if isinstance(value, TaylorSeries) else 0.0 * t + value
 
 
 def in_series(formula: Callable[[TaylorSeries], Any]) -> Callable[[TaylorSeries], Any]:
-    """Return a formula of time whose value, or values, are series; where it gives a number, that does not change."""
+    """Wrap a formula of time so that constants become series."""
 
     def series(t: TaylorSeries) -> Any:
         value = formula(t)
@@ -105,19 +104,17 @@ def in_series(formula: Callable[[TaylorSeries], Any]) -> Callable[[TaylorSeries]
 
 
 def sin(x: TaylorSeries) -> TaylorSeries:
-    """Return the sine of a series in rad."""
     return _sin_cos(x)[0]
 
 
 def cos(x: TaylorSeries) -> TaylorSeries:
-    """Return the cosine of a series in rad."""
     return _sin_cos(x)[1]
 
 
 def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
-    """Return the direction of (x, y), rad, in (-π, π]; where x = y = 0 it has none, and every coefficient is 0.
+    """Return the direction of (x, y), rad, in (-π, π]; at x = y = 0 every coefficient is 0.
 
-    From (x² + y²) θ' = x y' - y x', solved for one coefficient of θ after another.
+    Solves (x² + y²) θ' = x y' - y x' for the coefficients of θ in turn.
     """
     squared = (x * x + y * y).coefficients
     turning = (x * y.padded_rate() - y * x.padded_rate()).coefficients
@@ -131,7 +128,7 @@ def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
 
 
 def _sin_cos(x: TaylorSeries) -> tuple[TaylorSeries, TaylorSeries]:
-    """Both together, from s' = c x' and c' = -s x'."""
+    """Compute both from s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
     s[0], c[0] = elementwise.sin(a[0]), elementwise.cos(a[0])

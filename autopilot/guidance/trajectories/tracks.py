@@ -1,4 +1,4 @@
-"""The tracks: position and yaw as formulas of time, from which every derivative follows."""
+"""The tracks: position and yaw as formulas of time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,19 +32,19 @@ _TURNS_PER_S = 0.025
 _CLIMB_M_S = 0.03
 _START_HEIGHT_M = 2.0
 _INSTANT_S = 1e-9
-"""Times are whole microseconds: what differs by less than this is rounding."""
+"""Tolerance of rounding: times are whole microseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where to be and which way to look, as formulas of time.
+    """Position and yaw as formulas of time.
 
     Attributes:
         position: Time in s -> x, y, z in m, ENU.
-        yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; None to look along the horizontal
-            velocity. A track without end must have it, so that its yaw at any time follows from that time alone.
-        duration_s: Afterwards it rests at its last point; infinite for a track without end.
-        waypoints: That it leads through, if it may be changed between them.
+        yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; None: along the horizontal velocity.
+            Endless tracks require it, so that yaw depends only on time.
+        duration_s: Afterwards the track rests at its last point; infinite for an endless track.
+        waypoints: Waypoints of a track that may be changed in between.
     """
 
     position: Callable[[TaylorSeries], Place]
@@ -53,47 +53,42 @@ class Track:
     waypoints: Waypoints | None = None
 
     def __post_init__(self) -> None:
-        """Check that its yaw is known at any time."""
+        """Require a yaw formula of an endless track."""
         if self.yaw is None and self.duration_s == inf:
             raise ValueError("a track without end needs a formula for its yaw")
 
     def clock(self, t: Array, order: int) -> TaylorSeries:
-        """Return the time that the formulas are given at `t` (n,), s: it stands still once the track has ended."""
+        """Return the argument of the formulas at `t` (n,), s: it stops at the end of the track."""
         ended = self.ended(t)
         time = TaylorSeries.time(np.where(ended, self.duration_s, t), order)
         time.coefficients[1:2, ended] = 0.0
         return time
 
     def ended(self, t: Array) -> NDArray[np.bool_]:
-        """Tell at which of the times `t` (n,), s, the track has ended."""
+        """Return at which times `t` (n,), s, the track has ended."""
         ended: NDArray[np.bool_] = t > self.duration_s + _INSTANT_S
         return ended
 
 
 def spiral(t: TaylorSeries) -> Place:
-    """Climb on a circle."""
     alpha = _alpha(t)
     return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), _climb(t)
 
 
 def expanding_spiral(t: TaylorSeries) -> Place:
-    """Climb on a circle that widens by 0.2 m/s."""
     alpha, radius = _alpha(t), _RADIUS_M * 0.1 * t + _RADIUS_M
     return radius * cos(alpha), radius * sin(alpha), _climb(t)
 
 
 def line(t: TaylorSeries) -> Place:
-    """Climb along a straight line."""
     return 0.1 * t + 1.0, 0.1 * t - 2.0, _climb(t)
 
 
 def wave(t: TaylorSeries) -> Place:
-    """Swing in x while flying along y at 2 m/s."""
     return _RADIUS_M * cos(_alpha(t)), 2.0 * t, _climb(t)
 
 
 def crown(t: TaylorSeries) -> Place:
-    """Circle while the height swings by 1.5 m."""
     alpha = _alpha(t)
     return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), 1.5 * sin(t) + _START_HEIGHT_M
 
@@ -108,10 +103,10 @@ THESIS_TRACKS: dict[str, Track] = {
 
 
 class TrackOptions(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The options of a track, each a field with its range and default; lengths in m, times in s, angles in degrees.
+    """Options of a track, each a field with range and default; lengths in m, times in s, angles in degrees.
 
     Attributes:
-        lone: The option that a value without a key is for.
+        lone: Option that a value without a key sets.
     """
 
     lone: ClassVar[str | None] = None
@@ -130,7 +125,6 @@ class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True)
     yaw: Angle = 0.0
 
     def track(self) -> Track:
-        """Return the track."""
         return Track(lambda t: (held(t, self.x), held(t, self.y), held(t, self.height)), self._yaw, inf)
 
     def _yaw(self, t: TaylorSeries) -> TaylorSeries:
@@ -138,7 +132,7 @@ class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly a figure of eight around the origin: Gerono's lemniscate, x = size sin ωt, y = size sin ωt cos ωt."""
+    """Gerono's lemniscate around the origin: x = size sin ωt, y = size sin ωt cos ωt."""
 
     size: Length = 4.0
     height: Coordinate = 3.0
@@ -146,7 +140,6 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
     yaw: YawChoice = "path"
 
     def track(self) -> Track:
-        """Return the track."""
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
     def _position(self, t: TaylorSeries) -> Place:
@@ -155,7 +148,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
         return x, x * cos(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
-        """Yaw along (cos α, cos 2α): seen from -90°, it never turns as far as 180° to either side, so never wraps."""
+        """Yaw along (cos α, cos 2α): relative to -90° it stays within ±180°, so it never wraps."""
         alpha = self._alpha(t)
         return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
 
@@ -164,7 +157,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly round the origin, counter-clockwise from the east."""
+    """Circle around the origin, counter-clockwise from the east."""
 
     radius: Length = 2.0
     speed: Speed = 2.0
@@ -172,7 +165,6 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
     yaw: YawChoice = "path"
 
     def track(self) -> Track:
-        """Return the track."""
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
     def _position(self, t: TaylorSeries) -> Place:
@@ -187,18 +179,17 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class FileOptions(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The options of a track that is read from a file."""
+    """Options of a track from a file."""
 
     lone: ClassVar[str | None] = "file"
 
     file: str
 
     def track(self) -> Track:
-        """Return the track of the file."""
         return self.track_of(None)
 
     def track_of(self, text: str | None) -> Track:
-        """Return the track of what is in the file; `text` stands for what is in it now.
+        """Return the track; `text` replaces the content of the file.
 
         Raises:
             TrackFileError: It cannot be flown.
@@ -207,21 +198,19 @@ class FileOptions(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class WaypointFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly through the points of a CSV file with the least snap, or as fast as a vehicle can."""
+    """Fly through the points of a CSV file with minimum snap, or as fast as possible."""
 
     speed: Speed | Literal["max"] | None = None
     margin: Annotated[float, msgspec.Meta(ge=0.0, le=0.4)] | None = None
 
     def track_of(self, text: str | None) -> Track:
-        """Return the track, before a vehicle is known."""
         return through(read_waypoints(Path(self.file), self.speed, self.margin, text))
 
 
 class SamplesFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly what a CSV file has samples of, as it is."""
+    """Fly the samples of a CSV file unchanged."""
 
     def track_of(self, text: str | None) -> Track:
-        """Return the track."""
         return sampled(read_samples(Path(self.file), text))
 
 
@@ -235,10 +224,10 @@ OPTIONS: dict[str, type[TrackOptions]] = {
 
 
 def through(waypoints: Waypoints, heights: Array | None = None, between: Array | None = None) -> Track:
-    """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw.
+    """Return the minimum-snap track through waypoints, with minimum yaw acceleration if they have yaw.
 
-    Besides, its height passes `heights`, (n, 2), n >= 1, times, s, and heights, m; and the track passes `between`,
-    (n, 4), times, s, and points, m, ENU.
+    Its height also passes `heights`, (n, 2), n >= 1: times, s, and heights, m; the track also passes `between`, (n, 4):
+    times, s, and points, m, ENU.
     """
     from colibri.autopilot.guidance.trajectories.minimum_snap import SNAP, minimise  # slow to load: most do without
 
@@ -259,7 +248,7 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
 
 
 def sampled(samples: Samples) -> Track:
-    """Return the track through samples, of the fifth degree in between: its acceleration is continuous."""
+    """Return the track through samples by quintic interpolation, with continuous acceleration."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import interpolate
 
     places = interpolate(samples.times_s, samples.motion_enu)
@@ -289,7 +278,7 @@ def _in_time(rows: Array, others: Array | None) -> Array:
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
-    """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU; at rest after its end."""
+    """Return a derivative of the position, (n, 3), in m / s^derivative, ENU; at rest after the end."""
     time = track.clock(np.asarray(t, dtype=np.float64), derivative)
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 

@@ -1,4 +1,4 @@
-"""Waypoints from a file: where to be, when, and which way to look; read strictly from CSV."""
+"""Waypoints with times and yaw, read strictly from CSV."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
 MARGIN = 0.1
-"""Part of each range that a path may leave to the control law, to come back to the path, also in wind."""
+"""Part of each range reserved for the control law, also against wind."""
 MIN_LEG_S = 0.05
 
 _REQUIRED = ("x", "y", "z")
@@ -20,15 +20,15 @@ _OPTIONAL = ("t", "yaw")
 
 @dataclass(frozen=True, slots=True)
 class Waypoints:
-    """Where to be and when.
+    """Waypoints with times.
 
     Attributes:
         times_s: Strictly increasing from 0, s, (n,), n >= 2.
         points_enu_m: (n, 3), m, ENU.
-        yaw_rad: Unwrapped the shorter way round, (n,), rad; None to look along the path.
-        timed: Whether the file says when; else the times may be changed.
-        fastest: Whether they are to be flown as fast as can be.
-        margin: Part of each of the vehicle's ranges that is left to the control law where the times are changed.
+        yaw_rad: Unwrapped, rad, (n,); None: along the path.
+        timed: Whether the file prescribes the times.
+        fastest: Whether to fly as fast as possible.
+        margin: Part of each range reserved for the control law where times are changed.
     """
 
     path: Path
@@ -40,19 +40,17 @@ class Waypoints:
     margin: float = MARGIN
 
     def stretched(self, factors: Array) -> "Waypoints":
-        """Return the same with each leg so many times as long, (n - 1,)."""
+        """Scale each leg's duration, (n - 1,)."""
         return self.at(np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
 
     def at(self, times_s: Array) -> "Waypoints":
-        """Return the same at other times, s, (n,)."""
         return replace(self, times_s=times_s)
 
     def leg_at(self, t: float) -> int:
-        """Return the number of the leg at a time, s, from 0 on."""
+        """Return the leg at a time, s, from 0 on."""
         return int(np.searchsorted(self.times_s[1:-1], t, side="right"))
 
     def error(self, what: str) -> TrackFileError:
-        """Return why they cannot be flown."""
         return TrackFileError(f"{self.path}: {what}")
 
 
@@ -62,13 +60,13 @@ def read_waypoints(
     margin: float | None = None,
     text: str | None = None,
 ) -> Waypoints:
-    """Read a CSV file, or its `text`, with a header of x, y, z (m, ENU), and if wanted t (s) and yaw (degrees).
+    """Read a CSV file, or its `text`, with columns x, y, z (m, ENU), and optionally t (s) and yaw (degrees).
 
-    Without `t`, the legs are flown at `speed_m_s` on average, 2 m/s if it is None, or "max" until a vehicle is known;
-    the first and the last, which begin and end at rest, at half of it.
+    Without `t`, legs are flown at an average of `speed_m_s`, by default 2 m/s, or "max" until a vehicle is known; the
+    first and last, from and to rest, at half of it.
 
     Raises:
-        TrackFileError: The file cannot be read, or not be flown.
+        TrackFileError: The file cannot be read or flown.
     """
     table = read_table(path, _REQUIRED, _OPTIONAL, text)
     points, timed = table.matrix(_REQUIRED), "t" in table.values
@@ -82,7 +80,7 @@ def read_waypoints(
 
 
 def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:
-    """Return when to be at points, s, (n,), at a speed on average, and half of it on the first and the last leg."""
+    """Return times at points, s, (n,), at an average speed, and half of it on the first and last leg."""
     legs_s = _legs(points_enu_m, speed_m_s)
     legs_s[[0, -1]] *= 2.0
     return np.concatenate([[0.0], np.cumsum(legs_s)])

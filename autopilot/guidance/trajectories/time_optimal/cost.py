@@ -1,9 +1,8 @@
-"""What a flight through points costs: its duration, and what it asks for beyond a vehicle's limits; with the gradient.
+"""Cost of a flight through points: duration plus penalty on exceeded limits, with its gradient.
 
-The flight is the one of least snap through the points. So its variables are few, times and points, and whatever they
-are, it is smooth. Source: Z. Wang, X. Zhou, C. Xu and F. Gao, "Geometrically constrained trajectory optimization for
-multicopters", IEEE Transactions on Robotics 38 (2022): the penalty, the durations without bounds and the gradient by
-the adjoint. How a demand changes with the motion is found by differences, so that its formula stands in `reach` alone.
+Source: Z. Wang, X. Zhou, C. Xu and F. Gao, "Geometrically constrained trajectory optimization for multicopters", IEEE
+Transactions on Robotics 38 (2022): few variables (times and points of a minimum-snap path), penalty, unbounded
+durations, adjoint gradient. Derivatives of the demands are by differences, so that their formulas stay in `reach`.
 """
 
 from math import factorial, inf
@@ -24,26 +23,25 @@ from colibri.common.matrices import matmul
 from colibri.common.types import Array
 
 _INTERVALS = 16
-"""Of each piece, at whose ends it is looked at."""
+"""Sampling intervals of a piece."""
 _STEPS = (1e-6, 1e-6, 1e-5, 1e-4)
-"""Of velocity, acceleration, jerk and snap, for the differences."""
+"""Difference steps of velocity, acceleration, jerk and snap."""
 _ORDERS = np.tile(np.arange(float(SNAP)), 2)
 
 
 class FlightCost:
-    """Duration of a flight, s, and penalty, as a function of its leg times and of the points that it may choose.
+    """Duration of a flight, s, plus penalty, as a function of leg times and free points.
 
     Attributes:
-        weight: Of the penalty: the square of what is beyond a limit, in parts of its range (m below the floor),
-            integrated over time.
-        charge_ah: Taken from the battery when it must still do what is asked for.
-        floor_m: Below which it must not lead, m, ENU.
+        weight: Weight of the penalty: squared excess in parts of its range (m below the floor), integrated over time.
+        charge_ah: Charge taken from the battery before.
+        floor_m: Lowest height, m, ENU.
     """
 
     def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
-        """`given` are the waypoints, (legs + 1, 3), m, ENU, each leg cut into `pieces` of equal durations.
+        """`given` are waypoints, (legs + 1, 3), m, ENU; each leg has `pieces` of equal duration.
 
-        The part `margin` of each range is left to the control law.
+        The part `margin` of each range is reserved for the control law.
         """
         self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
         self._reach, self._given, self._pieces = reach, given, pieces
@@ -54,12 +52,12 @@ class FlightCost:
         self._share[[0, -1]] *= 0.5
 
     def variables(self, legs_s: Array, points: Array) -> Array:
-        """Return leg times, s, (legs,), and all points, (legs pieces + 1, 3), as variables without bounds."""
+        """Convert leg times, s, (legs,), and all points, (legs pieces + 1, 3), to unbounded variables."""
         chosen = np.arange(len(points)) % self._pieces > 0
         return np.concatenate([_root(legs_s), points[chosen].ravel()])
 
     def flight(self, x: Array) -> tuple[Array, Array]:
-        """Return leg times and points of variables."""
+        """Convert variables to leg times and points."""
         legs = len(self._given) - 1
         points = np.empty((legs * self._pieces + 1, 3))
         chosen = np.arange(len(points)) % self._pieces > 0
@@ -90,7 +88,7 @@ class FlightCost:
         return float((durations * (1.0 + penalty)).sum()), gradient
 
     def _penalty(self, motion: Array) -> tuple[Array, Array]:
-        """Return the penalty of each sample, (samples, pieces), and its slope, (derivatives, samples, pieces, 3)."""
+        """Return the penalty, (samples, pieces), and its slope, (derivatives, samples, pieces, 3)."""
         slope = np.zeros_like(motion)
         low = np.maximum(self.floor_m - motion[0, :, :, 2], 0.0)
         slope[0, :, :, 2] = -2.0 * low
@@ -105,7 +103,7 @@ class FlightCost:
         return low * low + (excess * excess).sum(axis=0).reshape(low.shape), slope
 
     def _slope(self, states: Array, beyond: Array, excess: Array) -> Array:
-        """Return the slope of the squared excess (demands, n) with velocity, acceleration, jerk, snap: (4, n, 3)."""
+        """Return the slope of the squared excess (demands, n) with velocity to snap, (4, n, 3)."""
         moved = np.repeat(states[:, None], 3 * SNAP, axis=1)
         slope = np.empty_like(states)
         for order, step in enumerate(_STEPS):
@@ -118,18 +116,13 @@ class FlightCost:
         return slope
 
     def _beyond(self, states: Array) -> Array:
-        """Return by how much each limit is exceeded, (demands, n), by velocity to snap, (4, n, 3)."""
+        """Return the excess over each limit, (demands, n), for velocity to snap, (4, n, 3)."""
         demands = self._reach.demands(Motion(*states), self.charge_ah)
         return np.stack([demand.beyond(self._margin) for demand in demands])
 
 
 class _Slopes:
-    """Slopes of a cost with the durations and the points of a path of least snap, as it yields to forces at its knots.
-
-    Attributes:
-        of_durations: (pieces,).
-        of_points: (pieces + 1, 3).
-    """
+    """Slopes of a cost with durations, (pieces,), and points, (pieces + 1, 3), of a minimum-snap path."""
 
     def __init__(self, forms: Array, ends: Array, durations: Array) -> None:
         """`ends` are the derivatives at both ends of each piece, (pieces, 8, 3)."""
@@ -138,9 +131,9 @@ class _Slopes:
         self.of_points = np.zeros((len(durations) + 1, 3))
 
     def add(self, forces: Array) -> None:
-        """Add those of a cost that changes by `forces` with the derivatives at the ends of the pieces, (pieces, 8, 3).
+        """Add a cost whose slope with the end derivatives is `forces`, (pieces, 8, 3).
 
-        With durations as powers d^order of derivatives of that order; inner derivatives answer by the adjoint.
+        Durations enter as powers d^order; inner derivatives respond by the adjoint.
         """
         at_knots = _at_knots(forces)
         answer = np.zeros((*at_knots.shape[:2], 3))
@@ -154,14 +147,14 @@ class _Slopes:
         self.of_points += (at_knots - _at_knots(reaction))[:, 0]
 
     def _applied(self, ends: Array) -> Array:
-        """Return the product of each element with derivatives at its ends, (pieces, 8, 3)."""
+        """Multiply each element by end derivatives, (pieces, 8, 3)."""
         forms = self._forms.reshape(-1, 2 * SNAP, 2 * SNAP)
         applied: Array = (forms[:, :, :, None] * ends[:, None]).sum(axis=2)
         return applied
 
 
 def _sampling() -> Array:
-    """Return position to snap of a piece, in its own time, from the derivatives at its ends, (5 samples, 8)."""
+    """Return the matrix from end derivatives to samples of position to snap, in own time, (5 samples, 8)."""
     tau = np.arange(_INTERVALS + 1.0) / _INTERVALS
     rows = np.zeros((SNAP + 1, len(tau), 2 * SNAP))
     for order in range(SNAP + 1):
@@ -173,12 +166,12 @@ def _sampling() -> Array:
 
 
 def _at_ends(knots: Array) -> Array:
-    """Return what is at the ends of each piece, (pieces, 8, 3), of what is at the knots, (pieces + 1, 4, 3)."""
+    """Convert knots, (pieces + 1, 4, 3), to piece ends, (pieces, 8, 3)."""
     return np.concatenate([knots[:-1], knots[1:]], axis=1)
 
 
 def _at_knots(ends: Array) -> Array:
-    """Return the sums at the knots, (pieces + 1, 4, 3), of what is at the ends of each piece, (pieces, 8, 3)."""
+    """Sum piece ends, (pieces, 8, 3), at the knots, (pieces + 1, 4, 3)."""
     knots = np.zeros((len(ends) + 1, SNAP, 3))
     knots[:-1] += ends[:, :SNAP]
     knots[1:] += ends[:, SNAP:]
@@ -192,7 +185,7 @@ def _total(values: Array, pieces_axis: int) -> Array:
 
 
 def _duration(root: Array) -> tuple[Array, Array]:
-    """Return durations, s, always positive, and their slopes; 1 s at 0."""
+    """Return positive durations, s, and their slopes; 1 s at 0."""
     below = 1.0 / ((0.5 * np.minimum(root, 0.0) - 1.0) * np.minimum(root, 0.0) + 1.0)
     above = (0.5 * np.maximum(root, 0.0) + 1.0) * np.maximum(root, 0.0)
     longer = root > 0.0

@@ -1,8 +1,7 @@
-"""The fastest flight through waypoints that a vehicle's limits allow: optimised leg times, and points in between.
+"""The fastest flight through waypoints: optimised leg times, and free points in between.
 
-First the leg times alone, the path being that of least snap; then each leg is cut into halves again and again, so that
-points in between may be chosen too. Each stage begins with the flight of the one before, its penalty light at first.
-What the penalty leaves beyond the limits is taken off in the end: all is flown slower by as much.
+First only the leg times are optimised; then legs are halved repeatedly and the new points are optimised too. Each stage
+starts from the previous one with a light penalty. At the end, the flight is slowed down until all limits hold.
 """
 
 from math import inf
@@ -19,23 +18,23 @@ from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.types import Array
 
 _PIECES, _LEAST_PIECES, _MOST_PIECES = 4, 16, 1024
-"""Of a leg, and of all legs: where there are few legs they are cut into more, where there are many into fewer."""
+"""Pieces of a leg, and bounds on the pieces of all legs."""
 _WEIGHTS = (1e2, 1e4)
-"""Of the penalty, one after another."""
+"""Successive weights of the penalty."""
 _ITERATIONS = 150
 _TOLERANCE = 1e-4
 _CLEARANCE_M = 0.01
-"""Above the floor, aimed at; more by what is found below it."""
+"""Above the floor; increased by dips found."""
 _LIFTS = 10
 _SLOWER = (0.0005, 0.05)
-"""In one pass."""
+"""Bounds of the slow-down in one pass."""
 
 
 def fastest(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
-    """Return the fastest track through waypoints that is found, and in words what it is.
+    """Return the fastest track found through waypoints, and its description.
 
     Raises:
-        TrackFileError: A waypoint is below the floor, or there is no such track.
+        TrackFileError: A waypoint is below the floor, or the search fails.
     """
     check_heights(waypoints, floor_m)
     legs_s, points, pieces = np.diff(waypoints.times_s), waypoints.points_enu_m, 1
@@ -57,7 +56,7 @@ def _wanted_pieces(legs: int) -> int:
 
 
 def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array, points: Array) -> tuple[Array, Array]:
-    """Return better leg times and points, of as many pieces; the battery's state is that of the flight before."""
+    """Return better leg times and points; the battery's state is that of the previous flight."""
     pieces = (len(points) - 1) // len(legs_s)
     cost = FlightCost(reach, waypoints.points_enu_m, pieces, waypoints.margin)
     cost.floor_m = floor_m + _CLEARANCE_M if pieces > 1 else -inf
@@ -77,14 +76,14 @@ def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array
 
 
 def _halved(track: Track, legs_s: Array, pieces: int, floor_m: float) -> Array:
-    """Return the points of a track between as many pieces of each leg, above the floor."""
+    """Return a track's points at finer pieces, above the floor."""
     points = position(track, _knots(legs_s, pieces))
     points[:, 2] = np.maximum(points[:, 2], floor_m)
     return points
 
 
 def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) -> tuple[Track, str]:
-    """Return the track, slower by what it is beyond the limits, and what it is."""
+    """Slow the track down to the limits; return it with its description."""
     while True:
         track = _track(waypoints, legs_s, points)
         motion = exact_motion(track)

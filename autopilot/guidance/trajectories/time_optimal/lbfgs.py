@@ -1,8 +1,8 @@
-"""Minimisation of a smooth function of many variables by its gradient: the limited-memory BFGS method.
+"""Minimisation by limited-memory BFGS.
 
 Sources: J. Nocedal and S. J. Wright, "Numerical Optimization" (2006), algorithm 7.4 for the direction; A. S. Lewis and
-M. L. Overton, "Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6 for the line search: penalties
-have kinks in their second derivative. SciPy's code does its sums by BLAS, whose bits depend on the CPU.
+M. L. Overton, "Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6 for the line search, because
+penalties have kinks. SciPy's sums are by BLAS, with bits that depend on the CPU.
 """
 
 from collections import deque
@@ -29,7 +29,7 @@ class _Point(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """A step, the change of the gradient over it, and their product."""
+    """A step, the change of the gradient, and their product."""
 
     step: Array
     change: Array
@@ -37,9 +37,9 @@ class _Pair(NamedTuple):
 
 
 def minimise(function: Function, x: Array, iterations: int, tolerance: float) -> Array:
-    """Return where a function, given with its gradient, is least, (n,), as far as so many iterations lead.
+    """Return a minimum, (n,), after at most `iterations`.
 
-    It ends when as many iterations as are remembered bring less than `tolerance` of the value.
+    Stops when the remembered iterations improve less than `tolerance` of the value.
     """
     point = _Point(x, *function(x))
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
@@ -66,7 +66,7 @@ def _first(point: _Point) -> float:
 
 
 def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
-    """Two loops over the pairs."""
+    """Two-loop recursion."""
     direction, weights = -gradient, []
     for step, change, product in reversed(pairs):
         weights.append(dot(step, direction) / product)
@@ -80,7 +80,7 @@ def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
 
 
 def _searched(function: Function, start: _Point, direction: Array, length: float) -> _Point | None:
-    """Return a point along a direction that meets the weak Wolfe conditions, by bisection; None if none is found."""
+    """Bisect along a direction for the weak Wolfe conditions; return the best point found."""
     slope = dot(start.gradient, direction)
     low, high, best = 0.0, inf, None
     for _ in range(_TRIALS if slope < 0.0 else 0):
