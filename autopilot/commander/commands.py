@@ -45,7 +45,6 @@ class Commands:
         }
 
     def select(self, mode: Mode | None) -> Refusal | None:
-        """Select a mode; None stands for a mode that this vehicle does not have."""
         if mode is None:
             return Refusal("this vehicle has no such mode", UNSUPPORTED)
         return self._pilot.select(mode, self._needs.missing())

@@ -1,4 +1,4 @@
-"""The uploaded geofence and the fence around home set by parameters."""
+"""The uploaded geofence and the fence around home."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Home position and the geodetic origin of the ENU frame."""
+"""Home and the geodetic origin."""
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
@@ -10,12 +10,7 @@ _UNCERTAIN_M = 0.5
 
 
 class Home:
-    """Home of one vehicle.
-
-    Attributes:
-        position_enu_m: Take-off place, or the chosen place, m.
-        chosen: Whether it was set by a command: take-off then keeps it.
-    """
+    """Home of one vehicle: the take-off place, unless `chosen` by a command."""
 
     def __init__(self, origin: Geodetic) -> None:
         self.origin = origin
@@ -27,7 +22,6 @@ class Home:
         self.position_enu_m, self.yaw_rad, self.chosen = position_enu_m, yaw_rad, True
 
     def propose(self, position_enu_m: Vector, yaw_rad: float) -> None:
-        """Set home to the take-off place, unless it was chosen."""
         if not self.chosen:
             self.position_enu_m, self.yaw_rad = position_enu_m, yaw_rad
 

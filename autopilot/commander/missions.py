@@ -1,4 +1,4 @@
-"""Missions in flight: the uploaded plans, and the task that flies a mission."""
+"""Uploaded plans, and the task that flies a mission."""
 
 from collections.abc import Mapping, Sequence
 
@@ -23,11 +23,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Missions:
-    """The mission of one vehicle, checked against its fence.
-
-    Attributes:
-        changes: Number of plan uploads.
-    """
+    """The mission of one vehicle, checked against its fence; `changes` counts uploads."""
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
         self._home = home
@@ -56,7 +52,6 @@ class Missions:
         self._fence.adopt(behaviour)
 
     def progress(self) -> Progress:
-        """Return the progress; the same object until it changes."""
         return self._executor.progress
 
     def load(self, plan_type: int, plan: Plan) -> None:
@@ -71,7 +66,6 @@ class Missions:
         self._check_mission()
 
     def set_current(self, seq: int, reset: bool) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` resets the jump counters."""
         return self._executor.set_current(seq, reset)
 
     def moved_origin(self) -> None:
@@ -79,12 +73,11 @@ class Missions:
         self._check_mission()
 
     def task(self) -> "MissionTask":
-        """Start the mission at the current item."""
         self._executor.start()
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
-        """Continue a mission after a restart; `turns` and `legs` are the progress of the current item."""
+        """Continue the current item after a restart."""
         behaviour = self._behaviour
         self._executor.adopt(
             Defaults(max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m)
@@ -95,14 +88,12 @@ class Missions:
         return self._executor.record()
 
     def resume(self, plans: Mapping[int, Plan], record: MissionRecord | None) -> None:
-        """Restore the plans and the progress; without a record, start at the first item."""
         self._fence.load(plans[FENCE].items)
         self._executor.load(plans[MISSION].items)
         if record is not None:
             self._executor.resume(record)
 
     def watch_mode(self, mode: Mode) -> None:
-        """Pause the mission when another mode flies."""
         if self._executor.active and mode is not Mode.MISSION:
             for event in self._executor.pause(item_flown=mode is Mode.RETURN):
                 if isinstance(event, Reached):
@@ -132,7 +123,7 @@ class Missions:
         )
 
     def _check_mission(self) -> None:
-        """Warn of items outside the fence or below the ground; the legs between items are not checked."""
+        """Warn of items outside the fence or below the ground; legs between items are not checked."""
         home, items, said = self._home, self._executor.items, (self._outside, self._below)
         found = list(places(items, home.position_enu_m, home.origin))
         outside = ((seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place)))
@@ -148,16 +139,11 @@ class Missions:
 
 
 class MissionTask:
-    """Flies the executor's orders one by one.
-
-    Attributes:
-        returns: Whether the mission ends with mode return.
-    """
+    """Flies the executor's orders; `returns` if the mission ends with mode return."""
 
     def __init__(
         self, executor: MissionExecutor, missions: Missions, turns: float = 0.0, legs: tuple[int, ...] = ()
     ) -> None:
-        """Start with the current item, with its `turns` and remaining `legs` from before a restart."""
         self._executor = executor
         self._missions = missions
         self._order: Order | None = None
@@ -188,12 +174,10 @@ class MissionTask:
 
     @property
     def turns(self) -> float:
-        """Turns flown on the order's circle."""
         return self._turns_before + (self._task.turns if isinstance(self._task, OrbitTask) else 0.0)
 
     @property
     def legs(self) -> tuple[int, ...]:
-        """Remaining legs of the current order."""
         return self._task.left if isinstance(self._task, TaskSequence) else ()
 
     def arrived(self, context: TaskContext) -> bool:
@@ -202,7 +186,7 @@ class MissionTask:
 
 
 def task_of(order: Order, context: TaskContext, takeoff_speed_m_s: float | None = None) -> FlightTask:
-    """Return the task of an order; without `takeoff_speed_m_s`, take-off climbs at the usual climb speed."""
+    """Return the task of an order; take-off defaults to the climb speed."""
     match order:
         case GoTo():
             return GoToTask(order, context)

@@ -37,14 +37,7 @@ TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 
 
 class TaskRecord(NamedTuple):
-    """State of a flight task as plain data, for the checkpoint.
-
-    Attributes:
-        order: Order that restarts the task; None if the mode determines the task.
-        began_us: Start of the current track; None for other tasks.
-        turns: Turns flown on the mission's circle.
-        legs: Remaining legs of a sequence.
-    """
+    """A task for the checkpoint: restarting order, track start, turns, and remaining legs."""
 
     order: OrderRecord | None = None
     began_us: int | None = None
@@ -87,7 +80,7 @@ class ModeTasks:
         references: References,
         first: Track | None,
     ) -> None:
-        """`attitude` is None for a control law without attitude setpoints; `first` is a track flown from time 0."""
+        """`attitude` is None without attitude setpoints; `first` is flown from time 0."""
         self._missions = missions
         self._attitude = attitude
         self._gravity_m_s2 = vehicle.gravity_m_s2
@@ -118,7 +111,6 @@ class ModeTasks:
         return start_yaw(self._first, self._references) if self._first else 0.0
 
     def forget_first(self) -> None:
-        """Drop the track of time 0: another mode has flown since."""
         self._first = None
 
     def adopt(self, vehicle: Vehicle) -> None:
@@ -128,7 +120,6 @@ class ModeTasks:
         return self._factories[mode](context)
 
     def again(self, record: TaskRecord, mode: Mode, context: TaskContext) -> FlightTask:
-        """Return the task that continues a mode after a restart."""
         if mode is Mode.TRACK and self._first is None and record.began_us is not None:
             chosen = track(context.behaviour.track)
             return TrackTask(self._plan(chosen), chosen.duration_s, record.began_us)

@@ -33,13 +33,11 @@ _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_AL
 
 
 class Needs(Protocol):
-    """Checks which needs of modes are met."""
+    """Unmet needs of modes."""
 
     def missing(self) -> tuple[Need, ...]: ...
 
-    def engage(self, peer: Peer, now_us: int) -> None:
-        """Make `peer` the steering client because it requests a steered mode."""
-        ...
+    def engage(self, peer: Peer, now_us: int) -> None: ...
 
 
 class MotionCommands:
@@ -60,7 +58,7 @@ class MotionCommands:
         }
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
-        """Fly to a place on earth; DroneKit requests this by a mission item outside a mission."""
+        """Fly to a place; DroneKit uses a mission item for it."""
         return self._go(latitude_deg, longitude_deg, altitude_m, frame, nan, nan)
 
     def may_fly_at(self, speed_m_s: float) -> bool:
@@ -76,7 +74,6 @@ class MotionCommands:
         return self._pilot.fly(mode, task, self._needs.missing())
 
     def _take_off(self, command: Command) -> Refusal | None:
-        """Climb to z, or to the parameter's height."""
         pilot = self._pilot
         height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
@@ -91,12 +88,12 @@ class MotionCommands:
         return self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
 
     def _height_of_takeoff(self, command: Command) -> float:
-        """Return the height, m, ENU: z is above home, but above sea level from QGC, which sends a pitch of -1."""
+        """Return z of ENU, m: above home, but above sea level from QGC, which sends a pitch of -1."""
         above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
         return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
 
     def _reposition(self, command: Command) -> Refusal | None:
-        """Fly to a place, or stop if all coordinates are nan. The mode-change flag is not required."""
+        """Fly to a place, or stop if all are nan; the mode-change flag is optional."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return denied("reposition", f"a flag of {command.p2:g} is not known")
         if not (isnan(command.p4) or abs(command.p4) <= MAX_YAW_RAD):
@@ -167,7 +164,7 @@ class MotionCommands:
         return self._home.refusal(z) or next(filter(None, map(self.unreachable, around)), None)
 
     def _turn(self, command: Command) -> Refusal | None:
-        """Turn on the spot; the angle is clockwise from north, or relative to the heading if p4 is 1."""
+        """Turn clockwise from north, or from the heading if p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):
             return denied("turn", "not an angle and a direction")

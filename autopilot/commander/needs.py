@@ -1,4 +1,4 @@
-"""Which needs of flight modes are met, and the latest setpoints of clients."""
+"""Needs of flight modes, and the latest client inputs."""
 
 from typing import Protocol, TypeVar
 
@@ -14,19 +14,15 @@ _T = TypeVar("_T", covariant=True)
 
 
 class Latest(Protocol[_T]):
-    """A service that keeps the latest input of a client."""
+    """A service that keeps a client's latest input."""
 
-    def latest(self, now_us: int, timeout_us: int) -> _T | None:
-        """Return the latest input if it is at most `timeout_us` old."""
-        ...
+    def latest(self, now_us: int, timeout_us: int) -> _T | None: ...
 
-    def engage(self, peer: Peer, now_us: int) -> None:
-        """Accept the messages of `peer` from now on."""
-        ...
+    def engage(self, peer: Peer, now_us: int) -> None: ...
 
 
 class ModeNeeds:
-    """Checks the needs of modes for one pilot."""
+    """Needs of modes for one pilot."""
 
     def __init__(
         self,
@@ -44,11 +40,10 @@ class ModeNeeds:
         self._now_us = 0
 
     def at(self, now_us: int) -> None:
-        """Set the time of the next messages."""
         self._now_us = now_us
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Make `peer` the steering client because it requests a steered mode."""
+        """Make `peer` the steering client."""
         for service in (self._offboard, self._manual, self._follow):
             service.engage(peer, now_us)
 
@@ -68,7 +63,6 @@ class ModeNeeds:
         return tuple(need for need, there in met.items() if not there)
 
     def steered(self, now_us: int) -> Steered:
-        """Return the client inputs within their timeouts."""
         behaviour = self._pilot.behaviour
         return Steered(
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),

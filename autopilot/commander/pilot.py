@@ -1,4 +1,4 @@
-"""The pilot: modes, arming, take-off and landing; decides which references the control law follows."""
+"""The pilot: modes, arming, take-off, landing, and the references of the control law."""
 
 from collections.abc import Callable, Collection
 from typing import NamedTuple, TypeAlias
@@ -46,12 +46,9 @@ _ENDS = {Mode.TAKEOFF: Event.ARRIVED, Mode.MISSION: Event.FINISHED, Mode.TRACK: 
 
 
 class Sensed(NamedTuple):
-    """Inputs of a control sample.
+    """Inputs of a control sample; references are for `delay_us` later, when commands take effect.
 
     Attributes:
-        vehicle: None before the first state.
-        position_known: Whether the position is accurate enough to fly to places.
-        delay_us: Time until commands take effect: references are for that time.
         waited_us: Path time lost since the previous sample.
         path_speed: Rate of path time relative to the clock.
     """
@@ -66,7 +63,7 @@ class Sensed(NamedTuple):
 
 
 class PilotRecord(NamedTuple):
-    """State of a pilot for a restart, without the task: attributes of `Pilot` and its parts as plain data."""
+    """Attributes of `Pilot` and its parts for a restart, without the task."""
 
     state: State
     ground: GroundRecord
@@ -83,9 +80,9 @@ class Pilot:
     """State machine of mode, task and failsafe; each method is an event.
 
     Attributes:
-        lag_us: Lag of path time behind the clock.
-        speed_m_s: Cruise speed requested for this flight; None for the parameters'.
-        saving: The active failsafe, until a mode is selected or the rotors stop.
+        lag_us: Lag of path time.
+        speed_m_s: Requested cruise speed; None for the parameters'.
+        saving: Active failsafe, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
     """
 
@@ -111,9 +108,9 @@ class Pilot:
     def begin(
         self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False, delay_us: int = 0
     ) -> None:
-        """Start a flight with the first state: standing, or airborne in `mode` or hold.
+        """Start a flight, standing or airborne.
 
-        A vehicle estimated at rest (`rests`) counts as standing at any height: estimated heights are inexact.
+        A vehicle estimated at rest (`rests`) stands at any height, because estimated heights are inexact.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle, delay_us=delay_us)
         standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
@@ -142,10 +139,9 @@ class Pilot:
     def resume(
         self, now_us: int, vehicle: VehicleState, record: PilotRecord, again: TaskFactory, *, seamless: bool
     ) -> None:
-        """Restore the state after a restart; a vehicle that came down meanwhile stays on the ground.
+        """Restore the state after a restart; a vehicle that came down stays on the ground.
 
-        `again` creates the task that continues a mode. A `seamless` restart took no time: the recorded reference is
-        kept. Otherwise the reference starts from the vehicle.
+        A `seamless` restart took no time and keeps the reference.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
@@ -163,7 +159,6 @@ class Pilot:
         self._task_is_chosen = not came_down
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Apply new parameters; without landing on three rotors, no rotor counts as failed."""
         self.behaviour = behaviour
         if not behaviour.land_on_three:
             self.readiness.trust_rotors()
@@ -228,7 +223,6 @@ class Pilot:
         return self._stop_rotors(Event.DISARM, "rotors stopped" if standing else "rotors stopped in the air")
 
     def select(self, mode: Mode, missing: Collection[Need]) -> Refusal | None:
-        """Change the mode; `missing` are the unmet needs of modes."""
         if mode is self.state.mode and mode is not Mode.HOLD:
             return None
         refusal = self._follow(Event.SELECT, "", mode, missing)
@@ -238,7 +232,6 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
-        """Change to `mode` and fly `task`, now or once the rotors are armed."""
         refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
             self.saving = Action.NONE
@@ -246,7 +239,7 @@ class Pilot:
         return refusal
 
     def save(self, action: Action) -> None:
-        """Execute a failsafe's action, chosen and reported by the supervisor."""
+        """Execute a failsafe's action."""
         if not self.state.armed:
             return
         if action is Action.TERMINATE:
@@ -261,19 +254,17 @@ class Pilot:
         self.speed_m_s = speed_m_s
 
     def happened(self, event: Event) -> None:
-        """Change the mode when a task or mission item ends."""
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
     def touch_down(self) -> None:
-        """Register a landing that another detector reports, and stop the rotors."""
+        """Register a landing from another detector."""
         self.ground.land(self.sensed.now_us)
         self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 
     def step(self) -> Guidance:
-        """Return the references of this control sample."""
         if not self.state.armed:
             return self._rest()
         context = self.context()
@@ -331,7 +322,6 @@ class Pilot:
             self._task_is_chosen = False
 
     def _take(self, task: FlightTask) -> None:
-        """Start a task; a track picked up in mid-flight sets the reference."""
         self.task = task
         if isinstance(task, TrackTask) and task.start is not None:
             self.generator.set(task.start)
@@ -339,7 +329,6 @@ class Pilot:
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
-        """Apply an event to the state, and report `text` if the state changes."""
         only_lands = self.readiness.only_lands
         if event is Event.SELECT and self.state.armed and only_lands:
             return Refusal(f"{selected} refused: {only_lands}")

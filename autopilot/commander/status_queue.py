@@ -1,4 +1,4 @@
-"""Status texts for ground stations, queued until they are sent."""
+"""Queue of status texts."""
 
 
 class StatusQueue:
@@ -11,6 +11,5 @@ class StatusQueue:
         self._lines.append((severity, text))
 
     def take(self) -> list[tuple[int, str]]:
-        """Return the lines, and clear the queue."""
         lines, self._lines = self._lines, []
         return lines

@@ -1,4 +1,4 @@
-"""The supervisor: decides on failsafes by their table, and reports them."""
+"""The supervisor: decides and reports failsafes."""
 
 from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, position_known
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
@@ -17,11 +17,7 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
 
 
 class Supervisor:
-    """Supervisor of one vehicle.
-
-    Attributes:
-        memory: Holding conditions and the failsafes they began.
-    """
+    """Supervisor of one vehicle."""
 
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
         self._lines = lines
@@ -37,11 +33,10 @@ class Supervisor:
         self.memory = memory
 
     def position_known(self, estimate: Estimate | None) -> bool:
-        """Whether the position is accurate enough to fly to places; always without an `estimate`."""
         return position_known(estimate, self.limits)
 
     def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
-        """Return the action that begins at this sample, before the pilot's step; NONE to continue."""
+        """Return the action to begin, before the pilot's step."""
         since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
         self.memory, action, lines = following(self.memory, inputs.now_us, since_us, self._settings, flight)
         for severity, text in lines:
@@ -54,7 +49,6 @@ class Supervisor:
 
     @property
     def charge_state(self) -> int:
-        """MAV_BATTERY_CHARGE_STATE by the failsafes' conditions."""
         ok: int = mav.MAV_BATTERY_CHARGE_STATE_OK
         held = self.memory.held_us
         return next((state for condition, state in _CHARGE_STATES if condition in held), ok) if held else ok

@@ -1,15 +1,10 @@
-"""Detection of a sudden accelerometer bias from GPS velocity.
+"""Detection of a sudden accelerometer bias.
 
-A sudden bias b makes the filter's velocity run away: GPS velocity is rejected fix after fix, with innovations on a ramp
-y = y₀ - ∫R dt · b. b is fitted by least squares. A faulty or late receiver also makes ramps, so a second sensor must
-agree:
+A sudden bias b makes GPS velocity innovations a ramp y = y₀ - ∫R dt · b, rejected fix after fix; b is fitted by least
+squares. A faulty receiver also makes ramps, so a second sensor must agree: across the body, the accelerometer itself,
+because thrust is along z; along body z, the barometer against the integrated velocity.
 
-- across the body, the accelerometer itself: thrust is along z, so the mean lateral specific force must have changed by
-  b;
-- along body z, the barometer: its height minus the integral of the filter's velocity must follow the ramp's integral.
-
-PX4's EKF2 also checks for bad vertical acceleration. Likelihood test: A. Willsky, H. Jones, A generalized likelihood
-ratio approach to the detection and estimation of jumps in linear systems, IEEE TAC 21 (1976).
+PX4's EKF2 checks vertical acceleration likewise. Test: A. Willsky, H. Jones, IEEE TAC 21 (1976).
 """
 
 from collections import deque
@@ -58,13 +53,7 @@ _STEPS = 4
 
 
 class Found(NamedTuple):
-    """A detected bias.
-
-    Attributes:
-        bias_m_s2: Change of the accelerometer bias, FLU.
-        variance: Variance along each axis, (m/s²)².
-        velocity_m_s, position_m: Errors of the filter, ENU, to be added.
-    """
+    """Bias change, m/s² FLU, variance of each axis, (m/s²)², and the filter's errors, ENU."""
 
     bias_m_s2: Array
     variance: float
@@ -86,7 +75,7 @@ class AccelerometerWatch:
         find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
     def look(self, time_us: int, state: list[float], velocity: Kind, barometer: Barometer) -> Found | None:
-        """Check a fix; `state` (10,) is the filter's nominal state before the test."""
+        """Check a fix; `state` (10,) is nominal, before the test."""
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()
@@ -123,9 +112,9 @@ def find_bias(
 
     Args:
         rows: Fixes, (n, 15); the height is nan without a new pressure.
-        first: First fix of the rejected velocities at the end.
-        velocity_variance, height_variance: GPS velocity noise, (m/s)², and barometer noise, m².
-        found: Output: bias, m/s² FLU, and the last row's velocity and position errors, ENU.
+        first: First rejected fix.
+        velocity_variance, height_variance: (m/s)² and m².
+        found: Output: bias, FLU, velocity and position errors, ENU.
     """
     n = len(rows) - first
     for k in range(1, len(rows)):
@@ -171,7 +160,7 @@ def find_bias(
 
 @compiled
 def _drifted(rows: Array, begin: int) -> Array:
-    """Integrate the filter's velocity from fix `begin`, m ENU."""
+    """Integrate the filter's velocity, m ENU."""
     drifted = np.zeros((len(rows) - begin, 3))
     for k in range(1, len(drifted)):
         row = begin + k
@@ -186,10 +175,7 @@ def _drifted(rows: Array, begin: int) -> Array:
 def _is_seen(
     rows: Array, first: int, begin: int, last: int, moved: Array, drifted: Array, height_variance: float
 ) -> bool:
-    """Check that the barometer contradicts the filter's velocity like the position errors `moved` (n, 3).
-
-    Rows `begin` to `last` are from before the fault; `drifted` starts at `begin`.
-    """
+    """Check the barometer against position errors `moved` (n, 3); rows `begin` to `last` precede the fault."""
     rest = 0.0
     for k in range(begin, last + 1):
         rest += (rows[k, HEIGHT] - drifted[k - begin, 2]) / (last + 1 - begin)
@@ -203,7 +189,7 @@ def _is_seen(
 
 @compiled
 def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
-    """Check that the lateral specific force has changed by the bias since the rows `begin` to `last`."""
+    """Check the lateral specific force; rows `begin` to `last` precede the fault."""
     now, before = np.zeros(2), np.zeros(2)
     for k in range(first + 1, len(rows)):
         now += _felt(rows, k, gravity)
@@ -217,7 +203,7 @@ def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bia
 
 @compiled
 def _felt(rows: Array, k: int, gravity: float) -> Array:
-    """Return the mean specific force along body x and y since the previous fix, from the filter's velocity."""
+    """Return the mean specific force along body x and y since the previous fix."""
     R, dt = _between(rows, k), rows[k, TIME] - rows[k - 1, TIME]
     force = np.zeros(2)
     for i in range(3):
@@ -229,7 +215,7 @@ def _felt(rows: Array, k: int, gravity: float) -> Array:
 
 @compiled
 def _turned(rows: Array, first: int) -> Array:
-    """Return ∫R dt from the first rejected fix to each later fix, (n, 3, 3)."""
+    """Return ∫R dt, (n, 3, 3)."""
     A = np.zeros((len(rows) - first, 3, 3))
     for k in range(1, len(A)):
         dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
@@ -239,7 +225,7 @@ def _turned(rows: Array, first: int) -> Array:
 
 @compiled
 def _between(rows: Array, k: int) -> Array:
-    """Return the mean rotation from body to earth since the previous fix, (3, 3)."""
+    """Return the mean rotation since the previous fix."""
     R = np.empty((2, 3, 3))
     for j in range(2):
         w, x, y, z = rows[k - j, ATTITUDE : ATTITUDE + 4]
@@ -250,7 +236,7 @@ def _between(rows: Array, k: int) -> Array:
 
 @compiled
 def _centred(columns: Array) -> Array:
-    """Subtract the means of columns (n, 3) in place; return the means."""
+    """Subtract and return the means of columns."""
     mean = np.zeros(3)
     for row in columns:
         mean += row
@@ -262,10 +248,7 @@ def _centred(columns: Array) -> Array:
 
 @compiled
 def _fitted(A: Array, d: Array) -> tuple[Array, float]:
-    """Return the bias that minimises |d + A b|², and the spread of A, s².
-
-    AᵀA is nearly a multiple of the identity; the iterations correct for the vehicle's rotation.
-    """
+    """Minimise |d + A b|²; AᵀA is nearly a multiple of the identity."""
     spread = 0.0
     for k in range(len(A)):
         for i in range(3):
@@ -283,7 +266,7 @@ def _fitted(A: Array, d: Array) -> tuple[Array, float]:
 
 @compiled
 def _moved(rows: Array, first: int, lacks: Array, began_s: float) -> Array:
-    """Integrate the velocity errors from `began_s` before the first fix: position errors, m ENU."""
+    """Integrate velocity errors from `began_s` before the first fix, m ENU."""
     moved = np.empty((len(lacks), 3))
     moved[0] = 0.5 * began_s * lacks[0]
     for k in range(1, len(lacks)):

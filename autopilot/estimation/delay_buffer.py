@@ -1,4 +1,4 @@
-"""The ring of inertial samples and measurements that wait for the delayed filter."""
+"""Inertial samples and measurements that wait for the delayed filter."""
 
 from collections import deque
 from typing import NamedTuple
@@ -15,20 +15,14 @@ _BRIDGED_S = 0.1
 
 
 class Waiting(NamedTuple):
-    """Measurements at the end of a waiting sample, one for each instrument."""
+    """Measurements at the end of a sample, one for each instrument."""
 
     time_us: int
     values: list[Value | None] | None
 
 
 class DelayBuffer:
-    """A ring of inertial samples, with the measurements at their ends.
-
-    Attributes:
-        samples: The ring, (n, SAMPLE).
-        first: Row of the oldest waiting sample.
-        waiting: Measurements, oldest first.
-    """
+    """A ring of inertial samples, (n, SAMPLE), with the measurements at their ends."""
 
     def __init__(self, samples: int) -> None:
         self.samples: Array = np.zeros((samples, SAMPLE))
@@ -46,6 +40,5 @@ class DelayBuffer:
         self.waiting.append(measured)
 
     def take(self) -> Waiting:
-        """Remove the oldest sample; return the measurements at its end."""
         self.first = (self.first + 1) % len(self.samples)
         return self.waiting.popleft()

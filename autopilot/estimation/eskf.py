@@ -1,8 +1,7 @@
 """The error-state Kalman filter: state, sensor models, resets.
 
-A measurement rejected for long is accepted by force: first the covariance of the measured states is inflated, which
-resets them. For the magnetic field these are the vehicle's own field, so yaw stays; for pressure the barometer offset,
-so height stays; for GPS position or velocity.
+A measurement rejected for long is accepted by force: the covariance of the measured states is inflated first. For the
+magnetic field these are the vehicle's own field, so yaw stays; for pressure the barometer offset, so height stays.
 """
 
 from math import hypot, inf, isfinite, nan
@@ -75,15 +74,7 @@ class FilterRecord(NamedTuple):
 
 
 class Filter:
-    """State and covariance, some time behind the vehicle's.
-
-    Attributes:
-        x: Nominal state, (23,).
-        P: Covariance of its error, (22, 22).
-        instruments: Sensors fused without delay: magnetometer, barometer, optional ones.
-        kinds: All measurements, in the order of `table.KINDS`.
-        accel_bias_us, gyro_bias_us: Time of the last reset of each bias.
-    """
+    """Nominal state x (23,) and covariance P (22, 22), behind the vehicle's time."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
         self._sensors, self._gravity = sensors, gravity_m_s2
@@ -110,10 +101,10 @@ class Filter:
         self.gyro_bias_us: int | None = None
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
-        """Start at rest: each mean is fused as a measurement, so that the covariance holds their correlations.
+        """Start at rest: means are fused as measurements, so that the covariance holds their correlations.
 
-        The attitude is found by iteration: a measured tilt may be accelerometer bias, which the magnetic field shows. A
-        covariance linearised at the first guess would later count as information.
+        The attitude is iterated: a measured tilt may be accelerometer bias, and a covariance linearised at the first
+        guess would count as information.
         """
         x, P = self.x, self.P
         attitude = aligned.attitude
@@ -147,7 +138,6 @@ class Filter:
             kind.accept(time_us)
 
     def _reset(self, place_enu_m: Vector) -> None:
-        """Reset state and covariance to the prior of a vehicle at a place."""
         sensors, P = self._sensors, self.P
         self.x[:], P[:] = 0.0, 0.0
         self.x[:3] = place_enu_m
@@ -182,7 +172,6 @@ class Filter:
         )
 
     def resume(self, record: FilterRecord) -> bool:
-        """Restore a record; return whether its shape fits."""
         if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
             return False
         self.x[:], self.P[:] = record.x, record.P
@@ -195,7 +184,7 @@ class Filter:
         predict(self.x, self.P, samples, row, self._packed_noise, self._gravity)
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
-        """Fuse a fix measured `after_s` after the filter's time; return the reason of a rejection, even of a part."""
+        """Fuse a fix measured `after_s` after the filter's time."""
         x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
         z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
         claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
@@ -215,7 +204,7 @@ class Filter:
         return None if accepted else Reason.INNOVATION
 
     def reset_accel_bias(self, found: Found, time_us: int) -> None:
-        """Correct the accelerometer bias, and the position and velocity errors since its change."""
+        """Correct the bias, and the errors since its change."""
         x, P = self.x, self.P
         x[:3] += found.position_m
         x[3:6] += found.velocity_m_s
@@ -228,7 +217,7 @@ class Filter:
         self.accel_bias_us = time_us
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
-        """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` within `since_s`."""
+        """Inflate the covariance after a fault that turned the field."""
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
@@ -240,7 +229,6 @@ class Filter:
         self.gyro_bias_us = time_us
 
     def check(self, time_us: int) -> Check:
-        """Return the data for a consistency check at the filter's time `time_us`."""
         upper = self.P.take(_UPPER).tolist()
         nis, accepted = tuple(kind.nis for kind in self.kinds), tuple(kind.accepted for kind in self.kinds)
         return Check(time_us, tuple(self.x[:10].tolist()), tuple(upper), nis, accepted)
@@ -251,11 +239,10 @@ class Filter:
 
     @property
     def resets(self) -> int:
-        """Number of resets of a part of the state."""
         return sum(kind.resets for kind in self.kinds)
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:
-        """Return the white-noise variances of a fix: as described, or larger if it reports worse accuracy."""
+        """Return the white-noise variances, larger if the fix reports worse accuracy."""
         drift = self._noise.gps_drift
         return (
             self._horizontal + _excess(fix.horizontal_accuracy_m, self._horizontal + drift[0]),
@@ -264,7 +251,6 @@ class Filter:
 
 
 def noise_of(sensors: Sensors) -> Noise:
-    """Return the process noise of a vehicle with `sensors`."""
     accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
     horizontal, vertical = (square(max(sigma, _MIN_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m))
     drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _MIN_NOISE)
@@ -281,5 +267,5 @@ def noise_of(sensors: Sensors) -> Noise:
 
 
 def _excess(claimed_m: float, described: float) -> float:
-    """Return the excess of a reported variance, rounded to cm on the wire, over the described one."""
+    """Return the excess of a reported variance, rounded to cm on the wire."""
     return max(0.0, square(max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0)) - described) if isfinite(claimed_m) else 0.0

@@ -1,8 +1,4 @@
-"""Prediction step of the error-state Kalman filter.
-
-J. Solà, arXiv:1711.02508, sections 5.3 and 5.4, in ENU/FLU: the attitude rotates body vectors into the earth frame, and
-its error is a small rotation in the body frame.
-"""
+"""Prediction step of the filter: Solà's sections 5.3 and 5.4, with the attitude error in the body frame."""
 
 from math import sqrt
 from typing import NamedTuple, TypeAlias
@@ -40,13 +36,13 @@ _MAX_POSITION_VARIANCE, _MAX_VELOCITY_VARIANCE, _MAX_ATTITUDE_VARIANCE = 1e6, 1e
 
 
 class Noise(NamedTuple):
-    """Process noise, as spectral densities of white noise.
+    """Process noise as spectral densities of white noise.
 
     Attributes:
         force, rate: (m/s²)²/Hz and (rad/s)²/Hz.
-        gyro_bias, accel_bias: Bias walks, (rad/s²)²/Hz and (m/s³)²/Hz.
-        gps_drift: Variances of the Gauss-Markov drift of GPS, m², ENU, with correlation time `gps_drift_time_s`.
-        baro_offset, hard_iron: Walks, m²/s and gauss²/s.
+        gyro_bias, accel_bias: (rad/s²)²/Hz and (m/s³)²/Hz.
+        gps_drift: Gauss-Markov variances, m², ENU.
+        baro_offset, hard_iron: m²/s and gauss²/s.
     """
 
     force: float
@@ -61,9 +57,9 @@ class Noise(NamedTuple):
 
 @compiled
 def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Three, Three]:
-    """Advance the nominal state by one sample, Solà's (260) with the attitude at the middle of the interval.
+    """Advance the nominal state by one sample, Solà's (260).
 
-    Return that attitude's rotation matrix by rows, specific force without bias, FLU, and the angle turned, rad, FLU.
+    Return the rotation at mid-interval by rows, specific force without bias, and the angle turned, rad, FLU.
     """
     dt = samples[row, INTERVAL]
     a, b, c = 0.0, 0.0, 0.0
@@ -95,10 +91,7 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 
 @compiled
 def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravity: float) -> None:
-    """Advance state and covariance by one sample in place: P = F P Fᵀ + Q, Solà's (270) and (271).
-
-    `packed` is the `Noise`.
-    """
+    """Advance state and covariance in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
     noise, dt = packed[0], samples[row, INTERVAL]
     sees_force, sees_rate = samples[row, BLIND_FORCE] == 0.0, samples[row, BLIND_RATE] == 0.0
     R, force, turn = strap_down(x, samples, row, gravity)
@@ -135,10 +128,9 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
 
 @compiled
 def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravity: float, now: Array) -> None:
-    """Write the state after the `count` waiting samples, and its standard deviations, to `now`, (19,).
+    """Write the state and its standard deviations after `count` samples from row `first` of the ring to `now`, (19,).
 
-    These are position, velocity, attitude (10,), then standard deviations of position, velocity (ENU), and attitude
-    about east, north and up, rad (9,). `samples` is the ring, (n, 9), beginning at row `first`.
+    Position, velocity, attitude (10,); then deviations of position, velocity, and attitude about ENU axes (9,).
     """
     ahead = x.copy()
     delay, row = 0.0, first
@@ -163,7 +155,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
 
 @compiled
 def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
-    """Multiply P by the transition matrix from the left: half turn, velocity, half turn."""
+    """Multiply P by the transition matrix from the left."""
     for column in range(ERRORS):
         g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
         t0, t1, t2 = P[6, column], P[7, column], P[8, column]
@@ -195,7 +187,7 @@ def _bound(P: Array, part: int, maximum: float) -> None:
 
 @compiled
 def _turned(q: Four, x: float, y: float, z: float) -> Four:
-    """Turn a quaternion by a rotation vector in the body frame, rad: q ⊗ Exp."""
+    """Return q ⊗ Exp of a body rotation vector, rad."""
     square = 0.25 * (x * x + y * y + z * z)
     if square < _SMALL_TURN * _SMALL_TURN:
         c = 1.0 - square * (0.5 - square / 24.0)

@@ -1,9 +1,7 @@
-"""Update step of the error-state Kalman filter.
+"""Update step of the filter: Solà's (275), Joseph form, injection (283) and reset (287).
 
-J. Solà, arXiv:1711.02508, section 6: gain and update (275), Joseph form, injection (283) and reset (287).
-
-Every `fuse_…` corrects the nominal state x, (23,), and covariance P, (22, 22), in place, writes the innovation y, and
-returns NIS = yᵀ S⁻¹ y. If NIS exceeds the gate or is nan, only y is written.
+Every `fuse_…` corrects x (23,) and P (22, 22) in place, writes the innovation y, and returns NIS = yᵀ S⁻¹ y. If NIS
+exceeds the gate or is nan, only y is written.
 """
 
 from math import inf, sqrt
@@ -30,7 +28,7 @@ _MIN_VARIANCE = 1e-18
 
 @compiled
 def fuse_horizontal(x: Array, P: Array, place: Array, after_s: float, variance: float, gate: float, y: Array) -> float:
-    """Fuse east and north of a GPS fix, m, measured `after_s` after the state."""
+    """Fuse east and north, m, of a fix `after_s` after the state."""
     H = np.zeros((2, ERRORS))
     for i in range(2):
         H[i, POSITION + i], H[i, GPS_DRIFT + i], H[i, VELOCITY + i] = 1.0, 1.0, after_s
@@ -40,7 +38,6 @@ def fuse_horizontal(x: Array, P: Array, place: Array, after_s: float, variance: 
 
 @compiled
 def fuse_height(x: Array, P: Array, place: Array, after_s: float, variance: float, gate: float, y: Array) -> float:
-    """Fuse the height of a GPS fix, m, measured `after_s` after the state."""
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, GPS_DRIFT + 2], H[0, VELOCITY + 2] = 1.0, 1.0, after_s
     y[0] = place[2] - (x[2] + after_s * x[5] + x[18])
@@ -61,11 +58,7 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 def fuse_fix(
     x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
 ) -> None:
-    """Fuse velocity, place and height of a GPS fix in turn, each with its own test.
-
-    `fix`, (6,), is place, m, and velocity, m/s, ENU. Variances, gates and NIS, (3,), and innovations y, (6,), are in
-    the order velocity, place, height.
-    """
+    """Fuse velocity, place and height of a fix in turn; `fix` (6,) is place and velocity, outputs are in this order."""
     nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
     nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])
     nis[2] = fuse_height(x, P, fix[:3], after_s, variances[2], gates[2], y[5:])
@@ -73,7 +66,6 @@ def fuse_fix(
 
 @compiled
 def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gate: float, y: Array) -> float:
-    """Fuse the height of a barometer, m, with its offset."""
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, BARO_OFFSET] = 1.0, 1.0
     y[0] = height - (x[2] + x[19])
@@ -82,7 +74,7 @@ def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gat
 
 @compiled
 def fuse_field(x: Array, P: Array, measured: Array, field: Array, variance: float, gate: float, y: Array) -> float:
-    """Fuse the magnetic field, gauss FLU, with the earth's `field`, gauss ENU."""
+    """Fuse a magnetic field, gauss FLU; the earth's is ENU."""
     H = np.zeros((3, ERRORS))
     body = _in_body(x, field)
     _put_cross(H, body)
@@ -104,7 +96,7 @@ def fuse_rest(
     field_variance: float,
     y: Array,
 ) -> float:
-    """Fuse specific force, m/s² FLU, and magnetic field, gauss FLU, at rest jointly; y (6,) is in sigmas."""
+    """Fuse specific force, m/s², and magnetic field, gauss, FLU, at rest jointly."""
     H = np.zeros((6, ERRORS))
     up = _in_body(x, np.array([0.0, 0.0, gravity]))
     body = _in_body(x, field)
@@ -121,14 +113,14 @@ def fuse_rest(
 
 @compiled
 def inflate_covariance(P: Array, first: int, count: int, variance: float) -> None:
-    """Add to the variances of a part of the state, so that its next measurement is accepted."""
+    """Inflate variances, so that the next measurement is accepted."""
     for i in range(first, first + count):
         P[i, i] += variance
 
 
 @compiled
 def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, dip_rad: float) -> bool:
-    """Check a magnetic field, gauss FLU, minus the vehicle's own, for strength and dip of the earth's, gauss ENU."""
+    """Check strength and dip of a magnetic field, minus the vehicle's own."""
     up = _in_body(x, np.array([0.0, 0.0, 1.0]))
     own, earth, along = 0.0, 0.0, 0.0
     for i in range(3):
@@ -144,7 +136,7 @@ def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, d
 
 @compiled
 def fuse_rows(x: Array, P: Array, H: Array, y: Array, variance: float, gate: float) -> float:
-    """Fuse an innovation (m,) of linearised measurements H (m, 22), each with this variance."""
+    """Fuse linearised measurements H (m, 22) of equal variance."""
     m = len(H)
     C = np.zeros((ERRORS, m))
     for k in range(m):
@@ -212,7 +204,7 @@ def _gain(C: Array, L: Array) -> Array:
 
 @compiled
 def _join(P: Array, C: Array, K: Array, S: Array) -> None:
-    """P = (I - K H) P (I - K H)ᵀ + K R Kᵀ, with C = P Hᵀ and S = H P Hᵀ + R multiplied out."""
+    """P = (I - K H) P (I - K H)ᵀ + K R Kᵀ, with C = P Hᵀ multiplied out."""
     m = len(S)
     for i in range(ERRORS):
         for j in range(i + 1):
@@ -228,7 +220,7 @@ def _join(P: Array, C: Array, K: Array, S: Array) -> None:
 
 @compiled
 def _inject(x: Array, P: Array, error: Array) -> None:
-    """Add the error to the nominal state, and turn its attitude part into the new body frame."""
+    """Add the error, and turn its attitude part into the new body frame."""
     x[:6] += error[:6]
     x[10:] += error[9:]
     a, b, c = 0.5 * error[6], 0.5 * error[7], 0.5 * error[8]
@@ -260,7 +252,7 @@ def _in_body(x: Array, earth: Array) -> Array:
 
 @compiled
 def _put_cross(H: Array, body: Array) -> None:
-    """Write [body]×, the derivative of a vector in the body frame with the attitude error."""
+    """Write [body]×, the derivative with the attitude error."""
     x, y, z = body
     H[0, ATTITUDE + 1], H[0, ATTITUDE + 2] = -z, y
     H[1, ATTITUDE], H[1, ATTITUDE + 2] = z, -x

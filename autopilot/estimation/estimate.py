@@ -1,4 +1,4 @@
-"""The estimated state, its standard deviations, and the health of its sources."""
+"""The estimated state, its accuracy and health."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -11,14 +11,7 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class Test(NamedTuple):
-    """Last test of a measurement.
-
-    Attributes:
-        time_us: -1 before the first.
-        innovation: Measured minus expected, in the unit of the measurement.
-        nis: Normalised innovation squared, χ² distributed.
-        gate: Largest accepted NIS.
-    """
+    """Last test of a measurement; `time_us` is -1 before the first."""
 
     time_us: int
     innovation: tuple[float, ...]
@@ -40,17 +33,12 @@ _HORIZONTAL_POSITION = mav.ESTIMATOR_POS_HORIZ_ABS | mav.ESTIMATOR_PRED_POS_HORI
 
 
 class Health(NamedTuple):
-    """Usable parts of the estimate.
+    """Usable parts of the estimate: angles, velocity to 1 m/s, position to 5 m, sensors.
 
     Attributes:
-        attitude, heading: Roll and pitch to 10°, yaw to 15°.
-        horizontal_velocity, vertical_velocity: To 1 m/s.
-        horizontal_position, height: To 5 m.
-        dead_reckoning: Without GPS, position and velocity drift.
-        gps_lost_since_us: Time of the last accepted fix, if GPS is lost.
+        dead_reckoning: Without GPS, position drifts.
         gps_glitch: Fixes are received but rejected.
-        accel_bias, gyro_bias: False for a while after a reset of the bias.
-        not_accepted: Other sensors with missing or rejected values.
+        accel_bias, gyro_bias: False for a while after a reset.
     """
 
     attitude: bool
@@ -92,9 +80,9 @@ class Check(NamedTuple):
     """The filter at its own time, for consistency checks.
 
     Attributes:
-        state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), (10,).
-        covariance: Upper triangle of position, velocity and attitude (body rotation vector), 45 numbers by rows.
-        nis, accepted: Sum and number of the accepted NIS, for each of `Tests`.
+        state: Position, velocity (ENU), attitude (wxyz), (10,).
+        covariance: Upper triangle by rows, (45,).
+        nis, accepted: Sum and number of accepted NIS, by kind.
     """
 
     time_us: int
@@ -105,16 +93,11 @@ class Check(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """The vehicle at one instant.
+    """The vehicle at one instant; rates without bias, biases FLU, standard deviations ENU.
 
     Attributes:
-        frame: Current state; rates without bias.
-        position_std_m, velocity_std_m_s: Standard deviations, ENU.
-        attitude_std_rad: Standard deviations about east, north, up.
-        gyro_bias_rad_s, accel_bias_m_s2: FLU.
-        rejected: Number of rejected values since the start, by sensor and reason.
-        resets: Number of resets of position, velocity or a reference.
-        smoothing_m: Filter position minus published position, ENU.
+        resets: Number of resets of a part.
+        smoothing_m: Filter minus published position.
         check: Ten times a second.
     """
 

@@ -47,15 +47,7 @@ _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
 class EstimatorRecord(NamedTuple):
-    """State of an estimator for a restart, as plain data.
-
-    Attributes:
-        time_us, filter_us: Times of the last frame and of the filter.
-        samples, first, waiting: The delay buffer.
-        reading: Inertial reading of the last frame.
-        fix_us: Time of the last fix.
-        position_m, velocity_m_s: Remaining output smoothing.
-    """
+    """State of an estimator for a restart."""
 
     time_us: int
     filter_us: int
@@ -70,15 +62,10 @@ class EstimatorRecord(NamedTuple):
 
 
 class Estimator:
-    """Estimates the state of one vehicle.
-
-    Attributes:
-        filter_us: Time of the filter, behind by the delay of GPS.
-        caught: Whether it started in a fall, not at rest.
-    """
+    """Estimates the state of one vehicle; `caught` if it started in a fall."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
-        """Estimate in ENU from `origin`; compiled code is loaded here, not in the first step."""
+        """Load compiled code here, not in the first step."""
         self._sensors, self._gravity, self._origin = sensors, gravity_m_s2, origin
         self._interval_us = interval_us
         self._field = field_enu_gauss(origin)
@@ -120,19 +107,14 @@ class Estimator:
 
     @property
     def last(self) -> Estimate | None:
-        """The latest estimate, after a start at rest with a fix."""
         return self._estimate
 
     def step(self, frame: SensorFrame) -> Estimate | None:
-        """`receive`, then `estimate`."""
         self.receive(frame)
         return self.estimate()
 
     def receive(self, frame: SensorFrame) -> None:
-        """Queue a frame until the next call of any method.
-
-        The first estimate and frames out of sequence are handled at once, because `last` depends on them.
-        """
+        """Queue a frame until the next call; the first estimate and stray frames are handled at once for `last`."""
         self.advance()
         self._queued = frame
         last_us = self._time_us
@@ -140,24 +122,19 @@ class Estimator:
             self.advance()
 
     def estimate(self) -> Estimate | None:
-        """Return the estimate at the last frame.
-
-        A frame out of sequence repeats the previous estimate; a series of them restarts the estimator with the
-        simulator.
-        """
+        """Return the estimate; a stray frame repeats the previous one, a series of them restarts."""
         self.advance()
         if self._unpublished and self._time_us is not None:
             self._publish(self._time_us)
         return self._estimate
 
     def advance(self) -> None:
-        """Process the queued frame."""
         frame, self._queued = self._queued, None
         if frame is not None:
             self._take_in(frame)
 
     def settle(self) -> None:
-        """Advance, and precompute the work of the next frame in case it is on time."""
+        """Advance, and precompute the work of the next frame."""
         self.advance()
         if self._estimate is not None and self._time_us is not None:
             self._take_until(self._time_us + self._interval_us)
@@ -207,7 +184,6 @@ class Estimator:
             self._publish(frame.time_us)
 
     def record(self) -> bytes:
-        """Return the state for a restart; empty before the first estimate."""
         self.advance()
         if self._estimate is None or self._time_us is None:
             return b""
@@ -227,10 +203,7 @@ class Estimator:
         )
 
     def resume(self, record: bytes, time_us: int) -> bool:
-        """Restore a record for a next frame at `time_us`; return whether it fits.
-
-        A frame whose answer was lost with the process is received again.
-        """
+        """Restore a record; a frame without an answer is received again."""
         kept, buffer = of_bytes(EstimatorRecord, record), self._buffer
         if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != buffer.samples.shape:
             return False
@@ -273,7 +246,7 @@ class Estimator:
             self._take(now_us)
 
     def _take(self, now_us: int) -> None:
-        """Advance the filter by the oldest waiting sample, and fuse the measurements at its end."""
+        """Advance the filter by the oldest waiting sample."""
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
         time_us, values = self._buffer.take()
@@ -313,7 +286,7 @@ class Estimator:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
-        """Compute the current estimate; restart on impossible numbers."""
+        """Compute the estimate; restart on impossible numbers."""
         self._unpublished = False
         filter_, buffer = self.filter, self._buffer
         ahead = len(buffer.waiting)
@@ -388,7 +361,6 @@ class Estimator:
         )
 
     def _warm_up(self) -> None:
-        """Load compiled code with a vehicle at rest at the origin."""
         fix = GpsFix(0, 3, self._origin, (0.0, 0.0, 0.0), 1.0, 1.0, 10)
         force = (0.0, 0.0, self._gravity)
         aligned = Aligned(1.0, force, (0.0, 0.0, 0.0), self._field, 50, 0.0, 50, fix, (1.0, 0.0, 0.0, 0.0))

@@ -1,9 +1,7 @@
 """Detection of a sudden gyroscope bias, when magnetic field and GPS velocity both contradict the attitude.
 
-A sudden bias turns the filter's attitude. The magnetic field is rejected within 0.1 s, GPS velocity after 1 s or 2 s,
-as thrust then points elsewhere. Iron also turns a field, and receivers fail, but both together have one common cause.
-The covariance of attitude and bias is then inflated by the turn of the field, and the filter finds both. PX4's EKF2
-resets its yaw under the same conditions.
+The field is rejected within 0.1 s, velocity after 1 s or 2 s. Iron also turns a field, and receivers fail, but both
+have one common cause. The covariance is inflated by the turn, as PX4's EKF2 resets its yaw.
 """
 
 from math import hypot
@@ -17,7 +15,7 @@ _MAX_TURN_RAD = 0.3
 
 
 def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:
-    """Return the angle error of the field, rad, and its duration, s, after a gyroscope fault; call after a fix."""
+    """Return angle error, rad, and duration, s, of the field."""
     velocity, field = filter_.velocity, filter_.magnetometer.kind
     if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
         return None

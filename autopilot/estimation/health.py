@@ -1,4 +1,4 @@
-"""The estimator's health as status texts, arming checks and ESTIMATOR_STATUS."""
+"""Health as status texts, arming checks and ESTIMATOR_STATUS."""
 
 from collections.abc import Callable
 from functools import lru_cache, partial
@@ -14,7 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class _Matter(NamedTuple):
-    """A condition of health, and the texts when it ends and returns."""
+    """A condition of health, with texts."""
 
     well: Callable[[Health], bool]
     ceased: str
@@ -61,7 +61,6 @@ class HealthWatch:
         self._ill: frozenset[int] = frozenset()
 
     def lines(self, health: Health) -> list[tuple[int, str]]:
-        """Return severity and text of each change."""
         ill = frozenset(number for number, matter in enumerate(_MATTERS) if not matter.well(health))
         if ill == self._ill:
             return []
@@ -71,12 +70,11 @@ class HealthWatch:
 
 
 def not_known(health: Health) -> str:
-    """Return the parts of the state too inaccurate to fly, as text; empty if all are usable."""
+    """Return inaccurate parts as text."""
     return ", ".join(reason for known, reason in _UNKNOWN if not known(health))
 
 
 def estimator_state(estimate: Estimate) -> EstimatorState:
-    """Return flags, test ratios and accuracy for telemetry."""
     health, tests = estimate.health, estimate.tests
     east, north, up = estimate.position_std_m
     ratios = [*_NO_RATIOS]

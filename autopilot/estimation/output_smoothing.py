@@ -1,8 +1,7 @@
 """Smoothing of the published state, because the filter jumps with every fix.
 
-Each position correction is removed from the output and added back with a time constant, as in PX4's output predictor;
-large corrections, after a GPS loss, at a limited speed. Of velocity corrections only the unusual part is smoothed,
-because the controller needs the rest at once.
+Position corrections decay by a time constant, as in PX4's output predictor, large ones at a limited speed. Velocity
+corrections are smoothed only if unusual, because the controller needs them.
 """
 
 from math import sqrt
@@ -18,18 +17,14 @@ _NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class OutputSmoothing:
-    """Corrections still to be added back.
-
-    Attributes:
-        position_m, velocity_m_s: Published minus filter, ENU.
-    """
+    """Published minus filter, ENU."""
 
     def __init__(self) -> None:
         self.position_m = _NONE
         self.velocity_m_s = _NONE
 
     def absorb(self, before: list[float], after: list[float], delay_s: float) -> None:
-        """Smooth a correction of position and velocity (6,) made `delay_s` ago."""
+        """Smooth a correction (6,) made `delay_s` ago."""
         (x, y, z, vx, vy, vz), (x1, y1, z1, vx1, vy1, vz1) = before, after
         dvx, dvy, dvz = vx1 - vx, vy1 - vy, vz1 - vz
         moved = (x1 - x + delay_s * dvx, y1 - y + delay_s * dvy, z1 - z + delay_s * dvz)
@@ -37,7 +32,6 @@ class OutputSmoothing:
         self.velocity_m_s = _less(self.velocity_m_s, _beyond((dvx, dvy, dvz), _USUAL_M_S))
 
     def give_in(self, interval_s: float) -> None:
-        """Decay over an interval."""
         if self.position_m is not _NONE:
             self.position_m = _faded(self.position_m, interval_s)
         if self.velocity_m_s is not _NONE:
@@ -45,7 +39,6 @@ class OutputSmoothing:
 
 
 def _faded(vector: Vector, interval_s: float) -> Vector:
-    """Decay by the time constant, at most at the allowed speed."""
     x, y, z = vector
     norm = sqrt(x * x + y * y + z * z)
     if norm <= _MIN_M:

@@ -1,4 +1,4 @@
-"""Source of the vehicle's state: the simulator's frames, or the estimate from sensors."""
+"""The vehicle's state: from the simulator or by estimation."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -18,11 +18,7 @@ NewEstimator: TypeAlias = Callable[[int], "Estimator"]
 
 
 def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> NewEstimator | None:
-    """Return the factory of estimators for sensor feedback.
-
-    Raises:
-        VehicleError: The vehicle has no sensors.
-    """
+    """Return the factory of estimators for sensor feedback, or raise VehicleError without sensors."""
     if feedback is Feedback.STATE:
         return None
     sensors = vehicle.sensors
@@ -40,11 +36,7 @@ _NO_FIX_AFTER_US = 500_000
 
 
 class StateSource:
-    """Turns any frame into a state.
-
-    Attributes:
-        latest: Latest value of each sensor with its own message, by frame field.
-    """
+    """Turns any frame into a state; `latest` holds sensors with their own message."""
 
     def __init__(self, estimator: NewEstimator | None, interval_us: int) -> None:
         self._interval_us = interval_us
@@ -64,21 +56,16 @@ class StateSource:
 
     @property
     def rests(self) -> bool:
-        """Whether the estimate started at rest."""
         return self.estimate is not None and self._estimating is not None and not self._estimating.caught
 
     def record(self) -> bytes:
         return b"" if self._estimating is None else self._estimating.record()
 
     def resume(self, record: bytes, time_us: int) -> bool:
-        """Restore the estimator for a next frame at `time_us`; return whether the record fits."""
         return self._estimating is not None and self._estimating.resume(record, time_us)
 
     def receive(self, frame: Frame) -> None:
-        """Process a frame; sensor frames are queued for the estimator.
-
-        Time that restarts is a new flight. The estimator handles frames that are slightly late.
-        """
+        """Queue a frame for the estimator; time that restarts is a new flight."""
         if isinstance(frame, StateFrame):
             self._given = frame
             return
@@ -98,31 +85,28 @@ class StateSource:
         self.estimate = self._estimating.last
 
     def state(self) -> StateFrame | None:
-        """Return the state at the last frame."""
         if self._estimating is not None and self._given is None:
             self.estimate = self._estimating.estimate()
         return self.last
 
     @property
     def last(self) -> StateFrame | None:
-        """Latest state without further work: of the last frame, or of the last estimate."""
+        """Latest state, without further work."""
         if self._given is not None:
             return self._given
         return None if self.estimate is None else self.estimate.frame
 
     def advance(self) -> None:
-        """Process the last frame in the estimator now."""
         if self._estimating is not None:
             self._estimating.advance()
             self.estimate = self._estimating.last
 
     def settle(self) -> None:
-        """Do deferrable work after the answer to a frame."""
         if self._estimating is not None:
             self._estimating.settle()
 
     def has_gps(self, now_us: int) -> bool:
-        """Whether GPS is available; always with state feedback."""
+        """GPS is always available with state feedback."""
         if self._make is None:
             return True
         fix = self.fix

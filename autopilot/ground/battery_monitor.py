@@ -1,4 +1,4 @@
-"""The battery monitor: charge and voltage from a model driven by the rotor commands, or as the battery reports."""
+"""Charge and voltage from a model driven by rotor commands, or as reported."""
 
 from math import nan
 
@@ -40,7 +40,6 @@ class BatteryMonitor:
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:
-        """Restore charge and energy after a restart, unless the battery reports its charge."""
         self.energy_wh = energy_wh
         if self._is_reported:
             return
@@ -48,7 +47,7 @@ class BatteryMonitor:
         self._now = self._model.terminal(charge_ah, np.zeros(4))
 
     def run(self, controls: FourRotors, duration_s: float) -> None:
-        """Integrate `duration_s` with the rotors at `controls`, relative to top speed."""
+        """Integrate with `controls` relative to top speed."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah = charged(self.charge_ah, current_a, duration_s)
         self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
@@ -61,11 +60,9 @@ class BatteryMonitor:
 
     @property
     def voltage_v(self) -> float:
-        """Terminal voltage, V; 0 without a battery."""
         return max(0.0, self._now[0] + self._sag_v)
 
     def state(self, charge_state: int = CHARGE_OK) -> BatteryState | None:
-        """Return the battery state for telemetry."""
         if self._battery is None:
             return None
         left, current_a = self.left, self._now[1]

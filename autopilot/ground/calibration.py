@@ -1,4 +1,4 @@
-"""Simulated calibrations: MAV_CMD_PREFLIGHT_CALIBRATION, and PX4's "[cal] ..." texts that ground stations parse."""
+"""Simulated calibrations with PX4's "[cal] ..." texts, which ground stations parse."""
 
 from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Command
 from colibri.mavlink.wire.refusal import Refusal
@@ -17,7 +17,6 @@ class Calibration:
         self._due_us = 0
 
     def begin(self, command: Command, *, armed: bool) -> Refusal | None:
-        """Start the calibration selected by the parameters, or cancel if all are 0."""
         if armed:
             return Refusal("calibration refused: the rotors are armed")
         chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
@@ -50,7 +49,7 @@ class Calibration:
 
 
 def _kind_of(p: tuple[float, ...]) -> str | None:
-    """Return the selected calibration; empty for a cancellation, None if unknown."""
+    """Return the kind of calibration; empty to cancel."""
     given = [0.0 if value != value else value for value in p]  # nan: not given
     chosen = [(place, value) for place, value in enumerate(given) if value != 0.0]
     if not chosen:

@@ -1,7 +1,4 @@
-"""MAV_CMD_INJECT_FAILURE, forwarded to the plant if parameter SYS_FAILURE_EN is 1.
-
-A fault is sent with the answer to a frame; the next frame has its result. The command is acknowledged only then.
-"""
+"""MAV_CMD_INJECT_FAILURE, forwarded to the plant and acknowledged with its result."""
 
 from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
@@ -18,14 +15,13 @@ class Failures:
     """Forwards faults to the plant, and its results back."""
 
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        """`relays`: whether the plant accepts faults; faults of sensors require sensor feedback."""
+        """`relays`: whether the plant accepts faults; sensor faults require sensor feedback."""
         self._relays = relays
         self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []
         self._pending: tuple[Fault, Command] | None = None
 
     def inject(self, command: Command, *, enabled: bool) -> Refusal | None:
-        """Queue the fault of a command; `poll` returns the outcome."""
         if not enabled:
             return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
         if not self._relays:
@@ -41,14 +37,12 @@ class Failures:
         return PENDING
 
     def take(self) -> tuple[Fault, ...]:
-        """Return the faults for the next answer, and clear the queue."""
         if not self._to_send:
             return ()
         faults, self._to_send = tuple(self._to_send), []
         return faults
 
     def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Refusal | None] | None:
-        """Process the plant's results; return a finished command and its outcome."""
         if self._pending is None:
             return None
         fault, command = self._pending

@@ -1,4 +1,4 @@
-"""The predicted path of the control law's plan: attitudes and thrusts integrated to velocity and position."""
+"""The predicted path of the control law's plan."""
 
 from math import isnan
 
@@ -21,7 +21,7 @@ class Forecaster:
     """Integrates the plans of one control law."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
-        """`columns` is None for plans without attitude."""
+        """Plans without attitude lack `columns`."""
         self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg
@@ -32,7 +32,6 @@ class Forecaster:
             _motion(np.zeros(6), plan, columns, np.zeros(1), self._mass_kg, self._gravity_m_s2, interval_s)
 
     def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
-        """Return points of the plan up to its end, or of the references if the law predicts no attitude."""
         plan, squared = how.predicted, how.planned_squared
         if plan is not None and squared is not None and self._columns is not None:
             mass_kg = self._mass_kg if isnan(how.mass_kg) else how.mass_kg
@@ -45,7 +44,7 @@ class Forecaster:
     def _integrated(
         self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns, mass_kg: float
     ) -> tuple[Forecast, ...]:
-        """Integrate thrust along body z and gravity; drag is negligible over the horizon."""
+        """Integrate thrust and gravity; drag is negligible over the horizon."""
         begin = np.array((*state.position_enu_m, *state.velocity_enu_m_s))
         thrusts_n = matvec(squared, self._full_thrust_n)
         motion = _motion(begin, plan, columns, thrusts_n, mass_kg, self._gravity_m_s2, self._interval_s)
@@ -78,10 +77,7 @@ def _motion(
     gravity_m_s2: float,
     interval_s: float,
 ) -> Array:
-    """Return position, velocity and acceleration, ENU, after each step, (n, 9).
-
-    `begin` is the present position and velocity, (6,); `plan` has one row more than `thrusts_n`, for the present.
-    """
+    """Return position, velocity and acceleration, ENU, (n, 9), by thrust along body z; `plan` has an initial row."""
     motion = np.zeros((thrusts_n.shape[0], 9))
     speeds, places = np.zeros(3), np.zeros(3)  # their sums; what they are multiplied by comes after
     for k in range(thrusts_n.shape[0]):

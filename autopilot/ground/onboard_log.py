@@ -1,4 +1,4 @@
-"""The onboard log for ground stations: a ULog of each flight, from arming to disarming."""
+"""A ULog of each flight for ground stations."""
 
 from collections.abc import Iterable
 
@@ -28,7 +28,6 @@ class OnboardLog:
     """Records snapshots and status texts while armed."""
 
     def __init__(self, vehicle: str, system_id: int, parameters: Parameters, files: Files) -> None:
-        """Record into folder `logs` of `files`."""
         self._log = FlightLog(files, (LOGS,))
         self._topics = _Topics(self._log)
         self._recorder = Recorder(self._topics, vehicle, system_id, parameters, with_battery=True)
@@ -37,11 +36,9 @@ class OnboardLog:
 
     @property
     def name(self) -> str | None:
-        """Name of the open log."""
         return self._log.name
 
     def update(self, snapshot: Snapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
-        """Record new snapshots and texts; start and end logs."""
         begins, ends = armed and not self._armed, self._armed and not armed
         self._armed = armed
         if begins:

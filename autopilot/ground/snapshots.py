@@ -1,4 +1,4 @@
-"""Snapshots of a control sample for telemetry."""
+"""Snapshots for telemetry."""
 
 from math import isnan
 
@@ -53,7 +53,6 @@ class SnapshotBuilder:
         self.adopt(vehicle)
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Apply a changed vehicle model, and reset the state."""
         self._max_speed_rad_s = vehicle.rotors.max_speed * vehicle.rad_s_per_speed_unit
         self._forecaster = Forecaster(vehicle, self._interval_s, self._columns)
         self._velocity: Vector | None = None
@@ -74,7 +73,6 @@ class SnapshotBuilder:
         *,
         breached: bool,
     ) -> Snapshot:
-        """Return the snapshot; `decision` took `duration_s`, and `controls` are relative to top speed."""
         sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
         mode, armed = pilot.state
         number = custom_mode(mode)
@@ -164,7 +162,6 @@ def _comes_down(pilot: Pilot, state: VehicleState) -> bool:
 
 
 def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors) -> Setpoint:
-    """Return the setpoint of the control law."""
     if decision is None:
         return NO_SETPOINT
     c1, c2, c3, c4 = controls
@@ -186,7 +183,7 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
 
 
 def rates_of(demand: AttitudeDemand | None) -> Vector:
-    """Return the demanded rates, rad/s, equal to body rates for small tilt."""
+    """Return demanded rates, rad/s, which are the body's for small tilt."""
     return NOWHERE if demand is None else first(demand.angle_rates_rad_s)
 
 

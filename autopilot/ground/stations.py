@@ -1,4 +1,4 @@
-"""All MAVLink services of a vehicle, assembled around one pilot on one hub."""
+"""All MAVLink services of a vehicle on one hub."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -62,12 +62,8 @@ class StationSettings:
     """Settings of a vehicle towards ground stations.
 
     Attributes:
-        identity: A name of `identity.IDENTITIES`.
-        origin: Origin of the ENU frame.
         boot_unix_us: Unix time at simulated time 0, µs; 0 if unknown.
-        files: Files for transfer.
-        logs: Folder of flight logs; None for folder `logs` of the files.
-        relays_faults: Whether the plant accepts injected faults.
+        logs: Folder of flight logs; by default `logs` of the files.
     """
 
     system_id: int
@@ -85,10 +81,9 @@ class Guarding(Protocol):
     """Catches the exceptions of named parts."""
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return the result of `call`, or of `otherwise` if it raises."""
+        """Return the result of `call`, or of `otherwise` on an exception."""
 
-    def caught(self, part: str, error: Exception, instead: str = "") -> None:
-        """Record an exception of a part."""
+    def caught(self, part: str, error: Exception, instead: str = "") -> None: ...
 
 
 class Stations:
@@ -160,20 +155,17 @@ class Stations:
         self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
 
     def use(self, channel: int, kind: str) -> None:
-        """Stream to `channel` the default messages of its kind."""
         self._streams.use(channel, kind)
 
     @property
     def station_us(self) -> int | None:
-        """Time of the last ground station heartbeat, µs."""
         return self._heartbeat.station_us
 
     def expect_station(self, now_us: int) -> None:
-        """Count a ground station connected before a restart as lost from now on."""
+        """Count a ground station as lost from now on, after a restart."""
         self._heartbeat.expect(now_us)
 
     def update(self, snapshot: Snapshot) -> None:
-        """Publish a snapshot of the control sample."""
         vehicle = self._pilot.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
@@ -183,12 +175,11 @@ class Stations:
         self._follow.update(snapshot.origin)
 
     def go_on(self) -> None:
-        """Send at least the mode if a snapshot fails."""
+        """Send at least the mode."""
         mode, armed = self._pilot.state
         self._heartbeat.go_on(custom_mode(mode), armed=armed)
 
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
-        """Process the plant's results of faults, and set the time of the next messages."""
         self.needs.at(now_us)
         ended = self.failures.poll(plant_status.results, now_us)
         if ended is not None:
@@ -196,7 +187,6 @@ class Stations:
             self.hub.send(self._obeys.finish(command.id, command.peer, outcome))
 
     def poll(self, now_us: int) -> list[Outgoing]:
-        """Do due work; return the messages to send. Called once a frame."""
         self._guard("progress", self._tell, _nothing, now_us)
         self._guard("hub", self._poll_hub, _nothing, now_us)
         said = self._text.take()
@@ -217,7 +207,7 @@ class Stations:
             self.say(INFO, text)
 
     def refuse_commands(self, reason: str) -> None:
-        """Deny every command with `reason`, and drop other messages; an empty reason resumes service."""
+        """Deny every command, and drop other messages; an empty reason resumes service."""
         self.hub.accept_only(_COMMANDS if reason else None)
         self._obeys.close(reason)
 
@@ -231,7 +221,6 @@ class Stations:
         self.hub.send(self._text.say(severity, text))
 
     def take_texts(self) -> list[Line]:
-        """Return the latest status texts for the terminal."""
         if not self._said:
             return []
         said = list(self._said)

@@ -1,4 +1,4 @@
-"""Commands to the autopilot as a system: restart, storage, calibration, origin, version, shell."""
+"""Commands to the autopilot as a system."""
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version as version_of_package
@@ -21,11 +21,7 @@ REBOOT, SHUT_DOWN = 1.0, 2.0
 
 
 class SystemCommands:
-    """Handles system commands.
-
-    Attributes:
-        restart: `REBOOT` or `SHUT_DOWN` once requested; otherwise 0.
-    """
+    """System commands; `restart` is 0 until requested."""
 
     def __init__(
         self, pilot: Pilot, missions: Missions, parameters: Parameters, *, identity: str, system_id: int
@@ -77,7 +73,7 @@ class SystemCommands:
         return None
 
     def _storage(self, command: Command) -> Refusal | None:
-        """Handle PREFLIGHT_STORAGE: parameters are stored on change, so only the reset has an effect."""
+        """Parameters are stored on change, so only the reset has an effect."""
         if command.p1 == 2.0:
             if self._pilot.state.armed:
                 return Refusal("parameters refused: the rotors are armed")

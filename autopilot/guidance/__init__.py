@@ -1,1 +1,1 @@
-"""References within limits: position chain, attitude slew, landing detection, tracks, missions, tasks."""
+"""References within limits: missions, tasks, tracks, slews."""

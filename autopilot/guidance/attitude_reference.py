@@ -1,8 +1,7 @@
-"""Attitude demands from sticks, or a client's attitude or body rates, over the control law's preview.
+"""Attitude demands from sticks, or a client's attitude or body rates.
 
-Each angle is slewed like a critically damped second-order system with bounded rate and acceleration, so that the
-vehicle can follow and the MPC can preview it. Roll and pitch refer to the reached yaw: the thrust direction is reached
-first. Body rates are integrated by THESIS [2.7], with the tilt limited.
+Each angle is slewed with bounded rate and acceleration. The thrust direction is reached first; roll and pitch refer to
+the reached yaw. Body rates are integrated by THESIS [2.7].
 """
 
 from math import isnan, nan, radians
@@ -24,7 +23,7 @@ STICK_MIDDLE = 0.5
 
 
 class AttitudeLimits(NamedTuple):
-    """Limits of full sticks, of the demanded yaw ahead of the vehicle's, and of the slew."""
+    """Limits of full sticks, of yaw ahead of the vehicle's, and of the slew."""
 
     stick_tilt_rad: float = radians(35.0)
     stick_yaw_rate_rad_s: float = radians(100.0)
@@ -55,7 +54,7 @@ def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
 
 
 class ReferenceMemory(NamedTuple):
-    """State of the generator between control samples: phi, theta, psi, rad, (3,), their rates, and thrust."""
+    """Demanded angles, rad, (3,), rates and thrust."""
 
     angles: Array
     rates: Array
@@ -63,7 +62,7 @@ class ReferenceMemory(NamedTuple):
 
 
 class AttitudeReference:
-    """Generator of attitude demands for one vehicle and one preview."""
+    """Generator of attitude demands for one vehicle."""
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
         self.adopt(vehicle)
@@ -80,7 +79,6 @@ class AttitudeReference:
         self.max_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
-        """Start at the vehicle's attitude, with its weight as default thrust."""
         angles, rates = np.array(state.euler), np.zeros(3)
         limit_tilt(angles, rates, self.limits.slew.max_tilt_rad)
         return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
@@ -88,7 +86,6 @@ class AttitudeReference:
     def step(
         self, memory: ReferenceMemory, state: VehicleState, command: AttitudeCommand
     ) -> tuple[ReferenceMemory, AttitudeDemand]:
-        """Return the next state, and the demand from now on under a constant `command`."""
         angles, rates = np.empty((self._samples + 1, 3)), np.empty((self._samples + 1, 3))
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
@@ -98,16 +95,12 @@ class AttitudeReference:
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
 
     def from_sticks(self, sticks: Sticks) -> AttitudeCommand:
-        """Convert sticks in stabilized flight."""
         tilt = self.limits.stick_tilt_rad
         yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
         return tilt_command(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
     def from_setpoint(self, setpoint: AttitudeSetpoint) -> AttitudeCommand:
-        """Convert a client's setpoint, with thrust as for a stick.
-
-        An attitude takes precedence over body rates, of which only yaw's is then fed forward. Missing rates are zero.
-        """
+        """Attitude takes precedence over rates, of which yaw's is fed forward."""
         thrust_n = nan if isnan(setpoint.thrust) else self.thrust_for_stick(setpoint.thrust)
         p, q, r = (0.0 if isnan(rate) else rate for rate in setpoint.rate_flu_rad_s)
         if setpoint.attitude is None:
@@ -115,28 +108,24 @@ class AttitudeReference:
         return attitude_command(setpoint.attitude, thrust_n, r)
 
     def thrust_for_stick(self, stick: float) -> float:
-        """Convert a stick at 0..1 to thrust, N: 0, hover in the middle, maximum.
-
-        Hover at half is expected by ground stations for PX4.
-        """
+        """Return 0, hover in the middle, or maximum, N, as ground stations for PX4 expect."""
         if stick <= STICK_MIDDLE:
             return self.weight_n * max(stick, 0.0) / STICK_MIDDLE
         part = (min(stick, 1.0) - STICK_MIDDLE) / (1.0 - STICK_MIDDLE)
         return self.weight_n + (self.max_thrust_n - self.weight_n) * part
 
     def _near(self, psi: float, yaw_rad: float) -> float:
-        """Return the demanded yaw in the vehicle's full turn, limited to the allowed distance ahead."""
         max_ahead = self.limits.yaw_ahead_rad
         return min(max(nearest_turn(psi, yaw_rad), yaw_rad - max_ahead), yaw_rad + max_ahead)
 
 
 def tilt_command(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> AttitudeCommand:
-    """Roll and pitch, rad, at the present heading; yaw rate counter-clockwise."""
+    """Angles, rad, at the present heading."""
     return AttitudeCommand(TILT, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
 
 
 def attitude_command(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> AttitudeCommand:
-    """Attitude, FLU to ENU; yaw is reached more slowly than the thrust direction."""
+    """Yaw is reached more slowly than the thrust direction."""
     (_, _, x), (_, _, y), (_, _, z) = rotation_matrix(attitude)
     return AttitudeCommand(ATTITUDE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
 

@@ -1,8 +1,7 @@
-"""Kernels that slew an attitude demand towards a command.
+"""Kernels that slew an attitude demand.
 
-An angle x with rate v follows v' = w² (target - x) + 2 w (target' - v), bounded in acceleration and rate; under a rate
-command v' = 2 w (target' - v). With a maximum acceleration of at least w times the maximum rate, the linear law brakes
-alone, without overshoot.
+v' = w² (target - x) + 2 w (target' - v), bounded; for a rate only v' = 2 w (target' - v). A maximum acceleration of at
+least w times the maximum rate avoids overshoot.
 """
 
 from math import floor, isnan, pi, sqrt
@@ -35,11 +34,9 @@ class AttitudeCommand(NamedTuple):
     """Target of a demand.
 
     Attributes:
-        kind: TILT, ATTITUDE or RATE.
         vector: TILT: phi, theta, rad, and 0. ATTITUDE: thrust direction, ENU. RATE: p, q, r, rad/s.
-        yaw_rad: ATTITUDE only.
         yaw_rate_rad_s: TILT: turn rate. ATTITUDE: feed-forward.
-        thrust_n: nan: the thrust that carries the weight at any tilt.
+        thrust_n: nan carries the weight at any tilt.
     """
 
     kind: int
@@ -59,7 +56,7 @@ def slew_on(
     rates: Array,
     thrusts: Array,
 ) -> None:
-    """Fill angles phi, theta, psi, rad, and rates, (n, 3), and thrusts, N, (n,), starting from their first rows."""
+    """Fill angles and rates, (n, 3), and thrusts, (n,), from their first rows."""
     kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
@@ -103,7 +100,6 @@ def _move(
     angles: Array,
     rates: Array,
 ) -> None:
-    """Advance angle i and its rate by one interval, in place."""
     acceleration = min(max(pull + 2.0 * w * (wanted_rate - rates[i]), -max_acceleration), max_acceleration)
     rate = min(max(rates[i] + interval_s * acceleration, -max_rate), max_rate)
     angles[i] += 0.5 * interval_s * (rates[i] + rate)
@@ -122,7 +118,7 @@ def _euler_rates(angles: Array, rate: Vector, out: Array) -> None:
 
 @compiled
 def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) -> None:
-    """Write roll and pitch, rad, that point body z along `direction`, ENU, at yaw `psi`, within the tilt limit."""
+    """Write roll and pitch that point body z along `direction`, ENU, within the tilt limit."""
     x, y, z = direction[0], direction[1], direction[2]
     horizontal = sqrt(x * x + y * y)
     if horizontal < _NO_DIRECTION:
@@ -137,7 +133,7 @@ def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) ->
 
 @compiled
 def limit_tilt(angles: Array, rates: Array, max_tilt_rad: float) -> None:
-    """Limit the tilt in place, and remove rates beyond it; angles phi, theta, psi, rad, and rates, (3,)."""
+    """Limit the tilt, and remove rates beyond it."""
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
     if c * ct >= cos(max_tilt_rad):
         return

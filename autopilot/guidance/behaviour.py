@@ -1,4 +1,4 @@
-"""Numbers of the vehicle's behaviour: speeds, heights, times."""
+"""Speeds, heights and times of a flight."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,10 +12,9 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """Numbers of the vehicle's behaviour; each is a parameter, described in `parameters/behaviour.py`.
+    """Numbers of the vehicle's behaviour, described in `parameters/behaviour.py`; 0 switches a limit or disarming off.
 
-    Heights are above home; take-off's is above the ground. 0 switches a distance or height limit or a disarming time
-    off. `solve_time_s` is declared. `delay_s` of commands is compensated; negative: the profile's, or measured.
+    `delay_s` of commands is compensated; negative: the profile's, or measured.
     """
 
     limits: Limits = _LIMITS

@@ -1,4 +1,4 @@
-"""References of one control sample for the control law."""
+"""References of one control sample."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,7 @@ from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace
 
 
 class Guidance(NamedTuple):
-    """References for the control law; empty while the rotors stand or idle.
-
-    Attributes:
-        begins: Whether the rotors leave idle now: the control law is reset.
-        pace: Progress of time along the horizon.
-    """
+    """References for the control law, reset if it `begins`; empty on the ground."""
 
     horizon: Horizon | None = None
     attitude: AttitudeDemand | None = None

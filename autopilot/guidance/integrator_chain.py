@@ -1,15 +1,14 @@
-"""Chain of integrators that leads the reference to its target, as compiled kernels.
+"""Chain of integrators that leads the reference to its target.
 
-With e = reference - target, each loop of the cascade commands the next:
+With e = reference - target, each loop commands the next:
 
     velocity      v_t - approach(e)         the fastest that can still stop: sqrt(2 a d) far away, k d close by
     acceleration  a_t + d/dt of that + k_v (wanted velocity - v)
     jerk          j_t + k_a (wanted acceleration - a)
     snap          s_t + k_j (wanted jerk - j)
 
-and bounds its addition to the target's own motion. The acceleration is also bounded so that the jerk can end it within
-1 / k_v: more would overshoot. The snap is bounded because the moments produce it: a jumping target must not demand all
-of them. A reached target is followed exactly.
+and bounds its addition to the target's motion. The jerk must be able to end the acceleration within 1 / k_v. The snap
+is bounded because the moments produce it. A reached target is followed exactly.
 """
 
 from functools import lru_cache
@@ -39,7 +38,7 @@ _JERK, _JERK_SCALE = 3, 1e-2
 
 
 class Limits(NamedTuple):
-    """Limits of the approach: horizontal, upward and downward speed, horizontal and vertical acceleration."""
+    """Limits of the approach to a target."""
 
     speed_m_s: float = 5.0
     climb_m_s: float = 3.0
@@ -53,7 +52,7 @@ class Limits(NamedTuple):
 
 @lru_cache(maxsize=64)
 def packed_limits(limits: Limits) -> Packed:
-    """Return limits as a record, which kernels unbox three times as fast as a tuple."""
+    """Return a record, which kernels unbox three times as fast."""
     return packed(limits)
 
 
@@ -88,18 +87,16 @@ def advance(
     limits: Packed,
     dt: float,
 ) -> tuple[Array, Array]:
-    """Return motion, (5, n, 3), and heading, (3, n), from now on; snap and yaw acceleration are piecewise constant.
-
-    Widely spaced instants are integrated in several steps.
+    """Return motion, (5, n, 3), and heading, (3, n), from now on.
 
     Args:
         motion: Position to jerk now, ENU, (4, 3).
-        heading: Yaw, rad, and its rate now, (2,).
-        target: Position to snap at n instants, ENU, (n, 5, 3).
-        kinds: Binding derivative, 0 to 2, for x, y and z, (3,).
+        heading: Yaw and rate now, (2,).
+        target: Position to snap, ENU, (n, 5, 3).
+        kinds: Binding derivative of each axis, (3,).
         target_heading: Yaw, rate, acceleration, (n, 3).
         turns: Whether yaw binds; otherwise its rate.
-        dt: Between instants, s.
+        dt: Between instants, s; long ones take several steps.
     """
     count = target.shape[0]
     out, out_heading = np.empty((5, count, 3)), np.empty((3, count))
@@ -128,7 +125,7 @@ def advance(
 
 @compiled
 def is_near(motion: Array, target: Array, within: float) -> bool:
-    """Whether position to jerk, ENU, (4, 3), differ by less than `within` from a target's."""
+    """Compare position to jerk, (4, 3)."""
     for order in range(motion.shape[0]):
         scale = _JERK_SCALE if order == _JERK else 1.0
         for i in range(3):
@@ -139,7 +136,7 @@ def is_near(motion: Array, target: Array, within: float) -> bool:
 
 @compiled
 def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, wanted: Array, snap: Array) -> None:
-    """Write the snap and the commands between loops, (3,): x and y share their limits, z has its own."""
+    """Write the snap: x and y share their limits."""
     vertically = limits.sink_m_s if motion[0, 2] > target[0, 2] else limits.climb_m_s
     jerk = limits.jerk_m_s3
     _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), wanted, snap)
@@ -179,7 +176,7 @@ def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wante
 
 @compiled
 def _approach(distance: float, stopping: float, max_speed: float, gain: float) -> tuple[float, float]:
-    """Return the speed towards a place at `distance`, and its derivative with distance."""
+    """Return the speed at `distance`, and its derivative."""
     near = stopping / gain**2
     if distance <= near:
         speed, slope = gain * distance, gain
@@ -203,7 +200,6 @@ def _bound(vector: Array, first: int, last: int, maximum: float) -> None:
 
 @compiled
 def _turn(yaw: float, rate: float, target: Array, turns: bool, limits: Limits) -> float:
-    """Return the yaw acceleration, rad/s²."""
     wanted = target[1]
     slope = 0.0
     if turns:

@@ -1,4 +1,4 @@
-"""Landing detection: the reference sinks while the vehicle stays still."""
+"""Landing detection: still while the reference sinks."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ STANDING_SLOWER_M_S = 0.3
 
 
 class Landing(NamedTuple):
-    """State of the detector: start of the stillness, and the climb rate then."""
+    """Start of the stillness, and the climb rate then."""
 
     since_us: int | None = None
     climb_m_s: float = 0.0
@@ -31,10 +31,10 @@ _MOVES = Landing()
 def watch(
     landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
 ) -> tuple[Landing, bool]:
-    """Return the state, and whether the vehicle stands: still for long enough while it `sinks`.
+    """Return the state, and whether the vehicle stands: still for long while it `sinks`.
 
-    If the velocity estimate `drifts`, as without GPS, only its changes count, from the accelerometer. Such a vehicle
-    sinks at half thrust and would accelerate; a constant climb rate means that the ground holds it.
+    If the velocity estimate `drifts`, as without GPS, only its changes count: at half thrust the vehicle would
+    accelerate, so a constant climb rate means that the ground holds it.
     """
     if not sinks:
         return _MOVES, False
@@ -51,16 +51,15 @@ def watch(
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:
-    """Whether a reference, z of ENU, makes the vehicle sink."""
     return height_m < state.position_enu_m[2] - _BELOW_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
-    """Guess whether a vehicle stands at its first state: low and still."""
+    """Guess from a low and still first state."""
     still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
 
 
 def is_clear(landing: Landing, state: VehicleState, ground_m: float) -> bool:
-    """Whether a vehicle in flight is clear of the ground, above or below its last standing height."""
+    """Whether a vehicle is above or below its last standing height."""
     return landing.since_us is None and abs(state.position_enu_m[2] - ground_m) > _CLEAR_M

@@ -1,7 +1,6 @@
-"""The reference of the vehicle, which moves smoothly towards a target within limits.
+"""The reference, which moves smoothly to a target.
 
-The chain of `integrator_chain` follows a target that may move; once reached, the target itself is the reference, exact
-to the last bit, until it jumps. An axis may lack a target position, or position and velocity.
+Once reached, the target itself is the reference, to the last bit, until it jumps.
 """
 
 from collections.abc import Sequence
@@ -36,29 +35,21 @@ ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
 
 
 class Reference(NamedTuple):
-    """State of the chain.
-
-    Attributes:
-        motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
-        heading: Yaw, rad, unwrapped, and its rate, (2,).
-    """
+    """State of the chain: position to jerk, ENU, (4, 3); yaw, unwrapped, and rate, (2,)."""
 
     motion: Array
     heading: Array
 
     @property
     def height_m(self) -> float:
-        """Height, z of ENU."""
         return float(self.motion[0, 2])
 
 
 class Target(NamedTuple):
-    """Target of the reference at every instant of the preview.
+    """Target at each instant: position to snap, ENU, (n, 5, 3); yaw, rate, acceleration, (n, 3).
 
     Attributes:
-        motion: Position to snap, ENU, (n, 5, 3).
-        kinds: Binding derivatives of x, y and z.
-        heading: Yaw, rate, acceleration, (n, 3).
+        kinds: Binding derivatives.
         turns: Whether yaw binds; otherwise its rate.
     """
 
@@ -75,14 +66,13 @@ def at_rest(state: VehicleState) -> Reference:
 
 
 def moving_with(state: VehicleState) -> Reference:
-    """Start from the vehicle's motion."""
     motion = np.zeros((4, 3))
     motion[0], motion[1] = state.position_enu_m, state.velocity_enu_m_s
     return Reference(motion, np.array([state.euler[2], 0.0]))
 
 
 def slowed(reference: Reference, speed: float) -> Reference:
-    """Scale the motion to a time that passes at `speed`."""
+    """Scale derivatives to time passing at `speed`."""
     powers = np.array([[1.0], [speed], [speed * speed], [speed * speed * speed]])
     return Reference(reference.motion * powers, reference.heading * np.array([1.0, speed]))
 
@@ -107,9 +97,9 @@ def target_of(horizon: Horizon) -> Target:
 def lead(
     reference: Reference, target: Target, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """Return the references at each instant of the target, and the chain's state at the second.
+    """Return the references, and the chain's state at the second instant.
 
-    A reference that has `waited` was extrapolated by its derivatives.
+    A `waited` reference was extrapolated.
     """
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
@@ -133,7 +123,7 @@ def _integers(kinds: tuple[Kind, Kind, Kind]) -> Integers:
 
 
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
-    """Return the target, with yaw in the reference's full turn."""
+    """Return the target in the reference's full turn."""
     heading = target.heading
     turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
     if turns:
@@ -147,7 +137,7 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
 def lead_along(
     reference: Reference, plan: Horizon, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """`lead` for a plan; once it is reached, without the slow arrays of a target."""
+    """`lead` for a plan, without slow arrays once reached."""
     if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0]), waited=waited):
         return lead(reference, target_of(plan), limits, interval_s, waited=waited)
     turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
@@ -161,13 +151,12 @@ def _motion_at(plan: Horizon, sample: int) -> Array:
 
 
 def stays(reference: Reference, after: Reference) -> bool:
-    """Whether the reference is unchanged after a sample, to the last bit."""
     moved = reference.motion.tobytes() != after.motion.tobytes()
     return not moved and reference.heading.tobytes() == after.heading.tobytes()
 
 
 def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:
-    """Whether the reference has reached a target: a target may jump, a reference may not."""
+    """A target may jump, a reference may not."""
     reached = _CARRIED if waited else _REACHED
     yaw, rate = reference.heading.tolist()
     if max(abs(yaw - nearest_turn(float(heading[0]), yaw)), abs(rate - float(heading[1]))) >= reached:

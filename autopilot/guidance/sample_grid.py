@@ -1,4 +1,4 @@
-"""Planned instants: every control sample, whichever the control law previews."""
+"""Planned instants: every control sample."""
 
 from collections.abc import Sequence
 from math import ceil
@@ -8,12 +8,7 @@ from colibri.autopilot.control.interface import Horizon, Preview
 
 
 class Instants(NamedTuple):
-    """Planned instants, and the control law's among them.
-
-    Attributes:
-        preview: At least to the next sample.
-        rows: Instants of the control law; None for all.
-    """
+    """Planned instants, and the control law's `rows` (None for all)."""
 
     preview: Preview
     rows: Sequence[int] | None
@@ -23,7 +18,7 @@ class Instants(NamedTuple):
 
 
 def instants(preview: Preview, control_interval_us: int) -> Instants:
-    """Return the instants for a preview; between two of them the later one is used."""
+    """Return the instants; between two, the later is used."""
     rows = [ceil(i * preview.interval_us / control_interval_us) for i in range(preview.samples)]
     samples = max(rows[-1] + 1, 2)
     return Instants(Preview(control_interval_us, samples), None if rows == list(range(samples)) else rows)

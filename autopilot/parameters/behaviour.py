@@ -1,4 +1,4 @@
-"""Parameters of the vehicle's behaviour, under PX4's names where the meaning is the same."""
+"""Parameters of the behaviour, under PX4's names where the meaning is the same."""
 
 from dataclasses import fields
 from math import radians
@@ -17,7 +17,7 @@ _YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
 
 
 class Row(NamedTuple):
-    """A parameter for a `field` of `Behaviour` or its limits, which is `scale` times the parameter."""
+    """A parameter for a `field`, which is `scale` times the parameter."""
 
     name: str
     field: str
@@ -133,12 +133,12 @@ _ANSWERS = "Only answers ground stations that request it: changes nothing."
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
-    """Return the behaviour's parameters, and those that ground stations expect from PX4."""
+    """Return also parameters that ground stations expect from PX4."""
     return [*(row.parameter() for row in ROWS), *_answers(system_id)]
 
 
 def behaviour(parameters: Parameters) -> Behaviour:
-    """Return the behaviour by the parameters; unchanged numbers keep 64 bits."""
+    """Unchanged numbers keep 64 bits."""
     changed: dict[str, Any] = {}
     for row in ROWS:
         value = parameters[row.name]

@@ -14,7 +14,7 @@ _PREFIX_LENGTH = 3
 
 
 def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
-    """Return the numbers of a control law's table; undescribed ones are named by their keys."""
+    """Return a law's numbers; undescribed ones are named by their keys."""
     if controller in DESCRIBED:
         return [number for number in DESCRIBED[controller] if has(table, number.path)]
     letters = "".join(letter for letter in controller.upper() if letter.isascii() and letter.isalnum())

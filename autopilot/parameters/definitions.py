@@ -23,11 +23,7 @@ class ImpossibleError(AutopilotError):
 
 
 class Numbers:
-    """The parameters of a control law and a vehicle model.
-
-    Attributes:
-        definitions: Parameters, with the files' numbers as defaults.
-    """
+    """Parameters of a control law and a vehicle model."""
 
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
         self._profile = profile
@@ -49,11 +45,7 @@ class Numbers:
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
-        """Return profile and vehicle with these values; the law's table is checked when the law is built.
-
-        Raises:
-            ImpossibleError: The vehicle is impossible.
-        """
+        """Return profile and vehicle, or raise ImpossibleError."""
         profile, vehicle = self._profile, self._vehicle
         table = changed(self._table, self._law, values, self.defaults)
         if table is not self._table:

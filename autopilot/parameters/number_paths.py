@@ -30,7 +30,7 @@ _MAX_WORD_CHARS = 8
 
 
 class Number(NamedTuple):
-    """A number at a `path`, `scale` times its parameter; the other fields are the parameter's."""
+    """A number at a `path`, `scale` times its parameter."""
 
     name: str
     path: Path
@@ -42,7 +42,7 @@ class Number(NamedTuple):
     decimals: int = 3
 
     def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
-        """Return the parameter; its default is the tree's value, and bounds widen to include it."""
+        """Bounds widen to include the default."""
         value = read(tree, self.path)
         kind = Kind.INT if isinstance(value, int) else Kind.REAL
         default = value if kind == Kind.INT else value / self.scale
@@ -82,10 +82,7 @@ def has(tree: Mapping[str, Any], path: Path) -> bool:
 
 
 def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], defaults: Mapping[str, Value]) -> Tree:
-    """Return the tree with all changed values, or the same tree without changes.
-
-    Parameters hold 32 bits: unchanged numbers keep 64.
-    """
+    """Return the tree with all changed values; unchanged numbers keep 64 bits."""
     for number in numbers:
         if values[number.name] != defaults[number.name]:
             tree = _with(tree, number.path, number.applied(values[number.name]))
@@ -123,10 +120,7 @@ def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
 
 
 def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> list[Number]:
-    """Return the undescribed numbers of a table, without excluded keys.
-
-    Names are the prefix and the words of the keys, all shortened to the same length until they fit.
-    """
+    """Name undescribed numbers by prefix and keys, shortened until they fit."""
     taken: set[str] = set()
     numbers = []
     for path in paths(tree):
@@ -155,7 +149,6 @@ def _without_unit(path: Path) -> tuple[Path, str]:
 
 
 def _names(prefix: str, path: Path) -> Iterator[str]:
-    """Yield names for a path, longest first."""
     words = [_plain(word) for key in path if isinstance(key, str) for word in key.split("_")]
     places = "".join(str(key + 1) for key in path if isinstance(key, int))
     room = _MAX_NAME_CHARS - len(prefix) - 1 - len(places)

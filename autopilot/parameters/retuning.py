@@ -1,4 +1,4 @@
-"""Retuning in flight: the control law is rebuilt and checked before a parameter changes."""
+"""Retuning: the control law is rebuilt and checked before a change."""
 
 from collections.abc import Callable, Mapping
 from math import pi
@@ -39,15 +39,11 @@ class Rhythm(Protocol):
 
 
 class Trial(Protocol):
-    """Other objects built from parameters; both methods raise on bad values."""
+    """Other objects built from parameters; methods raise on bad values."""
 
-    def try_vehicle(self, vehicle: Vehicle) -> None:
-        """Build and try everything that depends on the vehicle model."""
-        ...
+    def try_vehicle(self, vehicle: Vehicle) -> None: ...
 
-    def try_values(self, parameters: Parameters) -> None:
-        """Build and try everything that depends on the other parameters."""
-        ...
+    def try_values(self, parameters: Parameters) -> None: ...
 
 
 class Tuned(NamedTuple):
@@ -70,7 +66,6 @@ class Tuning:
         parameters: Parameters | None = None,
         trial: Trial | None = None,
     ) -> None:
-        """Keep the rhythm of `running`; `say` reports refusals."""
         self._numbers = numbers
         self._build = build
         self._say = say
@@ -79,10 +74,7 @@ class Tuning:
         self._tried: Vehicle | None = None
 
     def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
-        """Return the control law for a change as a `Tuned`, or a refusal, for `Parameters.prepare`.
-
-        `values` are of all parameters, with the change.
-        """
+        """Return the changed control law as a `Tuned`, or a refusal."""
         try:
             if name not in self._numbers.defaults:
                 self._try_values(values)
@@ -97,7 +89,6 @@ class Tuning:
         return Prepared(tuned)
 
     def tuned(self, values: Mapping[str, Value]) -> Tuned:
-        """Build and try law and vehicle for these values; errors pass through."""
         profile, vehicle = self._numbers.applied(values)
         controller = self._build(profile, vehicle)
         _try(profile.controller, controller, vehicle)
@@ -107,7 +98,6 @@ class Tuning:
         return Tuned(profile, vehicle, controller)
 
     def try_all(self, values: Mapping[str, Value]) -> None:
-        """Try all initial values, or raise ImpossibleError."""
         try:
             self._try_values(values)
             self.tuned(values)
@@ -120,7 +110,6 @@ class Tuning:
 
 
 def builder(controller: str, clock: Clock) -> Build:
-    """Return the builder of an installed control law, or raise ControllerError."""
     factory = load_controller(controller)
 
     def build(profile: Profile, vehicle: Vehicle) -> Controller[Any]:
@@ -136,7 +125,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly two control samples near hover and two far from it."""
+    """Fly near hover, and far from it."""
     references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):

@@ -1,4 +1,4 @@
-"""Parameters of the vehicle model, as the autopilot assumes it, not the plant."""
+"""Parameters of the assumed vehicle model."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,6 @@ _AXES = "XYZ"
 
 
 def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
-    """Return the numbers of a vehicle's tables, for modelled parts only."""
     speed = tree["rotors"]["speed_unit"]
     inside = f"({speed})" if "/" in speed else speed
     return [

@@ -57,12 +57,7 @@ class Client:
         self._unknown_since_us: int | None = None
 
     def fly(self, autopilot: Autopilot[Any]) -> None:
-        """Answer frames until stopped.
-
-        Raises:
-            DecisionError: The control law returned impossible rotor speeds.
-            LogError: A log cannot be written, in a flight without ground stations.
-        """
+        """Answer frames until stopped, or raise DecisionError or LogError."""
         self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
@@ -89,7 +84,7 @@ class Client:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _keep(self, write: Callable[[AutopilotLog], None]) -> None:
-        """Write to the log; with ground stations, a failed log does not end the flight."""
+        """With ground stations, a failed log does not end the flight."""
         if self._log is None:
             return
         try:
@@ -104,7 +99,6 @@ class Client:
             self._link.send(datagram)
 
     def _report_if_unknown(self, step: Step) -> None:
-        """Report once why a vehicle without an estimate stays disarmed, or falls."""
         now_us = step.command.time_us
         if step.known:
             self._unknown_since_us = None

@@ -1,4 +1,4 @@
-"""Exceptions caught in flight: a line of JSON each, and a line on the terminal for each part."""
+"""Exceptions caught in flight, as lines of JSON."""
 
 import sys
 from pathlib import Path
@@ -12,14 +12,10 @@ FILE = "errors.jsonl"
 
 
 class ErrorLog:
-    """The exceptions of one process.
-
-    Attributes:
-        failed: Whether any was written.
-    """
+    """The exceptions of one process."""
 
     def __init__(self, folder: Path | None, status: Status) -> None:
-        """Append to `errors.jsonl` in `folder`; without a folder, tracebacks go to standard error."""
+        """Without a folder, tracebacks go to standard error."""
         self._path = None if folder is None else folder / FILE
         self._status = status
         self._said: set[str] = set()

@@ -1,4 +1,4 @@
-"""Ground stations of the process: links, key, parameter file, logs, terminal reports."""
+"""Ground stations of the process: links, files, terminal reports."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -39,12 +39,7 @@ _STANDING_SAMPLES = 50
 
 
 class Ground:
-    """Serves ground stations beside the plant, and saves all state that must survive the process.
-
-    Attributes:
-        autopilot: Replaced by a restart.
-        shut_down: Whether a ground station has requested the end.
-    """
+    """Serves ground stations; a restart replaces `autopilot`."""
 
     def __init__(
         self,
@@ -54,11 +49,7 @@ class Ground:
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files of `spec`; a `conductor` replaces all ground stations.
-
-        Raises:
-            GroundError: A link or file cannot be used.
-        """
+        """Open links and files, or raise GroundError; a `conductor` replaces all ground stations."""
         self._spec = spec
         self._profile = profile
         self._vehicle = vehicle
@@ -104,7 +95,6 @@ class Ground:
             self._status.say("ground", _invitation(link.url), url=link.url, link=number)
 
     def record(self, log: "AutopilotLog") -> None:
-        """Record initial values and inputs in `log`."""
         self._log = log
         log.begin_again(self._values, self._past_bytes)
         log.follow(self.copter.parameters)
@@ -114,10 +104,7 @@ class Ground:
         return self.autopilot.stages
 
     def serve(self, now_s: float) -> Autopilot[Copter]:
-        """Receive from ground stations and answer them; return the autopilot, which a restart replaces.
-
-        Answers are sent last, so that acknowledged changes are on disk even if the process is killed.
-        """
+        """Answer ground stations last: acknowledged changes are then on disk, even if the process is killed."""
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
@@ -134,7 +121,6 @@ class Ground:
         return self.autopilot
 
     def _record_told(self) -> None:
-        """Record new snapshots and texts."""
         stations = self.copter.stations
         snapshot, said = stations.snapshot, stations.take_texts()
         if said:
@@ -151,14 +137,12 @@ class Ground:
             self._status.say("said", f"{error}; flying on")
 
     def _recorded(self, log: "AutopilotLog", received: Iterable[Received]) -> Iterator[Received]:
-        """Record and yield received datagrams; a failed log does not stop them."""
         try:
             yield from log.recorded(received)
         except LogError as error:
             self._status.say("said", f"{error}; flying on")
 
     def _look_after(self, now_s: float) -> None:
-        """Report to the terminal, and save changes."""
         if now_s >= self._reported_s + _REPORT_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
             self._report(now_s)
         if self.copter.parameters.revision != self._revision:
@@ -168,7 +152,7 @@ class Ground:
             self._keep()
 
     def _keep(self) -> None:
-        """Save the state that lets the flight continue if this process is killed."""
+        """Save the state for a restart after a kill."""
         copter, samples = self.copter, self.copter.samples
         if samples == self._kept_samples:  # between two control samples
             return
@@ -186,7 +170,6 @@ class Ground:
         self._kept_samples, self._kept_plans, self._kept_armed = samples, changes, armed
 
     def close(self) -> None:
-        """Write remaining data, and close links and files."""
         self._report_texts()
         self.copter.stations.log.close()
         self._state.save_signing()
@@ -194,7 +177,7 @@ class Ground:
         self._state.close()
 
     def abandon(self) -> None:
-        """Close the files without writing, like a power cut."""
+        """Close without writing, like a power cut."""
         self._state.close()
 
     def _restart(self, kind: float) -> None:

@@ -1,4 +1,4 @@
-"""The links to ground stations: receive from all, and route each answer."""
+"""The links to ground stations."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,11 +26,7 @@ _GONE_AFTER_S = 3.5
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
-    """Open the links of `urls`.
-
-    Raises:
-        LinkError: A link cannot be opened, or would let strangers on the network fly the vehicle.
-    """
+    """Open all, or raise LinkError; networks require signing or `insecure`."""
     check_reach(urls, signed=signed, insecure=insecure)
     links: list[GroundLink] = []
     try:
@@ -46,12 +42,10 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
 class Allowance:
     """Time budget for received data: a share of all time.
 
-    Senders that exceed it are read less often, and the control law is not delayed. Only processor time counts, because
-    other processes on a busy computer are not the senders' fault.
+    Senders that exceed it are read less often. Only processor time counts, because other processes are not their fault.
     """
 
     def __init__(self, clock: Clock, processor_clock: Clock) -> None:
-        """Start with a full budget."""
         self._clock = clock
         self._processor_clock = processor_clock
         self._earned_s = clock()
@@ -68,7 +62,6 @@ class Allowance:
         return self._left_s > 0.0
 
     def end(self) -> None:
-        """Charge the time spent, even beyond the budget."""
         self._left_s -= self._processor_clock() - self._began_s
 
 
@@ -76,7 +69,6 @@ class GroundLinks:
     """Carries datagrams between links and a vehicle's hub."""
 
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
-        """Links with a target are called, whether anyone listens or not."""
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
         self._allowance = Allowance(clock, processor_clock)
@@ -88,7 +80,6 @@ class GroundLinks:
         self._last: dict[tuple[int, Source], tuple[int, float]] = {}
 
     def introduce(self, stations: Stations) -> None:
-        """Reopen the channels of all connections."""
         for number, address in self._opened:
             self._open(stations, number, address)
 
@@ -97,10 +88,7 @@ class GroundLinks:
         stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
     def receive(self, stations: Stations) -> Iterator[Received]:
-        """Yield received datagrams within the time budget; drop closed connections.
-
-        Excess data waits here, then in the system, which drops it in the end.
-        """
+        """Yield datagrams within the time budget; excess waits here, then in the system."""
         self._allowance.earn()
         for number, link in enumerate(self._links):
             if not self._waiting[number]:
@@ -114,7 +102,7 @@ class GroundLinks:
                 self._forget(stations, number, address)
 
     def _in_turn(self) -> Iterator[Received]:
-        """Yield from the links in turn, so that a flooded link does not block the others."""
+        """Alternate between links, so that a flooded one does not block others."""
         while any(self._waiting):
             for number, waiting in enumerate(self._waiting):
                 if not waiting:
@@ -131,7 +119,7 @@ class GroundLinks:
         stations.hub.close(number, address)
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
-        """Send each datagram on its link; failures are lost datagrams, as on any network."""
+        """Failures are lost datagrams."""
         self._allowance.begin()
         for number, address, datagram in outbox:
             try:
@@ -141,7 +129,6 @@ class GroundLinks:
         self._allowance.end()
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
-        """Return senders and message rates for each link."""
         facts = []
         for number, link in enumerate(self._links):
             channels = [channel for channel in stations.hub.channels if channel.link == number]
@@ -162,7 +149,6 @@ class GroundLinks:
         return facts
 
     def _there(self, channel: Channel) -> Iterator[Source]:
-        """Yield the recent sources of a channel."""
         now_s = self._clock()
         for source, received_us in channel.sources_us.items():
             before_us, since_s = self._last.get((channel.number, source), (-1, now_s))
@@ -173,7 +159,6 @@ class GroundLinks:
                 yield source
 
     def take_notes(self) -> list[str]:
-        """Return new notes on the links for the user."""
         return [note for link in self._links for note in link.take_notes()]
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The autopilot's records of a flight: setup, inputs, decisions, estimates."""
+"""The autopilot's records of a flight."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import nan
@@ -44,10 +44,7 @@ _NO_REFERENCES = (nan,) * 11
 
 
 class AutopilotLog:
-    """Records control samples, inputs, and PX4's topics: from the steps of a track, or from snapshots.
-
-    A method raises LogError if it cannot write.
-    """
+    """Records samples, inputs and PX4's topics; raises LogError."""
 
     def __init__(self, topics: TopicLog, setup: Setup) -> None:
         self.topics, self._setup = topics, setup
@@ -63,10 +60,7 @@ class AutopilotLog:
         self._fallback: Fallback | None = None
 
     def write(self, step: Step, datagram: bytes | None = None) -> None:
-        """Append a control sample; for a frame between samples, only the command and the filter check.
-
-        `datagram` is the frame as received, which a replay lacks.
-        """
+        """Append a control sample; between samples, only command and filter check. A replay lacks the `datagram`."""
         time_us = step.command.time_us
         if time_us < self._time_us:
             self._begin_anew()
@@ -91,13 +85,11 @@ class AutopilotLog:
                 self._view(*self._views, step, decided)
 
     def follow(self, parameters: Parameters) -> None:
-        """Record the snapshots of a vehicle with these parameters from now on."""
         vehicle = self._setup.vehicle_tables
         name = self._setup.vehicle if vehicle is None else vehicle.name
         self._recorder = Recorder(self.topics, name, self._setup.system_id, parameters, with_battery=False)
 
     def beginning(self) -> bytes:
-        """Return the start of a file, with the current parameters."""
         if self._recorder is not None:
             return self._recorder.begin()
         profile, vehicle = self._setup.profile_tables, self._setup.vehicle_tables
@@ -113,12 +105,11 @@ class AutopilotLog:
         self.topics.append(messages.logged_string(time_us, severity, text))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
-        """Record a new vehicle from the next frame on, with these parameters and this history."""
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
         self._begins = True
 
     def recorded(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
-        """Record and yield datagrams of ground stations; LogError is raised only after the last one."""
+        """Record and yield datagrams; raise LogError after the last."""
         failed: LogError | None = None
         for received in datagrams:
             datagram, link, address, loopback = received
@@ -135,18 +126,17 @@ class AutopilotLog:
         self.topics.flush()
 
     def close(self) -> None:
-        """Write waiting data if possible, and close the log."""
         self.topics.close()
 
     def _begin_anew(self) -> None:
-        """Start a new flight, because the plant's time has restarted."""
+        """The plant's time has restarted."""
         self.topics.close()
         self._status_us, self._thinning = -1, Thinning()
         self._fallback = None
         self._begins = True
 
     def _write_input(self, step: Step, datagram: bytes | None) -> None:
-        """Write the inputs of a replay; a datagram with only the state is reconstructed from the truth."""
+        """Write the inputs of a replay; states follow from the truth."""
         time_us, controls, armed = step.command
         if self._begins:
             self._begins = False
@@ -172,7 +162,6 @@ class AutopilotLog:
             self.say(time_us, *said)
 
     def _view(self, samples: SampleBlocks, sensings: SensingBlocks, step: Step, decided: tuple[float, ...]) -> None:
-        """Write a control sample of a track in PX4's topics."""
         estimate, frame = step.estimate, step.frame
         known = frame if estimate is None else estimate.frame
         if not isinstance(known, StateFrame):
@@ -186,14 +175,14 @@ class AutopilotLog:
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
 
     def _check_row(self, check: Check) -> tuple[float, ...]:
-        """Return the row of `FILTER`, with nan for absent measurements."""
+        """Absent measurements are nan."""
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
         return (check.time_us / 1e6, *check.state, *check.covariance, *counts)
 
 
 def log_in(folder: Path, setup: Setup) -> AutopilotLog:
-    """Return the log of `flight.ulg` in a folder; the file is created with the first frame."""
+    """The file is created with the first frame."""
     log = AutopilotLog(FileLog(lambda: SharedLog(folder / FILE, log.beginning())), setup)
     return log
 
@@ -208,7 +197,7 @@ def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
 
 
 def _first(references: Horizon) -> tuple[float, ...]:
-    """Return position, velocity, acceleration, yaw and yaw rate of the first reference."""
+    """Return position, velocity, acceleration, yaw and yaw rate."""
     position, velocity, acceleration, _, _, yaw, yaw_rate, _ = references
     p, v, a = position.item, velocity.item, acceleration.item
     return (p(0), p(1), p(2), v(0), v(1), v(2), a(0), a(1), a(2), yaw.item(0), yaw_rate.item(0))

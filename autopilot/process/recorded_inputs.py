@@ -16,26 +16,20 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class InputsError(AutopilotError):
-    """A log without such inputs; the message is for the user."""
+    """A log without inputs; the message is for the user."""
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="began", tag_field="what"):
-    """Setup of an autopilot.
+    """Setup of an autopilot; names or files, as chosen.
 
     Attributes:
-        profile: Name or file.
-        solver: Chosen QP solver; None for the profile's.
-        delay_s: Chosen delay; None for the profile's.
-        vehicle: Assumed vehicle, name or file.
-        track: Track flown from the start; None with ground stations.
-        floor_m: Lowest height of the track; None for the vehicle's ground.
-        origin: Origin of the ENU frame.
-        boot_unix_us: Unix time at simulated time 0; 0 for simulated time.
-        ground: Whether it served ground stations.
-        values: Changed parameters.
-        history: Saved state of the same flight, after a kill.
+        solver, delay_s: Replace the profile's.
+        track: Flown from the start, without ground stations.
+        floor_m: By default the ground.
+        boot_unix_us: 0 for simulated time.
+        history: Saved state of the flight, after a kill.
         first_us: First answered frame.
-        profile_tables, vehicle_tables: Contents of the files; None in old logs.
+        profile_tables, vehicle_tables: Missing in old logs.
         track_file: Content of the track's file.
     """
 
@@ -61,7 +55,6 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file: str | None) -> Setup:
-    """Return the setup; `track_file` is the content of the track's file."""
     return Setup(
         profile=name_of(spec.profile),
         controller=profile.controller,
@@ -102,13 +95,7 @@ def encoded(what: Input) -> bytes:
 
 
 class Inputs(NamedTuple):
-    """Inputs of an autopilot in a flight, by the time of a frame.
-
-    Attributes:
-        setups: By the first answered frame; a restart in flight is another setup.
-        datagrams: From ground stations, by the preceding frame.
-        frames: Datagrams of the plant.
-    """
+    """Inputs by the time of a frame; several setups after restarts."""
 
     setups: dict[int, Setup]
     datagrams: dict[int, list[ReceivedDatagram]]
@@ -116,11 +103,7 @@ class Inputs(NamedTuple):
 
 
 def read_inputs(records: Iterable[InputRecord]) -> Inputs:
-    """Return the inputs of a log.
-
-    Raises:
-        InputsError: A record is malformed, or the setup is missing.
-    """
+    """Return the inputs of a log, or raise InputsError."""
     inputs = Inputs({}, {}, {})
     for time_us, kind, content in records:
         if kind == Kind.FRAME:

@@ -1,4 +1,4 @@
-"""The autopilot process: calls a plant, answers its frames, logs its decisions."""
+"""The autopilot process."""
 
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 
 def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, stop: Stop) -> int:
-    """Fly the plant at the other end of `link`; return the exit code."""
     try:
         profile, vehicle = spec.load()
         ground = _ground(spec, profile, vehicle, status, stop) if spec.served else None
@@ -65,7 +64,7 @@ def _end(spec: AutopilotSpec, frame_interval_us: int) -> AutopilotEnd:
 
 
 def _flier(spec: AutopilotSpec, vehicle: Vehicle) -> FlierEnd:
-    """Return the end for a simulator with PX4's rotor order."""
+    """Simulators have PX4's rotor order."""
     rotors, order = vehicle.rotors, vehicle.rotors.numbering()
     return FlierEnd(
         system_id=spec.system_id,
@@ -83,7 +82,7 @@ def _alone(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Stat
 
 
 def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "Ground":
-    """Load the ground services only if used: they double the start-up time."""
+    """Load ground services only if used: they double the start-up time."""
     from colibri.autopilot.process.ground import Ground
     from colibri.autopilot.process.stepped_links import UdpConductor
 

@@ -1,4 +1,4 @@
-"""Persistent state in the folder of --state: parameters, key, files, logs, plans, flight."""
+"""The folder of --state: parameters, key, files, logs, plans, flight."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -33,12 +33,7 @@ class GroundError(AutopilotError):
 
 
 class StateFolder:
-    """The folder of --state; without one, state is not kept.
-
-    Attributes:
-        signing: Key and last timestamp, initially at least `tick`.
-        files, logs: For file transfer and download.
-    """
+    """The folder of --state, if any."""
 
     def __init__(
         self,
@@ -51,12 +46,7 @@ class StateFolder:
         tick: int,
         params: Mapping[str, float] = {},
     ) -> None:
-        """Read the signing key and open the folder; `params` are initial parameters until others are saved.
-
-        Raises:
-            FolderInUseError: Another vehicle uses the folder.
-            GroundError: A file cannot be used.
-        """
+        """Open the folder, or raise FolderInUseError or GroundError; `params` are initial values."""
         self._path = path
         self._profile = profile
         self._vehicle = vehicle
@@ -73,17 +63,15 @@ class StateFolder:
 
     @property
     def keeps_flights(self) -> bool:
-        """Whether flights are saved, to continue after a restart."""
         return self._flight is not None
 
     def history(self) -> History | None:
-        """Return the saved state of the last flight."""
         content = self._flight.newest() if self._flight else None
         kept = of_bytes(Checkpoint, content) if content else None
         return None if kept is None else History(kept, self._read_plans())
 
     def keep(self, record: Checkpoint) -> bool:
-        """Save the state of the flight; return whether it fitted."""
+        """Return whether the record fitted."""
         return self._flight is None or self._flight.write(to_bytes(record))
 
     def save_plans(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
@@ -91,16 +79,12 @@ class StateFolder:
             _replace(self._path / PLANS, to_bytes(dict(plans)))
 
     def parameter_path(self) -> Path:
-        """Return the parameter file, one for each control law and vehicle."""
+        """Each control law and vehicle has a file."""
         assert self._path is not None, "called only where something is kept"
         return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
 
     def parameters(self) -> dict[str, Value]:
-        """Return the saved parameters.
-
-        Raises:
-            GroundError: The file cannot be read, or an initial value is impossible.
-        """
+        """Return the saved parameters, or raise GroundError."""
         if self._path is None:
             return self._initial()
         path = self.parameter_path()
@@ -116,7 +100,6 @@ class StateFolder:
             raise GroundError(f"{path}: {error}; correct or remove it") from error
 
     def _initial(self) -> dict[str, Value]:
-        """Return the initial values, rounded as in a file."""
         parameters = Parameters(definitions(self._profile, self._vehicle, self._system_id))
         for name, value in self._params.items():
             if name not in parameters:
@@ -131,7 +114,6 @@ class StateFolder:
             _replace(self.parameter_path(), write(parameters, self._system_id).encode())
 
     def save_signing(self) -> None:
-        """Save the last timestamp, and the key if a ground station changed it."""
         if self._path is None or not (self.signing.active or self.signing.key_changed):
             return
         _replace(self._path / TIMESTAMP, str(self.signing.timestamp).encode())
@@ -168,7 +150,7 @@ class StateFolder:
             raise GroundError(f"signing key {path}: {error}") from error
 
     def _read_timestamp(self) -> int:
-        """Return the last timestamp of the previous run, because signatures must not repeat one."""
+        """Signatures must not repeat a timestamp."""
         if self._path is None:
             return 0
         path = self._path / TIMESTAMP
@@ -183,7 +165,7 @@ class StateFolder:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Replace a file atomically; errors are ignored."""
+    """Write atomically; ignore errors."""
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

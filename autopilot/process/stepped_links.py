@@ -1,4 +1,4 @@
-"""Ground stations behind a conductor, which stops simulated time: reception does not depend on clocks."""
+"""Ground stations behind a conductor, which stops simulated time."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -19,8 +19,7 @@ _MAX_WAIT_S = 0.1
 class Conductor(Protocol):
     """Represents all ground stations, in lockstep with the vehicle."""
 
-    def receive(self) -> StepMessage | None:
-        """Return the messages of this instant; None at the end."""
+    def receive(self) -> StepMessage | None: ...
 
     def send(self, step_message: StepMessage) -> None: ...
 
@@ -31,7 +30,7 @@ class UdpConductor:
     """A conductor in another process."""
 
     def __init__(self, link: UdpLink, ended: Callable[[], object]) -> None:
-        """Register by an empty packet; stop waiting once this process has `ended`."""
+        """Register by an empty packet."""
         self._link = link
         self._ended = ended
         self._gathering = Gathering()
@@ -60,7 +59,6 @@ class SteppedLinks:
     """Carries datagrams between a conductor and a vehicle's hub."""
 
     def __init__(self, conductor: Conductor, state: Callable[[], State]) -> None:
-        """The conductor receives the vehicle's `state` with each step message."""
         self._conductor = conductor
         self._state = state
         self._time_us = 0
@@ -70,7 +68,7 @@ class SteppedLinks:
         """Channels open with their first message."""
 
     def receive(self, stations: Stations) -> Iterable[Received]:
-        """Wait for the messages of this instant, and yield them; untaken ones are yielded next time."""
+        """Wait for the messages of this instant; untaken ones remain."""
         del stations
         step_message = self._conductor.receive()
         if step_message is not None:

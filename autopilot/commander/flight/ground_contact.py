@@ -1,4 +1,4 @@
-"""Ground contact: standing or airborne, and the times of arming, take-off and landing."""
+"""Ground contact, and the times of arming, take-off and landing."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from colibri.mavlink.services.statustext import INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
-    """Simulated times of the last arming, take-off and landing, 0 before the first, and the number of armings."""
+    """Simulated times, 0 before the first, and the number of armings."""
 
     armed_us: int = 0
     takeoff_us: int = 0
@@ -20,7 +20,7 @@ class FlightTimes(NamedTuple):
 
 
 class GroundRecord(NamedTuple):
-    """Ground contact as plain data; the fields are attributes of `GroundContact`."""
+    """Attributes of `GroundContact`."""
 
     standing: bool
     idles: bool
@@ -29,12 +29,7 @@ class GroundRecord(NamedTuple):
 
 
 class GroundContact:
-    """Ground contact of one vehicle.
-
-    Attributes:
-        idles: Whether the rotors stand or idle.
-        height_m: Height of the last standing position, z of ENU, m.
-    """
+    """Ground contact of one vehicle; `height_m` is z of ENU at the last standing position."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
@@ -44,7 +39,6 @@ class GroundContact:
         self.times = FlightTimes()
 
     def begin(self, now_us: int, *, standing: bool) -> None:
-        """Start a flight; the count of flights is kept."""
         self.times = FlightTimes(flights=self.times.flights)
         self.standing = self.idles = standing
         if not standing:
@@ -66,7 +60,6 @@ class GroundContact:
         self.times = self.times._replace(armed_us=now_us, flights=self.times.flights + 1)
 
     def spin_up(self) -> bool:
-        """Leave idle; return whether the rotors stood or idled before."""
         idled, self.idles = self.idles, False
         return idled
 
@@ -82,7 +75,6 @@ class GroundContact:
         self._lines.say(NOTICE, "landing detected")
 
     def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
-        """Detect a landing in flight; `sinks` and `drifts` as in `landing_detector.watch`."""
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self.land(now_us)
@@ -99,7 +91,6 @@ class GroundContact:
         self._landing = Landing()
 
     def end_of_idling(self, now_us: int, behaviour: Behaviour) -> Event | None:
-        """Return the event that stops idling rotors once the allowed time is over."""
         landed = self.times.landing_us > self.times.armed_us
         on_ground_us = now_us - max(self.times.armed_us, self.times.landing_us)
         allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s

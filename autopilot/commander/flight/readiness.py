@@ -1,4 +1,4 @@
-"""Readiness to arm: the arming checks, and a failed rotor that allows landing only."""
+"""Readiness to arm."""
 
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -6,13 +6,7 @@ from colibri.mavlink.services.statustext import EMERGENCY
 
 
 class Readiness:
-    """Readiness of one vehicle to fly.
-
-    Attributes:
-        rotor_failed: The failed rotor as text; empty if all work.
-        error: The software part that raised an exception in flight; empty if all work.
-        descends: Whether the last-resort control law flies: only landing is possible.
-    """
+    """Arming checks, failed rotor and failed software part, as text or empty; `descends` is the last resort."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
@@ -32,15 +26,13 @@ class Readiness:
 
     @property
     def only_lands(self) -> str:
-        """Reason why only landing is possible; empty if other modes are."""
+        """Reason why only landing is possible."""
         return self.rotor_failed or (self.error if self.descends else "")
 
     def fail(self, error: str) -> None:
-        """Record a failed part: the rotors are not armed again."""
         self.error = self.error or error
 
     def lose_rotor(self, rotor: int) -> None:
-        """Record the failure of rotor 0..3: modes can no longer be selected, and its failsafe lands."""
         self.rotor_failed = f"rotor {rotor + 1} failed"
         self._lines.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
 

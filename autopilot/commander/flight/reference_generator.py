@@ -1,4 +1,4 @@
-"""The reference generator: moves the reference to a task's target and previews it for the control law."""
+"""The reference generator: moves the reference to a task's target, and previews it."""
 
 from typing import NamedTuple
 
@@ -23,12 +23,7 @@ from colibri.autopilot.guidance.trajectories.planner import carried
 
 
 class Led(NamedTuple):
-    """A movement of the reference to a target, kept to skip repeating it while the reference rests.
-
-    Attributes:
-        horizon, for_law: From the previous reference, and at the control law's instants.
-        stays: Whether the reference is unchanged: the same target and limits give the same result.
-    """
+    """The last movement to a target, reused while the reference rests (`stays`)."""
 
     target: Target
     limits: Limits
@@ -42,12 +37,7 @@ class Led(NamedTuple):
 
 
 class ReferenceGenerator:
-    """Reference generator of one vehicle.
-
-    Attributes:
-        reference: State of the reference; None before the first vehicle state.
-        samples: Number of planned instants, `interval_s` apart.
-    """
+    """Reference of one vehicle, with `samples` planned instants."""
 
     def __init__(self, instants: Instants, limits: Limits) -> None:
         self._instants = instants
@@ -71,7 +61,7 @@ class ReferenceGenerator:
         self.set(at_rest(vehicle))
 
     def wait(self, waited_s: float, path_speed: float) -> None:
-        """Move the reference back by the path time lost in the last sample; path time now passes at `path_speed`."""
+        """Move the reference back by lost path time."""
         self._path_speed = path_speed
         if waited_s != 0.0 and self._ahead is not None:
             following = Horizon(*(column[1:2] for column in self._ahead))
@@ -80,7 +70,6 @@ class ReferenceGenerator:
             self._waited = True
 
     def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
-        """Move the reference on by one sample, and return the control law's preview."""
         reference, waited = context.reference, self._waited
         if wanted.pace is Pace.CLOCK and self._path_speed != 1.0:
             reference = slowed(reference, self._path_speed)

@@ -19,16 +19,7 @@ _SURELY_LEVEL = 0.1
 
 
 class ArmingInputs(NamedTuple):
-    """Inputs of the arming checks.
-
-    Attributes:
-        state: None before the first frame.
-        charge: Remaining part of the charge; 1 without a battery.
-        thrust_stick: 0..1; None if the mode takes none, or none is received.
-        outside_fence: Fence breach at the current position, if any.
-        not_known: Inaccurate parts of the estimate; empty if all are accurate.
-        battery: Reason against this battery, apart from its charge; empty if healthy.
-    """
+    """Inputs of the arming checks; `charge` and `thrust_stick` are 0..1, texts are reasons or empty."""
 
     state: VehicleState | None
     standing: bool

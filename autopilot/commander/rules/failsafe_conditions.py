@@ -1,4 +1,4 @@
-"""The conditions of the failsafes, judged by simulated time: when each began to hold."""
+"""When each failsafe condition began, by simulated time."""
 
 from collections.abc import Callable, Container, Mapping
 from math import hypot, radians, sqrt
@@ -28,17 +28,13 @@ class FailsafeInputs(NamedTuple):
     """Inputs of the conditions.
 
     Attributes:
-        missed_us: Time of the last frame before a gap; None without one.
-        estimate: Accuracy of the state; None if the plant reports the state.
-        setpoint: The companion's latest, of any age; None if it ended its stream.
-        sticks_us: Time of the latest sticks; None if they were released.
-        listening_us: Start of listening for clients: the restart, if in flight.
-        station_us: Time of the latest ground station heartbeat; None before the first.
-        fence: Margin of a place to every fence, m; None without a fence.
-        decided: Diagnostics of the control law's last decision; None while it is inactive.
+        missed_us: Last frame before a gap.
+        setpoint: The companion's latest, of any age.
+        listening_us: Start of listening for clients.
+        fence: Margin of a place, m.
+        decided: Diagnostics while the control law is active.
         late: Whether the declared solve time exceeds a control sample.
-        rotor_lost: Failed rotor, 0..3; None if all work.
-        pace: Limits for braking.
+        rotor_lost: Failed rotor, 0..3.
     """
 
     now_us: int
@@ -69,7 +65,7 @@ class Conditions:
         self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
-        """Return when each holding condition began; `held` conditions were lost before."""
+        """Return when each condition began; `held` ones were lost before."""
         before, self._since_us = self._since_us, {}
         found: dict[Condition, int] = {}
         for condition, silent_since in SILENT_SINCE.items():
@@ -85,7 +81,7 @@ class Conditions:
         return found
 
     def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
-        """Return the start of an unchanged position and attitude with non-zero rates."""
+        """Return the start of an unchanged pose with non-zero rates."""
         state, now_us = inputs.state, inputs.now_us
         if state.position_enu_m != self._position or state.attitude != self._attitude or inputs.standing:
             self._position, self._attitude, self._pose_us = state.position_enu_m, state.attitude, now_us
@@ -97,17 +93,15 @@ class Conditions:
 
 
 def battery_below(battery: BatteryState | None, charge: float, voltage_v: float) -> bool:
-    """Whether charge or voltage is below its limit; a voltage limit of 0 is off."""
+    """Check charge and voltage; a limit of 0 V is off."""
     return battery is not None and (battery.remaining < charge or battery.voltage_v < voltage_v)
 
 
 def needs_position(mode: Mode, setpoint: OffboardSetpoint | None) -> bool:
-    """Whether the mode, or the setpoint in offboard, needs a position."""
     return mode not in PLACELESS and not (mode is Mode.OFFBOARD and isinstance(setpoint, AttitudeSetpoint))
 
 
 def position_known(estimate: Estimate | None, limits: Limits) -> bool:
-    """Whether position and velocity are within their accuracy limits; always without an estimate."""
     if estimate is None:
         return True
     position_m, velocity_m_s = max(estimate.position_std_m[:2]), max(estimate.velocity_std_m_s[:2])
@@ -115,7 +109,7 @@ def position_known(estimate: Estimate | None, limits: Limits) -> bool:
 
 
 def resting_place(state: VehicleState, pace: Pace) -> Vector:
-    """Return the position after braking as hard as allowed, m, ENU."""
+    """Return the position after braking, m, ENU."""
     (x, y, z), (vx, vy, vz) = state.position_enu_m, state.velocity_enu_m_s
     speed = hypot(vx, vy)
     along_s = stopping_m(speed, pace.acceleration_m_s2, pace.jerk_m_s3) / speed if speed > 0.0 else 0.0
@@ -124,10 +118,7 @@ def resting_place(state: VehicleState, pace: Pace) -> Vector:
 
 
 def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Return the braking distance from a steady speed with acceleration and jerk bounded.
-
-    The acceleration profile is a trapezoid; at low speed a triangle below the bound.
-    """
+    """Return the braking distance with bounded acceleration (a trapezoid, or a triangle at low speed) and jerk."""
     if speed_m_s >= acceleration_m_s2**2 / jerk_m_s3:
         return 0.5 * speed_m_s * (speed_m_s / acceleration_m_s2 + acceleration_m_s2 / jerk_m_s3)
     return speed_m_s * sqrt(speed_m_s / jerk_m_s3)

@@ -1,4 +1,4 @@
-"""Parameters of the failsafes: limits, delays and actions, under PX4's names where the meaning is the same."""
+"""Parameters of the failsafes, under PX4's names where the meaning is the same."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
@@ -111,7 +111,6 @@ def limits(parameters: Parameters) -> Limits:
 
 
 def settings(parameters: Parameters) -> dict[Condition, Setting]:
-    """Return delay and action of each failsafe."""
     known = limits(parameters)
     return {
         row.condition: Setting(

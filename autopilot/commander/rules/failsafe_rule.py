@@ -1,7 +1,4 @@
-"""The failsafe rule: given when each condition began, decide which action begins.
-
-Actions are ranked: only a higher action replaces the active one, until the pilot selects a mode or the rotors stop.
-"""
+"""The failsafe rule: only a higher-ranked action replaces the active one."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -41,29 +38,19 @@ class Flight(NamedTuple):
 
     @property
     def rank(self) -> Action:
-        """Action that the mode already performs: returning includes holding, landing includes returning."""
+        """Action that the mode performs anyway."""
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 
 class Memory(NamedTuple):
-    """Memory between control samples.
-
-    Attributes:
-        held_us: When each ongoing condition, past its delay, last held.
-        armed: Whether the rotors were armed.
-    """
+    """Memory between samples: when each ongoing condition, past its delay, last held."""
 
     held_us: Mapping[Condition, int] = {}
     armed: bool = False
 
 
 class Verdict(NamedTuple):
-    """Decision of the rule.
-
-    Attributes:
-        action: Action to begin now; NONE to continue.
-        lines: MAV_SEVERITY and text of each report.
-    """
+    """Action to begin, and MAV_SEVERITY and text of each report."""
 
     memory: Memory
     action: Action
@@ -77,10 +64,9 @@ def following(
     settings: Mapping[Condition, Setting],
     flight: Flight,
 ) -> Verdict:
-    """Decide which failsafes begin and which end.
+    """Decide which failsafes begin and end; arming restarts all holding conditions.
 
-    An action begins with its condition: a pilot who then selects another mode keeps it until another condition begins.
-    Arming restarts all holding conditions. `since_us` holds only the conditions that hold.
+    An action begins with its condition: a mode selected later stays until another condition begins.
     """
     newly_armed = flight.armed and not memory.armed
     held_us: dict[Condition, int] = {
@@ -111,7 +97,6 @@ def following(
 
 
 def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, list[tuple[int, str]]]:
-    """Return the highest new action above the active one, and the line of each condition."""
     begins, lines = Action.NONE, []
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)

@@ -59,17 +59,12 @@ class Condition(StrEnum):
 
 
 class Row(NamedTuple):
-    """A failsafe.
+    """A failsafe; its texts and parameters appear on the page.
 
     Attributes:
-        holds, clears: When the condition begins and ends, as text.
-        limits: Parameters of the limits.
-        delay: Parameter of the delay; empty without one.
-        parameter, choices, default: Parameter of the action, its values and default.
         grounded: Whether it is also watched on the ground.
-        kept: Whether it holds, once begun, until the rotors stop.
-        warns: Text added to a warning.
-        reported: Whether the supervisor reports it; False if its detector does.
+        kept: Whether it holds until the rotors stop.
+        reported: False if its detector reports it.
     """
 
     condition: Condition

@@ -1,7 +1,4 @@
-"""Flight modes: needs, transitions and numbers, as two tables; source of `docs/modes.md`.
-
-Custom modes are laid out as in PX4: main mode << 16 | sub mode << 24.
-"""
+"""Flight modes as two tables; source of `docs/modes.md`. Custom modes are PX4's: main << 16 | sub << 24."""
 
 from collections.abc import Collection
 from enum import Enum, StrEnum
@@ -29,7 +26,7 @@ class Mode(StrEnum):
 
 
 class Need(Enum):
-    """A need of a mode; the value is the reason of a refusal without it."""
+    """A need; its value is the reason of a refusal."""
 
     ATTITUDE_CONTROL = "the control law takes no attitude setpoints"
     STICKS = "no MANUAL_CONTROL is heard"
@@ -60,15 +57,7 @@ class Event(StrEnum):
 
 
 class ModeRow(NamedTuple):
-    """A mode.
-
-    Attributes:
-        main, sub: PX4's main and sub mode.
-        needs: Needs to enter it in flight.
-        standard: MAV_STANDARD_MODE, 0 without one.
-        to_arm: Whether the rotors may be armed in it.
-        selectable: Whether a ground station may select it.
-    """
+    """A mode with PX4's numbers, its needs in flight, and MAV_STANDARD_MODE or 0."""
 
     mode: Mode
     main: int
@@ -146,14 +135,7 @@ ROWS = {row.mode: row for row in MODES}
 
 
 class Transition(NamedTuple):
-    """A transition.
-
-    Attributes:
-        sources: Modes it starts in; empty for any.
-        armed: Whether it requires armed rotors.
-        target: Next mode; None for the same, or the selected one.
-        disarms: Whether the rotors stop.
-    """
+    """A transition from `sources`, or any if empty, to `target`; None keeps the mode or takes the selected one."""
 
     sources: tuple[Mode, ...]
     event: Event
@@ -191,7 +173,6 @@ FIRST = State(Mode.HOLD, armed=False)
 
 
 def next_state(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
-    """Return the state after an event, or the refusal; `selected` is the mode of SELECT."""
     for row in TRANSITIONS:
         if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
             break

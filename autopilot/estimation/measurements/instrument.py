@@ -14,7 +14,7 @@ Value: TypeAlias = tuple[float, ...]
 
 
 class Ratio(IntEnum):
-    """A ratio of ESTIMATOR_STATUS, in field order; the largest of its measurements is reported."""
+    """A ratio of ESTIMATOR_STATUS, in field order."""
 
     VELOCITY = 0
     POSITION = 1
@@ -25,16 +25,15 @@ class Ratio(IntEnum):
 
 
 class Instrument(Protocol):
-    """A sensor fused without delay: one class for each sensor, one instance for each flight.
+    """A sensor fused without delay; one instance for each flight.
 
     Attributes:
-        part: Table in the vehicle file; without it the sensor is not fitted.
-        name: Name of the measurement in tests and logs.
+        part: Table in the vehicle file.
+        name: Measurement in tests and logs.
         numbers: Values in a measurement.
-        source: Sensor name in rejections.
         bit: MAV_SYS_STATUS_SENSOR.
-        group: Flag of `Updated`; 0 for a sensor with its own message.
-        smoothed: Whether its corrections pass the output smoothing, like those of GPS.
+        group: Flag of `Updated`; 0 with its own message.
+        smoothed: Whether corrections pass the output smoothing.
     """
 
     part: ClassVar[str]
@@ -49,11 +48,10 @@ class Instrument(Protocol):
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None: ...
 
-    def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
-        """Return a new and plausible measurement."""
+    def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None: ...
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a measurement at the filter's time; return the reason of a rejection."""
+        """Fuse a value; return the reason of a rejection."""
 
     def typical(self) -> Value:
-        """Return a value at rest at the origin, to load compiled code."""
+        """Return a value at rest, to load compiled code."""

@@ -1,4 +1,4 @@
-"""One kind of measurement: gate, last test, and forced acceptance after a long rejection."""
+"""Gate, last test, and forced acceptance of a measurement."""
 
 from collections.abc import Callable
 from math import inf
@@ -23,14 +23,7 @@ class KindRecord(NamedTuple):
 
 
 class Kind:
-    """One kind of measurement.
-
-    Attributes:
-        accepted_us: Time of the last acceptance.
-        rejected_us: Start of the current rejection.
-        resets: Number of forced acceptances.
-        nis, accepted: Sum and number of the normalised innovations squared that passed the test.
-    """
+    """One kind of measurement; `resets` counts forced acceptances."""
 
     def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:
         """After `patience_us` of rejection, inflate (first state, count, σ) and accept."""
@@ -47,14 +40,12 @@ class Kind:
         self.accepted = 0
 
     def fuse(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Fuse a measurement; return whether it was accepted."""
         nis = kernel(x, P, *arguments, self.gate, self._y)
         if self.note(time_us, tuple(self._y.tolist()), nis):
             return True
         return self.force_accept(x, P, time_us, kernel, *arguments)
 
     def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
-        """Record a test; return whether it passed."""
         self.test = Test(time_us, innovation, nis, self.gate)
         if nis <= self.gate:
             self.accepted_us, self.rejected_us = time_us, None
@@ -64,7 +55,7 @@ class Kind:
         return False
 
     def force_accept(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Reject a measurement, but accept it by force after a long rejection; return whether it was."""
+        """Accept a measurement by force after a long rejection."""
         if not self.reject(time_us):
             return False
         first, count, sigma = self._inflated
@@ -74,7 +65,6 @@ class Kind:
         return True
 
     def reset(self, time_us: int) -> None:
-        """Record a reset to the measured value."""
         self.resets += 1
         self.accept(time_us)
 
@@ -83,7 +73,6 @@ class Kind:
         self.rejected_us = None
 
     def reject(self, time_us: int) -> bool:
-        """Record a rejection; return whether it has lasted too long."""
         if self.rejected_us is None:
             self.rejected_us = time_us
         return time_us - self.rejected_us >= self._patience_us

@@ -54,5 +54,4 @@ class Magnetometer(Instrument):
         return None if accepted else Reason.INNOVATION
 
     def typical(self) -> Value:
-        """Return the field of a level vehicle heading east."""
         return tuple(self._field.tolist())

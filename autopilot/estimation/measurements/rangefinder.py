@@ -1,8 +1,6 @@
 """The rangefinder: distance along the body axis to flat ground.
 
-Near the ground and upright, the distance is the height over the cosine of the tilt, less half of the beam. The ground
-is at the start position, height 0, until the distance contradicts that for long; then the ground is reset, not the
-height.
+The ground is at height 0 until the distance contradicts that for long; then the ground is reset, not the height.
 """
 
 from math import inf, sqrt
@@ -34,11 +32,7 @@ _PATIENCE_US = 7_000_000
 
 
 class RangefinderBelow(Instrument):
-    """The rangefinder of one flight; smoothed, because its first corrections near the ground may be decimetres.
-
-    Attributes:
-        ground_m: Ground height, z of ENU.
-    """
+    """The rangefinder of one flight; smoothed, because first corrections may be decimetres."""
 
     part, name, numbers = "rangefinder", "distance", 1
     source, bit, ratio = "rangefinder", mav.MAV_SYS_STATUS_SENSOR_LASER_POSITION, Ratio.ABOVE_GROUND
@@ -62,7 +56,6 @@ class RangefinderBelow(Instrument):
         return value if value == (inf,) or self._watch.accepts(value, frame.time_us, rejected) else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a distance to the ground, m."""
         (distance_m,) = value
         height_m = float(x[2]) + self._part.height_m - self.ground_m
         if distance_m == inf or distance_m > _USED_BELOW_M or height_m > _USED_BELOW_M or not is_upright(x):
@@ -90,10 +83,9 @@ def is_upright(x: Array) -> bool:
 def fuse_distance(
     x: Array, P: Array, measured: float, height: float, beam: Array, variance: float, gate: float, y: Array
 ) -> float:
-    """Fuse the distance to flat ground along -z of the body, m; return NIS.
+    """Fuse the distance, m; return NIS.
 
-    d = h / cos(ϑ - β) with tilt ϑ and half beam β, whose cosine and sine are `beam`; within the beam d = h. `height` is
-    h by the state, m.
+    d = h / cos(ϑ - β) with tilt ϑ and half beam β (cosine and sine: `beam`); within the beam d = h.
     """
     w, a, b, c = x[6:10]
     up_x, up_y, up_z = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)

@@ -1,4 +1,4 @@
-"""The table of fused sensors: a new sensor is a row here and a file beside."""
+"""The table of fused sensors: a row here, a file beside."""
 
 from colibri.autopilot.estimation.measurements.barometer import Barometer
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio
@@ -27,13 +27,11 @@ RATIOS: dict[str, Ratio] = {
 
 
 def kinds_of(sensors: Sensors) -> list[str]:
-    """Return a vehicle's kinds of measurement, in the order of `KINDS`."""
     missing = {row.name for row in ROWS if getattr(sensors, row.part) is None}
     return [kind for kind in KINDS if kind not in missing]
 
 
 def instruments_of(sensors: Sensors, field_enu_gauss: Vector) -> tuple[Magnetometer, Barometer, tuple[Instrument, ...]]:
-    """Return the two instruments of every vehicle, and all of this vehicle's."""
     field, pressure = Magnetometer(sensors, field_enu_gauss), Barometer(sensors, field_enu_gauss)
     others = [row(sensors, field_enu_gauss) for row in ROWS[2:] if getattr(sensors, row.part) is not None]
     return field, pressure, (field, pressure, *others)

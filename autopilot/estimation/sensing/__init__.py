@@ -1,1 +1,1 @@
-"""Raw sensor data: plausibility, inertial samples, clock resets, alignment at rest or in free fall."""
+"""Raw sensor data: plausibility, inertial samples, alignment."""

@@ -1,4 +1,4 @@
-"""Start of the estimator at rest: means over a second, and the attitude from them."""
+"""Start at rest: means over a second, and their attitude."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -27,13 +27,7 @@ _FIELD_PART = 0.25
 
 
 class Aligned(NamedTuple):
-    """Means of a vehicle at rest.
-
-    Attributes:
-        force, rate: m/s² and rad/s, FLU.
-        field: gauss FLU.
-        fields, heights: Number of samples in a mean.
-    """
+    """Means at rest, FLU, and the number of fields and heights in them."""
 
     duration_s: float
     force: Vector
@@ -70,7 +64,6 @@ class Alignment:
     def feed(
         self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Aligned | None:
-        """Process a frame; return the means after a second of rest with a fix."""
         if not (reading.force_good and reading.rate_good):
             self._begin()
             return None
@@ -118,14 +111,14 @@ class Alignment:
 
 
 def attitude_of(force: NDArray[np.float64], field: NDArray[np.float64], earth_field: NDArray[np.float64]) -> Quaternion:
-    """Return the attitude from specific force (up) and horizontal magnetic field (TRIAD)."""
+    """Return the attitude from specific force and magnetic field (TRIAD)."""
     body = _triad(force, field)
     earth = _triad(np.array([0.0, 0.0, 1.0]), earth_field)
     return _quaternion(matmul(earth, body.T))
 
 
 def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return magnetic east, magnetic north and up as columns."""
+    """Return magnetic east, north and up as columns."""
     up = up / norm(up)
     east = np.cross(field, up)
     east = east / norm(east)
@@ -133,7 +126,7 @@ def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _quaternion(R: NDArray[np.float64]) -> Quaternion:
-    """Convert a rotation matrix by its largest component (Shepperd)."""
+    """Convert by the largest component (Shepperd)."""
     trace = float(np.trace(R))
     squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
     largest = int(np.argmax(squares))

@@ -1,8 +1,7 @@
-"""Start of the estimator in the air, in free fall with the rotors stopped.
+"""Start in the air: rotors stand until the first estimate, so the vehicle falls.
 
-After a restart in flight without a record, the vehicle cannot rest for a second. Rotors stand until the first estimate,
-so it falls, as accelerometer and GPS both show. Attitude is unobservable in a fall: assumed level, heading by the
-magnetic field, with a large covariance. The first GPS corrections find the tilt.
+Attitude is unobservable then: assumed level, heading by the magnetic field, with a large covariance, until GPS
+corrections find the tilt.
 """
 
 from math import hypot
@@ -25,12 +24,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 class Caught(NamedTuple):
-    """A falling vehicle.
-
-    Attributes:
-        moved_m: Displacement since the fix, ENU.
-        attitude: Guess.
-    """
+    """A falling vehicle; `moved_m` is since the fix, ENU, the attitude a guess."""
 
     velocity_enu_m_s: Vector
     moved_m: Vector
@@ -43,7 +37,6 @@ class Falling:
     """Waits for a fall, unless the first frame is at time 0."""
 
     def __init__(self, gravity_m_s2: float, field_enu_gauss: Vector, delay_s: float) -> None:
-        """Fixes are received `delay_s` after their measurement."""
         self._gravity = gravity_m_s2
         self._earth_field = np.array(field_enu_gauss)
         self._delay_us = round(delay_s * 1e6)
@@ -55,7 +48,6 @@ class Falling:
     def feed(
         self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Caught | None:
-        """Process a frame; return the vehicle if it falls, with a fix and a field."""
         if self._begins_in_flight is None:
             self._begins_in_flight = time_us > 0
         self._field = field or self._field

@@ -1,4 +1,4 @@
-"""Accelerometer and gyroscope: frames in, samples for the filter out."""
+"""Inertial samples from frames."""
 
 from math import inf
 from typing import NamedTuple
@@ -30,7 +30,6 @@ class _Axes:
         self.value: Vector = (0.0, 0.0, 0.0)
 
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
-        """Read a value; return whether the current one is usable."""
         if frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected):
             self.value, self._time_us = value, frame.time_us
             return True
@@ -38,7 +37,7 @@ class _Axes:
 
 
 class Reading(NamedTuple):
-    """Accelerometer and gyroscope at one frame: m/s² and rad/s, FLU, and whether each is usable."""
+    """Inertial values, m/s² and rad/s, FLU, and whether each is usable."""
 
     force: Vector
     rate: Vector
@@ -64,7 +63,7 @@ class Inertial:
 
 
 def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
-    """Return the sample between two frames, by the trapezoidal rule."""
+    """Return the sample between two frames (trapezoidal rule)."""
     (ax, ay, az), (bx, by, bz) = before.force, now.force
     (ap, aq, ar), (bp, bq, br) = before.rate, now.rate
     return (

@@ -1,4 +1,4 @@
-"""Plausibility of frames: finite, in range, changing values; fixes; increasing time."""
+"""Plausibility of values, fixes and frame times."""
 
 from math import inf, isfinite
 
@@ -18,21 +18,16 @@ _SETTLED = 25
 
 
 class Watch:
-    """Checks one sensor.
-
-    Attributes:
-        is_new: Whether the last value changed: simulators repeat values.
-    """
+    """Checks one sensor; `is_new` is false for values that simulators repeat."""
 
     def __init__(self, source: str, minimum: float, maximum: float, patience_us: float) -> None:
-        """Accept values from `minimum` to `maximum`, unless identical for `patience_us`."""
+        """Values identical for `patience_us` are frozen."""
         self._source, self._minimum, self._maximum, self._patience_us = source, minimum, maximum, patience_us
         self._last: tuple[float, ...] = ()
         self._changed_us = 0
         self.is_new = False
 
     def accepts(self, values: tuple[float, ...], time_us: int, rejected: Rejected) -> bool:
-        """Check a value, and count a rejection in `rejected`."""
         for value in values:
             if not self._minimum <= value <= self._maximum:
                 rejected.add(self._source, _reason(values))
@@ -47,18 +42,13 @@ class Watch:
 
 
 class GpsWatch:
-    """Checks a GPS receiver.
-
-    Attributes:
-        time_us: Time of the last plausible fix.
-    """
+    """Checks a GPS receiver."""
 
     def __init__(self) -> None:
         self.time_us: int | None = None
         self._alive = Watch(Source.GPS, -inf, inf, _GPS_PATIENCE_US)
 
     def accepts(self, fix: GpsFix, now_us: int, rejected: Rejected) -> bool:
-        """Check a fix received by `now_us`, and count a rejection in `rejected`."""
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
             rejected.add(Source.GPS, Reason.NO_FIX)
@@ -80,14 +70,12 @@ class ClockResets:
         self._count = 0
 
     def settle(self, time_us: int) -> bool:
-        """Count a stray frame; return whether enough agree on another clock."""
         follows = self._time_us is not None and 0 < time_us - self._time_us <= MAX_GAP_US
         self._count = self._count + 1 if follows else 1
         self._time_us = time_us
         return self._count >= _SETTLED
 
     def clear(self) -> None:
-        """Reset after a frame in sequence."""
         self._time_us = None
 
 

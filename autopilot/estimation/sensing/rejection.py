@@ -1,4 +1,4 @@
-"""Counts of rejected measurements by sensor and reason."""
+"""Counts of rejected values."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 
 class Source(StrEnum):
-    """Source of a rejected value; optional sensors use their names."""
+    """Source of a rejected value; optional sensors use names."""
 
     CLOCK = "clock"
     ACCELEROMETER = "accelerometer"
@@ -45,5 +45,4 @@ class Rejected:
 
     @property
     def counts(self) -> Rejections:
-        """Rejections by sensor and reason, as an immutable copy."""
         return self._published

@@ -1,7 +1,6 @@
-"""The mission executor, a state machine: flight state and time in, an order and events out.
+"""The mission executor, with states of MISSION_STATE (https://mavlink.io/en/messages/common.html#MISSION_STATE).
 
-States are those of MISSION_STATE (https://mavlink.io/en/messages/common.html#MISSION_STATE). Autocontinue is ignored,
-as in ArduPilot, because DroneKit recommends 0 for it.
+Autocontinue is ignored, as in ArduPilot, because DroneKit recommends 0 for it.
 """
 
 from collections.abc import Sequence
@@ -32,7 +31,7 @@ _FLYING, _SUSPENDED = 1, 2
 
 
 class Reached(NamedTuple):
-    """An item is reached, or done if it takes no time."""
+    """An item is reached."""
 
     seq: int
 
@@ -47,12 +46,7 @@ MissionEvent: TypeAlias = Reached | SetHome
 
 
 class Step(NamedTuple):
-    """Output of a step.
-
-    Attributes:
-        order: The same object until the order changes.
-        flying: False once the mission is complete, paused or cleared.
-    """
+    """Output of a step; `flying` is false once complete, paused or cleared."""
 
     order: Order
     events: tuple[MissionEvent, ...]
@@ -60,14 +54,13 @@ class Step(NamedTuple):
 
 
 class MissionRecord(NamedTuple):
-    """Progress of a mission as plain data, for a restart.
+    """Progress of a mission for a restart.
 
     Attributes:
-        state: MISSION_STATE.
-        jumps: Remaining jumps by item.
-        mission_context: At the start of the current item, as are `defaults` and `order_before`.
-        phases: Remaining phases of the item.
-        since_us: Start of the phase; `fresh` if in the last step.
+        jumps: Remaining, by item.
+        mission_context: At the start of the item, like `defaults` and `order_before`.
+        phases: Remaining.
+        fresh: Whether the phase began in the last step.
         jumped: Whether the last jump was without flight since.
     """
 
@@ -87,12 +80,7 @@ class MissionRecord(NamedTuple):
 
 
 class MissionExecutor:
-    """Executor of one plan.
-
-    Attributes:
-        progress: Replaced on every change.
-        defaults: Numbers for items without.
-    """
+    """Executor of one plan; `progress` is replaced on every change."""
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
         self.defaults = defaults
@@ -118,7 +106,7 @@ class MissionExecutor:
         return self.progress.state == ACTIVE
 
     def load(self, items: Sequence[MissionItem]) -> None:
-        """Replace the plan; an active mission restarts with the first item."""
+        """Replace the plan; an active mission restarts."""
         flying = self.active
         self._items = tuple(items)
         self._reset()
@@ -128,7 +116,6 @@ class MissionExecutor:
         self.defaults = defaults
 
     def start(self) -> Refusal | None:
-        """Fly from the current item on, or from the first if complete."""
         if not self._items:
             return Refusal("mission: there is none")
         if self.progress.state == COMPLETE:
@@ -141,7 +128,7 @@ class MissionExecutor:
         return None
 
     def pause(self, *, item_flown: bool = False) -> tuple[MissionEvent, ...]:
-        """Pause at the current item, or after it if it is a return that mode return flies."""
+        """Pause at the current item, or after a return that mode return flies."""
         if not self.active:
             return ()
         seq = self.progress.seq
@@ -155,7 +142,7 @@ class MissionExecutor:
         return (Reached(seq),)
 
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` resets the jump counters."""
+        """Go to an item, -1 for the current one; `reset` resets the jumps."""
         if not self._items:
             return Refusal("mission: there is none")
         seq = self.progress.seq if seq == -1 else seq
@@ -195,7 +182,6 @@ class MissionExecutor:
         )
 
     def resume(self, record: MissionRecord) -> None:
-        """Restore the progress of a mission of the same items."""
         if not 0 <= record.seq < len(self._items):
             return
         self._order, self._speed_m_s, self._jumps = order_of(record.order), record.speed_m_s, dict(record.jumps)
@@ -211,7 +197,6 @@ class MissionExecutor:
         self._since_us, self._fresh = record.since_us, record.fresh
 
     def _fly(self, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> bool:
-        """Fly the current item; return whether the next one is current."""
         seq = self.progress.seq
         item = self._items[seq]
         if self._phases is None:
@@ -235,7 +220,7 @@ class MissionExecutor:
         return True
 
     def _begin(self, now_us: int) -> None:
-        """Start the next phase; `arrived` and `turns` of this step still belong to the previous one."""
+        """Start the next phase; `arrived` and `turns` still belong to the previous one."""
         self._since_us = now_us
         if self._phases and self._phases[0].order is not None:
             self._order = self._phases[0].order
@@ -256,7 +241,6 @@ class MissionExecutor:
         self._advance()
 
     def _jump(self, item: MissionItem, now_us: int) -> bool:
-        """Jump while the item's count lasts, -1 for ever; return whether it did."""
         seq = self.progress.seq
         left = self._jumps.get(seq, int(item.p2))
         if left == 0:

@@ -1,8 +1,8 @@
-"""The geofence: polygons and circles that bound the flight.
+"""The geofence: polygons and circles.
 
 Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and following. The vehicle must be
-inside all inclusion zones of at least one group (parameter 2), and outside every exclusion zone, at any height. Circles
-of radius 0 are ignored: some clients send one as a placeholder.
+inside all inclusion zones of one group (parameter 2), and outside all exclusion zones. Circles of radius 0 are
+placeholders.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -33,7 +33,6 @@ EDGE_M = 1e-6
 
 
 def check_fence_item(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of an item."""
     if item.command not in (RETURN_POINT, *POLYGONS, *CIRCLES):
         return int(mav.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GLOBAL_FRAMES:
@@ -48,7 +47,7 @@ def check_fence_item(item: MissionItem) -> int:
 
 
 def check_fence(items: Sequence[MissionItem]) -> int:
-    """Return the MAV_MISSION_RESULT of all items: each polygon must be complete, of one kind and group."""
+    """Check that polygons are complete, of one kind and group."""
     for vertices in _zones(items):
         first = vertices[0]
         if len(vertices) < _length(first) or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
@@ -65,7 +64,7 @@ class Zone(Protocol):
     """An area of the ground."""
 
     def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return the distance to the edge, m; negative outside."""
+        """Return the depth inside, m; negative outside."""
         ...
 
 
@@ -84,7 +83,6 @@ class Polygon:
     """The inside of a polygon, by the even-odd rule."""
 
     def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
-        """Corners are east and north, m."""
         self._from: Array = np.array(list(vertices_m), dtype=float)
         self._to = np.roll(self._from, -1, axis=0)
         self._along = self._to - self._from
@@ -105,12 +103,7 @@ class Polygon:
 
 
 class Geofence:
-    """A fence in ENU.
-
-    Attributes:
-        return_point_enu_m: East and north of the return point, if any, m.
-        max_height_m: z of ENU.
-    """
+    """A fence in ENU, m."""
 
     def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
         self.max_height_m = max_height_m
@@ -133,7 +126,7 @@ class Geofence:
             self._exclusions.append(zone)
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return the distance to the nearest breach, m; negative outside."""
+        """Return the depth inside, m; negative outside."""
         east, north, up = position_enu_m
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
@@ -144,7 +137,6 @@ class Geofence:
         return min(margin, *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
 
     def inside(self, position_enu_m: Vector) -> bool:
-        """Whether a position is within the fence or on its edge."""
         return self.margin_m(position_enu_m) >= -EDGE_M
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
@@ -154,14 +146,14 @@ class Geofence:
 
 
 class AroundHome(NamedTuple):
-    """The fence set by parameters: a circle around home, and a height above it; 0 for off."""
+    """The parameters' fence around home; 0 for off."""
 
     home_enu_m: Vector
     max_distance_m: float
     max_height_m: float
 
     def margin_m(self, position_enu_m: Vector) -> float:
-        """Return the distance to the edge, m; negative outside."""
+        """Return the depth inside, m; negative outside."""
         east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf

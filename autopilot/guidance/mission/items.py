@@ -1,7 +1,6 @@
-"""The accepted mission items, and the allowed values of their parameters.
+"""Accepted mission items and their allowed values; nan is the default.
 
-Parameters: https://mavlink.io/en/messages/common.html#mav_commands; answers: MAV_MISSION_RESULT of the same page. nan
-means the default; useless values are refused.
+https://mavlink.io/en/messages/common.html#mav_commands
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -67,12 +66,7 @@ def _a_speed(value: float) -> bool:
 
 
 class _Allowed(NamedTuple):
-    """Rules for the items of one command.
-
-    Attributes:
-        place: Whether x and y must be latitude and longitude.
-        here: Whether x and y may also be 0, 0 or missing.
-    """
+    """Rules of one command; `here` allows 0, 0 as x and y."""
 
     place: bool = False
     height: bool = False
@@ -103,7 +97,6 @@ FLOWN: frozenset[int] = frozenset(_ALLOWED)
 
 
 def check_item(item: MissionItem) -> int:
-    """Return the MAV_MISSION_RESULT of an item."""
     allowed = _ALLOWED.get(item.command)
     if allowed is None:
         return int(ACCEPTED if item.command in SKIPPED else mav.MAV_MISSION_UNSUPPORTED)
@@ -125,7 +118,7 @@ def check_item(item: MissionItem) -> int:
 
 
 def check_mission(items: Sequence[MissionItem]) -> int:
-    """Return the MAV_MISSION_RESULT of all items: jumps must stay inside."""
+    """Check that jumps stay inside."""
     outside = any(item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items) for item in items)
     return int(mav.MAV_MISSION_INVALID_PARAM1 if outside else ACCEPTED)
 
@@ -149,25 +142,25 @@ def check_height(item: MissionItem) -> int:
 
 
 def is_here(item: MissionItem) -> bool:
-    """Whether a take-off or landing has no place: ground stations send 0, 0."""
+    """Ground stations send 0, 0 without a place."""
     return (item.x == 0 and item.y == 0) or NOT_GIVEN in (item.x, item.y)
 
 
 def place_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> Vector:
-    """Return the place of an item, m, ENU; without altitude at home's height."""
+    """Return ENU, m."""
     x, y, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
     return (x, y, height_of(item, home_enu_m, origin))
 
 
 def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
-    """Return the height of an item, m, ENU; by default home's."""
+    """Return z of ENU, m; by default home's."""
     if not isfinite(item.z):
         return home_enu_m[2]
     return item.z - origin.altitude_m if item.frame in _ABOVE_SEA else home_enu_m[2] + item.z
 
 
 def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
-    """Yield sequence number and place, m, ENU, of every item with a destination."""
+    """Yield sequence number and place, m, ENU, of destinations."""
     for seq, item in enumerate(items):
         allowed = _ALLOWED.get(item.command)
         if allowed is None or not allowed.place:

@@ -1,4 +1,4 @@
-"""Mission items as phases, each with an order and an end condition."""
+"""Mission items as phases."""
 
 from collections.abc import Callable, Mapping
 from math import dist, inf, isfinite, isnan, nan, pi, radians, remainder, tau
@@ -18,14 +18,7 @@ _TURN_WITHIN_S = 30.0
 
 
 class MissionContext(NamedTuple):
-    """State of the flight for a mission.
-
-    Attributes:
-        yaw_rad: Counter-clockwise from east.
-        landed: Whether the vehicle is on the ground.
-        arrived: Whether the previous order is fulfilled.
-        turns: Turns on the circle of the previous order.
-    """
+    """State of the flight; `arrived` and `turns` refer to the previous order."""
 
     position_enu_m: Vector
     velocity_enu_m_s: Vector
@@ -38,13 +31,7 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Defaults of items.
-
-    Attributes:
-        acceptance_m: Radius of a reached place.
-        takeoff_height_m: Above the ground, for missions without a take-off.
-        orbit_radius_m: For LOITER_TURNS.
-    """
+    """Numbers of items without."""
 
     acceptance_m: float = 0.5
     takeoff_height_m: float = 2.5
@@ -52,7 +39,7 @@ class Defaults(NamedTuple):
 
 
 class ItemContext(NamedTuple):
-    """State of the mission at the start of an item, with the previous order."""
+    """State of the mission at the start of an item."""
 
     mission_context: MissionContext
     defaults: Defaults
@@ -64,13 +51,7 @@ class ItemContext(NamedTuple):
 
 
 class Phase(NamedTuple):
-    """A part of an item.
-
-    Attributes:
-        order: None keeps the previous order.
-        ends: End condition, of the context and the seconds since the start.
-        reaches: Whether its end counts as reaching the item.
-    """
+    """A part of an item: order (None keeps the previous), end condition, and whether it reaches the item."""
 
     order: Order | None
     ends: Callable[[MissionContext, float], bool]
@@ -81,7 +62,6 @@ Leg: TypeAlias = Callable[[MissionItem, ItemContext], tuple[Phase, ...]]
 
 
 def phases_of(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Return the phases of an item; empty if it takes no time."""
     leg = _LEGS.get(item.command)
     return () if leg is None else leg(item, context)
 
@@ -96,7 +76,7 @@ def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Pha
 
 
 def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
-    """Fly to a place with heading p4, and stay; stay_s 0 flies through."""
+    """Fly to a place and stay; stay_s 0 flies through."""
     place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
@@ -115,7 +95,6 @@ def _circle(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
 
 
 def _take_off(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Climb vertically, then fly to the place, if any."""
     mission_context, defaults = context.mission_context, context.defaults
     height = height_of(item, mission_context.home_enu_m, mission_context.origin)
     yaw = _yaw(item.p4)
@@ -139,7 +118,7 @@ def _delay(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
 
 
 def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """Turn on the spot; p1 is clockwise from north, or relative to the heading if p4 is 1."""
+    """Turn clockwise from north, or from the heading if p4 is 1."""
     mission_context = context.mission_context
     if mission_context.landed:
         return ()
@@ -172,7 +151,7 @@ _LEGS: Mapping[int, Leg] = {
 
 
 def _off_the_ground(height_m: float, context: ItemContext) -> tuple[Phase, ...]:
-    """Prepend a take-off on the ground: MAVSDK's missions begin with a waypoint."""
+    """Take off first: MAVSDK's missions begin with a waypoint."""
     mission_context, defaults = context.mission_context, context.defaults
     if not mission_context.landed:
         return ()

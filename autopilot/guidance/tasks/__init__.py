@@ -1,1 +1,1 @@
-"""Flight tasks (PX4's term), each updated once a sample to a motion or an attitude."""
+"""Flight tasks, PX4's term."""

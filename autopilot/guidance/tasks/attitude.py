@@ -1,4 +1,4 @@
-"""Flight tasks by attitude and thrust, from sticks or setpoints; and the descent without position."""
+"""Flight tasks by attitude and thrust."""
 
 import numpy as np
 
@@ -29,7 +29,6 @@ class TiltLoop:
         self._memory: ReferenceMemory | None = None
 
     def forget(self) -> None:
-        """Reset before the next demand."""
         self._memory = None
 
     def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
@@ -42,7 +41,7 @@ class TiltLoop:
 
 
 class StabilizedTask(EndlessTask):
-    """Sticks to tilt, yaw rate and thrust; without sticks, stop."""
+    """Sticks to tilt, yaw rate and thrust."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         self._tilt = TiltLoop(generator)
@@ -57,7 +56,7 @@ class StabilizedTask(EndlessTask):
 
 
 class AltitudeTask(EndlessTask):
-    """Sticks to tilt, yaw rate and climb, with height hold; without sticks, stop."""
+    """Sticks to tilt, yaw rate and climb, with height hold."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
@@ -78,7 +77,6 @@ class AltitudeTask(EndlessTask):
         return motion._replace(reference=reference, lifts=lifting, sinks=is_below(reference.height_m, context.state))
 
     def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
-        """Return the reference of height, and whether the vehicle must leave the ground."""
         climb_m_s = stick_climb(sticks, context)
         if climb_m_s != 0.0:
             self._height_m = None
@@ -89,7 +87,7 @@ class AltitudeTask(EndlessTask):
 
 
 class DescentTask(EndlessTask):
-    """Level descent at landing speed, for an unknown position or heading."""
+    """Level descent without position or heading."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
@@ -112,7 +110,7 @@ class HeightLoop:
         self._offset_m_s2 = 0.0
 
     def thrust_n(self, reference: Reference, context: TaskContext) -> float:
-        """Return the thrust, N, to the height of `reference`."""
+        """Return thrust, N."""
         height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
         state = context.state
         height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
@@ -125,7 +123,7 @@ class HeightLoop:
 
 
 def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
-    """Return reference and target of a climb, or of a height if given; horizontally at the vehicle."""
+    """Return reference and target of a climb, or of a given height."""
     kind = Kind.VELOCITY if height_m is None else Kind.POSITION
     place = (*context.place[:2], context.place[2] if height_m is None else height_m)
     target = still_target(place, context.yaw_rad, context.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))

@@ -18,7 +18,7 @@ ABOVE_TARGET = 2
 
 
 class FollowTargetTask(EndlessTask):
-    """A place relative to the target, looking at it; without a target, stop."""
+    """A place relative to the target."""
 
     def __init__(self) -> None:
         self._stop = HoldTask()

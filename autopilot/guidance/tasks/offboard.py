@@ -1,4 +1,4 @@
-"""The flight task of offboard mode: a companion's setpoints, within the limits."""
+"""The task of offboard mode."""
 
 from math import hypot, isnan
 
@@ -18,7 +18,7 @@ _BRAKE_1_S = 2.0
 
 
 class OffboardTask(EndlessTask):
-    """Setpoints of a companion; at their end, stop."""
+    """Setpoints of a companion."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
         self._attitude, self._tilt = attitude, TiltLoop(attitude) if attitude else None
@@ -38,7 +38,7 @@ class OffboardTask(EndlessTask):
 
 
 def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
-    """Return the target of a setpoint: each axis is bound by its lowest given derivative."""
+    """Bind each axis by its lowest given derivative."""
     target = still_target(context.place, context.yaw_rad, context.samples)
     velocity = allowed_velocity(setpoint.velocity_m_s, context)
     ahead_s = (context.now_us - setpoint.time_us) * 1e-6 + context.interval_s * np.arange(context.samples)
@@ -73,7 +73,6 @@ def allowed_velocity(velocity: Vector, context: TaskContext) -> Vector:
 
 
 def allowed_acceleration(acceleration: float, axis: int, context: TaskContext) -> float:
-    """Limit an acceleration, also by the speed that it leads to."""
     limits, speed = context.behaviour.limits, context.velocity[axis]
     up, down, maximum = context.behaviour.max_speed_m_s, context.behaviour.max_speed_m_s, limits.acceleration_m_s2
     if axis == UP:

@@ -21,12 +21,7 @@ _ON_IT_M, _ON_IT_M_S = 0.3, 0.5
 
 
 class OrbitTask(EndlessTask):
-    """Fly to the nearest point of the circle, then along it.
-
-    Attributes:
-        order: Order that restarts the task.
-        turns: Turns flown.
-    """
+    """Fly to the nearest point of the circle, then along it."""
 
     def __init__(self, order: Circle, context: TaskContext) -> None:
         self.order = order
@@ -55,7 +50,7 @@ class OrbitTask(EndlessTask):
         return Motion(target, context.behaviour.limits, Pace.WAITING)
 
     def _angle_of(self, place: Vector) -> float:
-        """Return the direction from the centre, counter-clockwise from east; the centre itself counts as east."""
+        """Counter-clockwise from east."""
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
     def _rate_of(self, context: TaskContext) -> float:

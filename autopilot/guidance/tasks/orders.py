@@ -9,12 +9,7 @@ from colibri.common.types import Vector
 
 
 class GoTo(NamedTuple):
-    """Fly to a place and stay.
-
-    Attributes:
-        yaw_rad: Counter-clockwise from east; None: along the way.
-        speed_m_s: None: the cruise speed.
-    """
+    """Fly to a place and stay; yaw None is along the way, speed None the cruise speed."""
 
     position_enu_m: Vector
     yaw_rad: float | None = None
@@ -22,13 +17,7 @@ class GoTo(NamedTuple):
 
 
 class Circle(NamedTuple):
-    """Fly around a centre, at its height.
-
-    Attributes:
-        radius_m: Positive is clockwise from above.
-        speed_m_s: None: the cruise speed.
-        yaw_behaviour: ORBIT_YAW_BEHAVIOUR.
-    """
+    """Fly around a centre; positive radii are clockwise."""
 
     center_enu_m: Vector
     radius_m: float
@@ -37,14 +26,14 @@ class Circle(NamedTuple):
 
 
 class TakeOff(NamedTuple):
-    """Climb vertically; a `yaw_rad` of None keeps the heading."""
+    """Climb vertically; yaw None keeps the heading."""
 
     height_enu_m: float
     yaw_rad: float | None = None
 
 
 class Land(NamedTuple):
-    """Sink to the ground, by default here and with the present heading."""
+    """Sink, by default here with the present heading."""
 
     position_enu_m: Vector | None = None
     yaw_rad: float | None = None

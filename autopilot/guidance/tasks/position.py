@@ -59,7 +59,7 @@ class GoToTask:
 
 
 class HoldTask:
-    """Stop and stay; `order` restarts a task."""
+    """Stop and stay."""
 
     def __init__(self) -> None:
         self._place: Vector | None = None
@@ -71,7 +71,6 @@ class HoldTask:
         return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
-        """Brake to rest, then hold the place reached."""
         limits = context.behaviour.limits
         if self._target is not None:
             return Motion(self._target, limits)
@@ -89,12 +88,11 @@ class HoldTask:
 
 
 class TakeoffTask:
-    """Climb vertically to a height, or stay if already higher."""
+    """Climb vertically, or stay if higher."""
 
     def __init__(
         self, height_enu_m: float, yaw_rad: float | None, context: TaskContext, speed_m_s: float | None = None
     ) -> None:
-        """`speed_m_s` None: the parameter's climb speed."""
         self._height_m = max(height_enu_m, context.place[2])
         self._yaw_rad = context.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
@@ -105,7 +103,7 @@ class TakeoffTask:
         return TakeOff(self._height_m, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
-        """Climb, horizontally braking first."""
+        """Brake horizontally first."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = climbing_at(limits, self._speed_m_s)
@@ -123,10 +121,9 @@ class TakeoffTask:
 
 
 class LandTask(EndlessTask):
-    """Sink vertically, slower near the ground, until stopped by it."""
+    """Sink vertically, slower near the ground."""
 
     def __init__(self, xy: tuple[float, float], yaw_rad: float | None) -> None:
-        """Keep the heading if `yaw_rad` is None."""
         self._xy = xy
         self._yaw_rad = yaw_rad
 
@@ -140,17 +137,12 @@ class LandTask(EndlessTask):
 
 
 def sinking_m_s(context: TaskContext) -> float:
-    """Return the sink rate at this height, m/s."""
     flare = _FLARE_1_S * (context.place[2] - context.home_enu_m[2] - _FLARE_ABOVE_M)
     return min(max(flare, context.behaviour.land_speed_m_s), context.behaviour.limits.sink_m_s)
 
 
 class TaskSequence:
-    """Tasks in sequence, each from the end of the previous one.
-
-    Attributes:
-        task: The current task; None before the first sample.
-    """
+    """Tasks in sequence."""
 
     def __init__(self, first: Leg, *others: Leg) -> None:
         self._ahead = [first, *others]
@@ -159,12 +151,11 @@ class TaskSequence:
 
     @property
     def left(self) -> tuple[int, ...]:
-        """Remaining legs with the current one, followed by those of a nested sequence."""
+        """Remaining legs, then those of a nested sequence."""
         inner = self.task.left if isinstance(self.task, TaskSequence) else ()
         return (len(self._ahead) + (self.task is not None), *inner)
 
     def skip(self, left: tuple[int, ...]) -> "TaskSequence":
-        """Start with `left` remaining legs; return self."""
         if left:
             self._ahead = self._ahead[max(len(self._ahead) - left[0], 0) :]
             self._inner = left[1:]
@@ -183,11 +174,7 @@ class TaskSequence:
 
 
 class TrackTask:
-    """A track from `began_us` on, then its last point.
-
-    Attributes:
-        start: Reference set at a start in mid-flight; None if led there.
-    """
+    """A track; `start` is the reference at a start in mid-flight."""
 
     def __init__(
         self,
@@ -197,7 +184,7 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        """`planner_for_law` is for a law with another preview interval."""
+        """`planner_for_law` has the law's preview interval."""
         self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law
@@ -215,7 +202,6 @@ class TrackTask:
 
 
 def landing(order: Land) -> TaskSequence:
-    """Land above a place, or at rest."""
     place, yaw_rad = order
     if place is None:
         return TaskSequence(lambda _: HoldTask(), lambda context: LandTask(context.place[:2], yaw_rad))
@@ -227,10 +213,7 @@ def landing(order: Land) -> TaskSequence:
 
 
 def homeward(context: TaskContext) -> TaskSequence:
-    """Return: climb if home is far, fly there, land.
-
-    The geofence and the distance do not restrict a return: other places are worse.
-    """
+    """Climb if home is far, fly there, land; the geofence does not restrict it."""
     x, y, z = context.home_enu_m
     down = landing(Land((x, y, z)))
     if hypot(x - context.place[0], y - context.place[1]) <= context.behaviour.return_radius_m:
@@ -240,7 +223,7 @@ def homeward(context: TaskContext) -> TaskSequence:
 
 
 def to_track(planner: Planner, duration_s: float) -> TaskSequence:
-    """Fly to a track's start height, its first point, then along it."""
+    """Fly to a track's first point, then along it."""
     first = planner.horizon(0)
     x, y, z = first.position_enu_m[0].tolist()
     yaw_rad = float(first.yaw_rad[0])

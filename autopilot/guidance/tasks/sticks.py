@@ -12,7 +12,7 @@ _MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
 
 
 class PositionTask(EndlessTask):
-    """Sticks to velocity along the heading; a centred axis holds its rest position."""
+    """Sticks to velocity; a centred axis holds its position."""
 
     def __init__(self) -> None:
         self._xy: tuple[float, float] | None = None
@@ -61,7 +61,7 @@ class PositionTask(EndlessTask):
 
 
 def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
-    """Return the velocity east and north, m/s; full sticks give the same speed in any direction."""
+    """Return east and north, m/s; full sticks have equal speed in any direction."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
     behaviour = context.behaviour
     speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
@@ -79,11 +79,10 @@ def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:
 
 
 def without_play(sticks: Sticks) -> Sticks:
-    """Remove the dead zone; thrust has none."""
     return sticks._replace(pitch=dead(sticks.pitch), roll=dead(sticks.roll), yaw=dead(sticks.yaw))
 
 
 def dead(stick: float) -> float:
-    """Remove the dead zone from a deflection, -1..1."""
+    """Remove the dead zone, -1..1."""
     beyond = max(abs(stick) - _DEADZONE, 0.0) / (1.0 - _DEADZONE)
     return beyond if stick > 0.0 else -beyond

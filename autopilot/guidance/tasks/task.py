@@ -1,4 +1,4 @@
-"""The interface of flight tasks: context in, motion out, once a control sample."""
+"""The interface of flight tasks."""
 
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -13,7 +13,7 @@ _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
 class Steered(NamedTuple):
-    """Latest client inputs: sticks, setpoint, target to follow."""
+    """Latest client inputs."""
 
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
@@ -27,11 +27,10 @@ class TaskContext(NamedTuple):
     """Inputs of a task.
 
     Attributes:
-        now_us: Path time: simulated time at which commands take effect, minus the control law's lag.
-        state: The vehicle then.
-        interval_s, samples: Instants of a target.
-        ground_m: Height of the last standing position, z of ENU.
-        blind: Whether the position is unusable: landings are then level.
+        now_us: Path time at which commands take effect.
+        samples: Instants of a target.
+        ground_m: z of ENU at the last standing position.
+        blind: Whether the position is unusable.
     """
 
     now_us: int
@@ -62,7 +61,7 @@ class TaskContext(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion by position and yaw: target, limits of the approach, pace."""
+    """Target, limits and pace by position and yaw."""
 
     target: Target
     limits: Limits
@@ -70,11 +69,7 @@ class Motion(NamedTuple):
 
 
 class PlannedMotion(NamedTuple):
-    """Motion along a plan: horizon and limits of the approach.
-
-    Attributes:
-        for_law: The horizon at the control law's instants, if different.
-    """
+    """Motion along a plan; `for_law` is at the control law's instants."""
 
     horizon: Horizon
     limits: Limits
@@ -87,14 +82,7 @@ class PlannedMotion(NamedTuple):
 
 
 class AttitudeMotion(NamedTuple):
-    """Motion by attitude and thrust.
-
-    Attributes:
-        reference: Position reference meanwhile.
-        lifts: Whether a standing vehicle must take off.
-        sinks: Whether an airborne vehicle must sink.
-        drifts: Whether the velocity is unreliable: see `landing_detector.watch`.
-    """
+    """Motion by attitude and thrust; it lifts off, sinks, or has an unreliable velocity (`drifts`)."""
 
     demand: AttitudeDemand
     reference: Reference
@@ -110,16 +98,14 @@ class FlightTask(Protocol):
     """A way to fly."""
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return the motion from now on. Called once a control sample."""
+        """Called once a control sample."""
         ...
 
-    def arrived(self, context: TaskContext) -> bool:
-        """Whether it has ended."""
-        ...
+    def arrived(self, context: TaskContext) -> bool: ...
 
 
 class EndlessTask:
-    """A task ended from outside: by the ground, a command, a timeout."""
+    """A task ended from outside."""
 
     def arrived(self, context: TaskContext) -> bool:
         del context
@@ -127,7 +113,7 @@ class EndlessTask:
 
 
 def lifts(target: Target, state: VehicleState) -> bool:
-    """Whether a standing vehicle must take off for this target."""
+    """Whether a standing vehicle must take off."""
     end = target.motion[-1, :, 2]
     kind = target.kinds[2]
     if kind is Kind.POSITION:

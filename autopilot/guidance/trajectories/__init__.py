@@ -1,1 +1,1 @@
-"""Tracks as formulas of time with all derivatives, waypoints with minimum snap, horizons."""
+"""Tracks as formulas of time, and their horizons."""

@@ -1,4 +1,4 @@
-"""Strict reading of numbers from a CSV file with a header; errors name file, line and column."""
+"""Strict CSV tables; errors name file, line and column."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,17 +18,12 @@ _ROUNDING_S = 1e-6
 
 
 class TrackFileError(AutopilotError):
-    """A file that cannot be flown; the message names it, and line and column, or leg."""
+    """A file that cannot be flown; the message names the place."""
 
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """The numbers of a file.
-
-    Attributes:
-        values: Columns, (n,) each, n >= 2.
-        lines: Line of each row.
-    """
+    """Columns, (n,) each, n >= 2, and their lines."""
 
     path: Path
     values: dict[str, Array]
@@ -38,17 +33,16 @@ class CsvTable:
         return TrackFileError(f"{self.path}: line {self.lines[row]}, column {column}: {what}")
 
     def matrix(self, columns: Sequence[str]) -> Array:
-        """Return columns side by side, (n, columns)."""
         return np.stack([self.values[column] for column in columns], axis=1)
 
     @property
     def yaw_rad(self) -> Array | None:
-        """Column yaw, unwrapped, rad, (n,)."""
+        """Unwrapped, (n,)."""
         yaw = self.values.get("yaw")
         return None if yaw is None else np.unwrap(np.radians(yaw))
 
     def times(self, min_step_s: float) -> Array:
-        """Return column t, s: it must start at 0 and increase by at least `min_step_s`."""
+        """Return t, s, from 0 in steps of at least `min_step_s`."""
         times_s = self.values["t"]
         if times_s[0] != 0.0:
             raise self.error(0, "t", f"the first time must be 0, not {times_s[0]:g}")
@@ -58,17 +52,13 @@ class CsvTable:
         return times_s
 
     def check_duration(self, column: str, times_s: Array) -> None:
-        """Raise a TrackFileError for `column` if a row is reached too late."""
+        """Raise a TrackFileError if a row is too late."""
         for row in np.flatnonzero(times_s > MAX_DURATION_S)[:1]:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 
 
 def read_table(path: Path, required: Collection[str], optional: Collection[str], text: str | None = None) -> CsvTable:
-    """Read a CSV file, or its `text`, with at least two rows.
-
-    Raises:
-        TrackFileError: The file cannot be read, or is malformed.
-    """
+    """Read a CSV file, or its `text`; TrackFileError if malformed."""
     try:
         lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
@@ -96,7 +86,6 @@ def _header(path: Path, cells: list[str], required: Collection[str], known: Coll
 
 
 def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int, list[float]]]:
-    """Yield line number and numbers of each row."""
     for line, text in enumerate(lines, start=2):
         cells = text.split(",")
         if not text.strip():

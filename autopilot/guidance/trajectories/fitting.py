@@ -1,7 +1,7 @@
-"""Minimum-snap paths adapted to a vehicle: held above the floor, and slowed down as required.
+"""Minimum-snap paths held above the floor and slowed down to a vehicle's limits.
 
-Where the path dips below the floor, its height passes an additional point above it, as smoothly as at a waypoint. Legs
-beyond the vehicle's limits are stretched in time. Feasible paths stay unchanged, bit for bit.
+A dip below the floor passes an additional point above it; legs beyond the limits are stretched in time. Feasible paths
+stay unchanged, bit for bit.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ _LISTED = 3
 
 
 class Dip(NamedTuple):
-    """The lowest point of a path below the floor; legs count from 0."""
+    """Lowest point below the floor; legs count from 0."""
 
     leg: int
     time_s: float
@@ -39,12 +39,7 @@ class Dip(NamedTuple):
 
 
 def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
-    """Return the feasible track through waypoints, and its changes as text.
-
-    Raises:
-        TrackFileError: A waypoint is below the floor, the search fails, or the file prescribes times and the track
-            would change.
-    """
+    """Return the feasible track, and its changes as text, or raise TrackFileError."""
     check_heights(waypoints, floor_m)
     if waypoints.timed:
         return _as_timed(waypoints, reach, floor_m), ""
@@ -66,14 +61,13 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
 
 
 def check_heights(waypoints: Waypoints, floor_m: float) -> None:
-    """Raise a TrackFileError if a waypoint is below the floor."""
     for row in np.flatnonzero(waypoints.points_enu_m[:, 2] < floor_m - ROUNDING_M)[:1]:
         height_m = waypoints.points_enu_m[row, 2]
         raise waypoints.error(f"waypoint {row + 1} is at {height_m:g} m, below the floor of {floor_m:g} m")
 
 
 def dips_of(track: Track, floor_m: float) -> Iterator[tuple[float, float]]:
-    """Yield time, s, and height, m, of the lowest point of each dip below the floor."""
+    """Yield time, s, and height, m, of each dip."""
     t = times(track)
     z = position(track, t)[:, 2]
     below = np.concatenate([[0], z < floor_m - ROUNDING_M, [0]]).astype(np.int8)
@@ -96,7 +90,7 @@ def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
 
 
 def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> tuple[Array, Demand]:
-    """Return each leg's relative demand, (n - 1,), and the most exceeded demand."""
+    """Return each leg's relative demand, (n - 1,), and the worst."""
     excess = np.array([demand.excess(margin) for demand in demands])
     worst = demands[int(excess.max(axis=1).argmax())]
     begins = np.ceil(waypoints.times_s[:-1] / INTERVAL_S).astype(np.intp)
@@ -104,14 +98,14 @@ def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> t
 
 
 def _widened(excess: Array, neighbours: int) -> Array:
-    """Return the maximum over each leg and its neighbours on both sides, (n,)."""
+    """Return the maximum with neighbours, (n,)."""
     neighbours = min(neighbours, len(excess))
     widened: Array = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
     return widened
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track held above the floor, and its original dips."""
+    """Return the track above the floor, and its dips."""
     track = through(waypoints)
     dips = found = _dips(track, waypoints, floor_m)
     heights = np.empty((0, 2))

@@ -1,4 +1,4 @@
-"""Loading of a track for one vehicle: checked, and adapted if possible, before the flight."""
+"""Tracks checked and adapted for one vehicle."""
 
 from math import inf
 from pathlib import Path
@@ -16,7 +16,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class LoadedTrack(NamedTuple):
-    """A track, with a note on changes or exceeded limits for the user."""
+    """A track, with a note for the user."""
 
     track: Track
     note: str
@@ -25,15 +25,12 @@ class LoadedTrack(NamedTuple):
 def load_track(
     name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None, text: str | None = None
 ) -> LoadedTrack:
-    """Load a track for a vehicle under a profile.
-
-    Waypoint tracks are held above the floor and slowed down to the vehicle's limits, or made as fast as these. Other
-    tracks are flown unchanged, even beyond the limits.
+    """Load a track for a vehicle; waypoint tracks are adapted to its limits, others are flown unchanged.
 
     Args:
         name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
-        floor_m: Lowest height, m, ENU; None for the ground, if any.
-        text: Content of the track's file; None to read it.
+        floor_m: Lowest height, m, ENU; by default the ground.
+        text: Content of the track's file, instead of reading it.
 
     Raises:
         TrackError: The track is unknown, infeasible, or below the floor.
@@ -52,7 +49,7 @@ def load_track(
 def track_through(
     waypoints: Waypoints, vehicle: Vehicle, profile: Profile, floor_m: float | None = None
 ) -> LoadedTrack:
-    """Return the track through waypoints as in `load_track`; TrackError if infeasible."""
+    """`load_track` for waypoints."""
     reach = Reach(vehicle, profile, exact_drag=waypoints.fastest)
     try:
         fitted, changed = (fastest if waypoints.fastest else fit)(waypoints, reach, _floor(vehicle, floor_m))
@@ -66,7 +63,7 @@ def _floor(vehicle: Vehicle, floor_m: float | None) -> float:
 
 
 def file_text(name: str) -> str | None:
-    """Return the content of a track's file, if it has one; TrackError if unreadable."""
+    """Return the content of a track's file, if it has one."""
     path = _file(name)
     if path is None:
         return None
@@ -79,7 +76,6 @@ def file_text(name: str) -> str | None:
 
 
 def with_file(name: str, path: Path) -> str:
-    """Return the name with another file."""
     given = _file(name)
     return name if given is None else name.replace(given, str(path), 1)
 

@@ -1,10 +1,8 @@
-"""Piecewise polynomials through points at given times that minimise the integral of a squared derivative.
+"""Piecewise polynomials through points that minimise a squared derivative.
 
-Problem (snap for position, acceleration for yaw): D. Mellinger and V. Kumar, "Minimum snap trajectory generation and
-control for quadrotors", ICRA 2011. Solution: C. Richter, A. Bry and N. Roy, "Polynomial trajectory planning for
-aggressive quadrotor flight", ISRR 2013: the unknowns are the derivatives at inner points, so that equality constraints
-hold by construction and the KKT system is symmetric positive definite, coupling only neighbours. Each segment has its
-own time from 0 to 1.
+D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011; solved as in C.
+Richter, A. Bry and N. Roy, "Polynomial trajectory planning for aggressive quadrotor flight", ISRR 2013: the unknowns
+are derivatives at inner points, so that the system is positive definite and couples only neighbours.
 """
 
 from dataclasses import dataclass
@@ -23,18 +21,13 @@ ACCELERATION = 2
 
 @dataclass(frozen=True, slots=True)
 class PiecewisePolynomial:
-    """Consecutive polynomials.
-
-    Attributes:
-        times_s: Knots with both ends, s, strictly increasing, (n,).
-        coefficients: In own time from 0 to 1, lowest power first, (n - 1, powers, axes).
-    """
+    """Polynomials between knots `times_s`, (n,); coefficients in own time 0 to 1, (n - 1, powers, axes)."""
 
     times_s: Array
     coefficients: Array
 
     def __call__(self, t: TaylorSeries) -> tuple[TaylorSeries, ...]:
-        """Return each axis at time `t`, s; the ends are extrapolated."""
+        """Return each axis at `t`, extrapolated at the ends."""
         piece = self._piece(t.coefficients[0])
         tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
         return tuple(_horner(self.coefficients[piece, :, axis], tau) for axis in range(self.coefficients.shape[2]))
@@ -44,21 +37,16 @@ class PiecewisePolynomial:
 
 
 def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
-    """Return the curve through `points` with the least integral of its squared derivative of an order.
+    """Return the curve through `points` (n, axes) at `times_s`, n >= 2, at rest at both ends.
 
-    It is at rest at both ends. Derivatives below `order` are continuous because they are shared, those up to 2 order -
-    2 by optimality.
-
-    Args:
-        order: `SNAP` or `ACCELERATION`.
-        times_s: Times of the points, s, strictly increasing, (n,), n >= 2.
-        points: (n, axes).
+    `order` is `SNAP` or `ACCELERATION`. Derivatives below it are continuous because they are shared, those up to 2
+    order - 2 by optimality.
     """
     return interpolate(times_s, minimal_knots(elements(np.diff(times_s), stiffness(order)), points))
 
 
 def minimal_knots(elements: Array, points: Array) -> Array:
-    """Return the optimal derivatives at `points` (n, axes), order 0 first, (n, order, axes)."""
+    """Return the optimal derivatives, (n, order, axes)."""
     knots = np.zeros((len(points), elements.shape[2], points.shape[1]))
     knots[:, 0] = points
     if len(points) > 2:
@@ -67,10 +55,7 @@ def minimal_knots(elements: Array, points: Array) -> Array:
 
 
 def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
-    """Hermite interpolation: return the polynomials of least degree with these derivatives at the knots.
-
-    `times_s` strictly increase, (n,), n >= 2; `knots` are derivatives, order 0 first, (n, order, axes).
-    """
+    """Hermite interpolation of derivatives `knots`, (n, order, axes)."""
     _, order, axes = knots.shape
     durations = np.diff(times_s)
     both = np.concatenate([knots[:-1], knots[1:]], axis=1)
@@ -80,7 +65,7 @@ def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
 
 
 def from_ends(order: int) -> Array:
-    """Return the matrix from derivatives at 0, then at 1, to coefficients."""
+    """Return the matrix from end derivatives to coefficients."""
     columns = range(2 * order)
     at_0 = [[float(factorial(k)) if power == k else 0.0 for power in columns] for k in range(order)]
     at_1 = [[float(perm(power, k)) for power in columns] for k in range(order)]
@@ -88,7 +73,7 @@ def from_ends(order: int) -> Array:
 
 
 def stiffness(order: int) -> Array:
-    """Return the integral from 0 to 1 of the squared derivative as a form of the derivatives at 0, then at 1."""
+    """Return the integral of the squared derivative from 0 to 1 as a form of end derivatives."""
     columns = range(2 * order)
 
     def entry(i: int, j: int) -> float:
@@ -99,14 +84,14 @@ def stiffness(order: int) -> Array:
 
 
 def powers(durations: Array, order: int) -> Array:
-    """Return the factors from derivatives per second to derivatives per segment, (segments, order)."""
+    """Return factors from derivatives per second to per segment."""
     powers = np.ones((len(durations), order))
     powers[:, 1:] = durations[:, None]
     return np.cumprod(powers, axis=1, dtype=np.float64)
 
 
 def elements(durations: Array, stiffness: Array) -> Array:
-    """Return each segment's cost as a form of its end derivatives: (segments, end, order, end, order)."""
+    """Return each segment's form, (segments, end, order, end, order)."""
     order = len(stiffness) // 2
     scale = np.tile(powers(durations, order), 2)
     forms = stiffness * scale[:, :, None] * scale[:, None, :] / powers(durations, 2 * order)[:, -1:, None]
@@ -114,7 +99,6 @@ def elements(durations: Array, stiffness: Array) -> Array:
 
 
 def _free_derivatives(elements: Array, points: Array) -> Array:
-    """Return the optimal derivatives at the inner points, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
     pull = (
         before[:, 1, 1:, 0, :1] * points[:-2, None]
@@ -125,10 +109,7 @@ def _free_derivatives(elements: Array, points: Array) -> Array:
 
 
 def balanced(elements: Array, forces: Array) -> Array:
-    """Solve curvature · derivatives = `forces`, (n - 2, order - 1, axes), n > 2, for the inner points.
-
-    The curvature is block tridiagonal: block elimination, then back substitution.
-    """
+    """Solve for the inner derivatives by block elimination, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
     coupling = after[:-1, 0, 1:, 1, 1:]
@@ -145,7 +126,6 @@ def balanced(elements: Array, forces: Array) -> Array:
 
 
 def _horner(coefficients: Array, x: TaylorSeries) -> TaylorSeries:
-    """Evaluate a polynomial of a series, with coefficients (n, powers) for each time."""
     value = x * 0.0 + coefficients[:, -1]
     for coefficient in coefficients[:, -2::-1].T:
         value = value * x + coefficient

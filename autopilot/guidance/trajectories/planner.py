@@ -1,4 +1,4 @@
-"""Tracks tabulated at equal intervals, and horizons from the table."""
+"""Tracks tabulated at equal intervals."""
 
 from math import hypot
 
@@ -21,13 +21,7 @@ _START = Preview(interval_us=100_000, samples=1)
 
 
 class Planner:
-    """References at equal intervals along a track; after its end, its last point.
-
-    A finite track is tabulated once, an endless one in blocks on demand: a horizon depends only on its time.
-
-    Attributes:
-        table: The current block, plus the reach of a horizon beyond it.
-    """
+    """References along a track, then its last point; endless tracks are tabulated in blocks."""
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
         self.preview = preview
@@ -40,7 +34,6 @@ class Planner:
         self.table = self._tabulate(0)
 
     def horizon(self, time_us: int) -> Horizon:
-        """Return the references from the sample at or before `time_us` on."""
         sample = time_us // self.preview.interval_us
         block, first = divmod(sample if self._rest is None else min(sample, self._rest), self._length)
         if block != self._block:
@@ -49,7 +42,7 @@ class Planner:
         return Horizon._make([column[ahead] for column in self.table])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
-        """Return `horizon` for a time between instants `grid_us` apart, extrapolated."""
+        """Extrapolate from the grid instant before `time_us`."""
         if self._ahead and self._ahead[:2] == (time_us, grid_us):
             return self._ahead[2]
         past_us = time_us % grid_us
@@ -57,11 +50,10 @@ class Planner:
         return carried(horizon, past_us * 1e-6) if past_us else horizon
 
     def prepare(self, time_us: int, grid_us: int) -> None:
-        """Precompute `horizon_at`."""
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        """Tabulate a block and its horizon; differences need the sample before."""
+        """Differences need the sample before."""
         first, lead = block * self._length, min(block, 1)
         samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
         interval_s = self.preview.interval_us * 1e-6
@@ -86,12 +78,10 @@ def carried(horizon: Horizon, by_s: float) -> Horizon:
 
 
 def start_yaw(track: Track, references: References) -> float:
-    """Return the first yaw reference, rad."""
     return float(Planner(track, references, _START).horizon(0).yaw_rad[0])
 
 
 def _rest(track: Track, interval_us: int) -> int | None:
-    """Return the first sample after the end of a track."""
     return None if np.isinf(track.duration_s) else round(track.duration_s * 1e6) // interval_us + 1
 
 
@@ -109,7 +99,7 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
 
 
 def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
-    """Return yaw along the horizontal velocity, its rate and acceleration; held at standstill, all rates 0."""
+    """Return yaw along the velocity and its derivatives; held at standstill."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
     moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
     direction = atan2(TaylorSeries(np.where(moving, vy, 0.0)), TaylorSeries(np.where(moving, vx, 0.0)))
@@ -121,7 +111,6 @@ def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
 
 
 def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
-    """Return the direction of the first non-zero derivative of the first sample, rad."""
     for order in range(1, len(x.coefficients)):
         ahead, left = float(x.derivative(order)[0]), float(y.derivative(order)[0])
         if hypot(ahead, left) >= _STILL:
@@ -130,7 +119,7 @@ def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
 
 
 def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
-    """Return continuous yaw; unknown values repeat the previous known one, or the first one, or 0."""
+    """Unknown values repeat the previous, or the first one."""
     if not known.any():
         return np.zeros_like(yaw)
     latest = np.maximum.accumulate(np.where(known, np.arange(len(yaw)), np.argmax(known)))
@@ -139,11 +128,7 @@ def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def _by_differences(track: Track, t: Array, interval_s: float) -> Horizon:
-    """Compute velocity and yaw by differences, as in the thesis.
-
-    Velocity is the backward difference (forward for the first sample); yaw is along the horizontal velocity, for the
-    first sample tangential to a circle about the origin. Higher derivatives are 0. A yaw formula takes precedence.
-    """
+    """As in the thesis: backward differences, yaw along them, at first tangential to a circle about the origin."""
     points = position(track, t)
     backward = np.diff(points, axis=0) / interval_s
     velocity = np.concatenate([backward[:1], backward])

@@ -1,8 +1,7 @@
-"""Thrust, tilt and body rate required by a track, and the vehicle's limits.
+"""Thrust, tilt and body rate that a track requires, and a vehicle's limits.
 
-Position is a flat output: acceleration, gravity and drag give the thrust vector, jerk its turn rate, snap its angular
-acceleration and thus the rotors' moment. Source: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
-The moment about z is left out because control laws sacrifice yaw.
+Position is a flat output: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018. The moment about z is
+left out because control laws sacrifice yaw.
 """
 
 from dataclasses import dataclass
@@ -39,13 +38,7 @@ _RESPONSE_SAMPLES = 20
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A required quantity and its limit.
-
-    Attributes:
-        values: At each time, (n,).
-        limit: Maximum; minimum if `falls`.
-        span: Range of the quantity.
-    """
+    """A required quantity, (n,), and its limit, a minimum if it `falls`."""
 
     name: str
     unit: str
@@ -55,26 +48,25 @@ class Demand:
     falls: bool = False
 
     def excess(self, margin: float) -> Array:
-        """Return the ratio to the limit with `margin` of the range reserved, (n,)."""
+        """Return the ratio to the limit with `margin`, (n,)."""
         if self.falls:
             return (self.limit + margin * self.span) / np.maximum(self.values, _SMALL_N)
         excess: Array = self.values / (self.limit - margin * self.span)
         return excess
 
     def beyond(self, margin: float) -> Array:
-        """Return the excess over the limit in parts of the range, with `margin` reserved, (n,); < 0 if feasible."""
+        """Return the excess in parts of the range, < 0 if feasible, (n,)."""
         too_much = self.limit - self.values if self.falls else self.values - self.limit
         beyond: Array = too_much / self.span + margin
         return beyond
 
     def __str__(self) -> str:
-        """Return the extreme value and the limit."""
         value, most = (self.values.min(), "least") if self.falls else (self.values.max(), "most")
         return f"{self.name} of {value:.3g} {self.unit}, where {self.limit:.3g} is the {most}"
 
 
 class Motion(NamedTuple):
-    """Velocity, acceleration, jerk and snap, ENU, (n, 3) each."""
+    """Derivatives of position, ENU, (n, 3) each."""
 
     velocity: Array
     acceleration: Array
@@ -83,7 +75,7 @@ class Motion(NamedTuple):
 
 
 class _Pulled(NamedTuple):
-    """Force along the thrust, N, ENU, (n, 3); drag, N s/m, and thrust, N, (n, 1) each."""
+    """Force along the thrust, N, ENU, (n, 3), with drag, N s/m, and thrust, N, (n, 1)."""
 
     force: Array
     drag: Array
@@ -94,11 +86,7 @@ class Reach:
     """The limits of one vehicle under one profile."""
 
     def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
-        """Read the limits of rotors, and of tilt and body rates if the control law has any.
-
-        Args:
-            exact_drag: Compute drag from actual thrust and tilt, not from hover: beyond 10 m/s they differ by newtons.
-        """
+        """`exact_drag`: by actual thrust and tilt, not by hover; beyond 10 m/s they differ by newtons."""
         self._exact_drag = exact_drag
         self._vehicle = vehicle
         self._airframe = airframe_of(vehicle)
@@ -110,13 +98,11 @@ class Reach:
         self._max_rate = float(min(predicted.get("max_rate_rad_s", (inf,))[:2]))
 
     def charge_of_hover(self, duration_s: float) -> float:
-        """Return the charge for a hover, Ah."""
         rotors = self._vehicle.rotors
         hovering = np.full(len(rotors.position_m), self._vehicle.hover_speed / rotors.max_speed)
         return self._battery.charge_after(0.0, hovering, duration_s)
 
     def charge_of(self, motion: Motion) -> float:
-        """Return the charge for a motion sampled at `INTERVAL_S`, with equal rotors, Ah."""
         rotors, interval_s, charge_ah = self._vehicle.rotors, _CHARGE_SAMPLES * INTERVAL_S, 0.0
         some = Motion(*(column[::_CHARGE_SAMPLES] for column in motion))
         thrust = np.maximum(self._pulled(some).thrust_n[:, 0], 0.0)
@@ -126,7 +112,7 @@ class Reach:
         return charge_ah
 
     def demands(self, motion: Motion, charge_ah: float) -> list[Demand]:
-        """Return the demands of a motion, with limits after `charge_ah` was taken from the battery."""
+        """Return the demands; limits are after `charge_ah` was taken."""
         _, a, j, s = motion
         mass = self._airframe.mass_kg
         pulled = self._pulled(motion)
@@ -145,10 +131,9 @@ class Reach:
         return demands
 
     def _pulled(self, motion: Motion) -> "_Pulled":
-        """Split the force into thrust and drag.
+        """Split the force into thrust and drag, c (v - (v·z) z) across the rotor axis and c_z (v·z) z along it.
 
-        Drag across the rotor axis is c (v - (v·z) z) with c = c_xy + c_r √T, along it c_z (v·z) z, so that T z = m (a +
-        g) + c v + (c_z - c) (v·z) z: the thrust points along m (a + g) + c v.
+        With c = c_xy + c_r √T, T z = m (a + g) + c v + (c_z - c) (v·z) z: thrust points along m (a + g) + c v.
         """
         airframe, v = self._airframe, motion.velocity
         drag: Array = np.full((len(v), 1), self._drag_n_s_m)
@@ -168,7 +153,6 @@ class Reach:
         return force
 
     def _of_rotors(self, thrust_n: Array, turn_rad_s2: Array, charge_ah: float) -> list[Demand]:
-        """Return the demands on the rotors; the moment may be about any horizontal axis."""
         share, lever = self._mixed[:, 0], _length(self._mixed[:, 1:3])
         moment = max(self._vehicle.body.inertia_kg_m2[:2]) * turn_rad_s2
         rotors = self._vehicle.rotors
@@ -187,7 +171,7 @@ class Reach:
 
 
 def times(track: Track) -> Array:
-    """Return the sampling times of a track, s, (n,); the first 100 s of an endless one."""
+    """Return sampling times, s; the first 100 s of an endless track."""
     return np.arange(0.0, DURATION_S if track.duration_s == inf else track.duration_s, INTERVAL_S)
 
 
@@ -197,10 +181,7 @@ def exact_motion(track: Track) -> Motion:
 
 
 def mean_motion(track: Track) -> Motion:
-    """Return the motion by differences over the response time of a control law.
-
-    This excludes steps that a vehicle rounds off.
-    """
+    """Average over the response time of a control law, which rounds steps off."""
     t, apart = times(track), _RESPONSE_SAMPLES
     around = INTERVAL_S * np.arange(-2 * apart, len(t) + 2 * apart)
     p = position(track, np.clip(around, 0.0, track.duration_s))

@@ -1,4 +1,4 @@
-"""Tracks by name and options: Colibri's own, and those of other packages by entry points."""
+"""Tracks by name: Colibri's own, and entry points."""
 
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -73,7 +73,7 @@ def _load_installed(name: str) -> Any:
 
 
 def _tried(name: str, options: TrackOptions) -> Track:
-    """Return the track of another package, checked for three finite coordinates at the start."""
+    """Check the track of another package."""
     try:
         given = options.track()
         found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
@@ -105,7 +105,7 @@ def read_options(name: str, kind: type[TrackOptions], text: str | None) -> Track
 
 
 def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
-    """Split options; the first may be a value alone, for a track's lone option."""
+    """Split options; a value alone is the lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
         key, equals, value = item.partition("=")

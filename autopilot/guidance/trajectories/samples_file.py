@@ -1,4 +1,4 @@
-"""Externally sampled tracks, read strictly from CSV and flown unchanged."""
+"""Externally sampled tracks, flown unchanged."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +19,7 @@ _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """A sampled track.
-
-    Attributes:
-        times_s: Strictly increasing from 0, s, (n,), n >= 2.
-        motion_enu: Position, velocity and acceleration, m, m/s and m/s², (n, 3, 3).
-        yaw_rad: Unwrapped, rad, (n,); None: along the path.
-    """
+    """Times from 0, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped."""
 
     times_s: Array
     motion_enu: Array
@@ -33,11 +27,7 @@ class Samples:
 
 
 def read_samples(path: Path, text: str | None = None) -> Samples:
-    """Read a CSV file with columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and optionally yaw (degrees).
-
-    Raises:
-        TrackFileError: The file cannot be read, or its columns contradict each other.
-    """
+    """Read columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and yaw (degrees), or raise TrackFileError."""
     table = read_table(path, _REQUIRED, _OPTIONAL, text)
     times_s = table.times(_MIN_STEP_S)
     motion = np.stack([table.matrix(columns) for columns in (_PLACE, _VELOCITY, _ACCELERATION)], axis=1)
@@ -46,7 +36,7 @@ def read_samples(path: Path, text: str | None = None) -> Samples:
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
-    """Compare columns by the trapezoidal rule, for positions with the end correction by accelerations."""
+    """Compare columns by the trapezoidal rule."""
     x, v, a = np.moveaxis(motion, 1, 0)
     goes = np.diff(x, axis=0) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     for columns, change, rate, rounding, unit in (

@@ -1,8 +1,6 @@
-"""Derivatives of a track by arithmetic on truncated Taylor series.
+"""Derivatives by arithmetic on truncated Taylor series x(t + h) = c0 + c1 h + c2 h² + …, exact to the last coefficient.
 
-A series holds x(t + h) = c0 + c1 h + c2 h² + … at many times t. Sums, products, sines, cosines and directions are exact
-to the last coefficient, so that a formula of time has every derivative. Source: Griewank and Walther, "Evaluating
-Derivatives" (2008), chapter 13.
+Source: Griewank and Walther, "Evaluating Derivatives" (2008), chapter 13.
 """
 
 from collections.abc import Callable
@@ -50,7 +48,6 @@ class TaylorSeries:
         return TaylorSeries(np.concatenate([self.rate().coefficients, np.zeros_like(self.coefficients[:1])]))
 
     def __add__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
-        """Add a series or a constant, one for all times or one for each."""
         if isinstance(other, TaylorSeries):
             return TaylorSeries(self.coefficients + other.coefficients)
         shifted = self.coefficients.copy()
@@ -58,7 +55,7 @@ class TaylorSeries:
         return TaylorSeries(shifted)
 
     def __mul__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
-        """Multiply by a series (Cauchy product) or a constant, one for all times or one for each."""
+        """Cauchy product, or multiplication by constants."""
         if not isinstance(other, TaylorSeries):
             return TaylorSeries(self.coefficients * other)
         a, b = self.coefficients, other.coefficients
@@ -89,12 +86,12 @@ class TaylorSeries:
 
 
 def held(t: TaylorSeries, value: TaylorSeries | float) -> TaylorSeries:
-    """Return a constant as a series at the times of `t`; a series as it is."""
+    """Return a constant as a series."""
     return value if isinstance(value, TaylorSeries) else 0.0 * t + value
 
 
 def in_series(formula: Callable[[TaylorSeries], Any]) -> Callable[[TaylorSeries], Any]:
-    """Wrap a formula of time so that constants become series."""
+    """Wrap a formula: constants become series."""
 
     def series(t: TaylorSeries) -> Any:
         value = formula(t)
@@ -112,10 +109,7 @@ def cos(x: TaylorSeries) -> TaylorSeries:
 
 
 def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
-    """Return the direction of (x, y), rad, in (-π, π]; at x = y = 0 every coefficient is 0.
-
-    Solves (x² + y²) θ' = x y' - y x' for the coefficients of θ in turn.
-    """
+    """Return the direction, rad; 0 at x = y = 0. Solves (x² + y²) θ' = x y' - y x'."""
     squared = (x * x + y * y).coefficients
     turning = (x * y.padded_rate() - y * x.padded_rate()).coefficients
     theta = np.zeros_like(squared)
@@ -128,7 +122,7 @@ def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
 
 
 def _sin_cos(x: TaylorSeries) -> tuple[TaylorSeries, TaylorSeries]:
-    """Compute both from s' = c x' and c' = -s x'."""
+    """Solve s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
     s[0], c[0] = elementwise.sin(a[0]), elementwise.cos(a[0])

@@ -41,10 +41,10 @@ class Track:
 
     Attributes:
         position: Time in s -> x, y, z in m, ENU.
-        yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; None: along the horizontal velocity.
-            Endless tracks require it, so that yaw depends only on time.
-        duration_s: Afterwards the track rests at its last point; infinite for an endless track.
-        waypoints: Waypoints of a track that may be changed in between.
+        yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; by default along the horizontal velocity.
+            An endless track requires it, so that yaw depends on time alone.
+        duration_s: Then the track rests at its last point; infinite for an endless track.
+        waypoints: Waypoints, if the track between them may be changed.
     """
 
     position: Callable[[TaylorSeries], Place]
@@ -53,7 +53,6 @@ class Track:
     waypoints: Waypoints | None = None
 
     def __post_init__(self) -> None:
-        """Require a yaw formula of an endless track."""
         if self.yaw is None and self.duration_s == inf:
             raise ValueError("a track without end needs a formula for its yaw")
 
@@ -132,7 +131,7 @@ class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Gerono's lemniscate around the origin: x = size sin ωt, y = size sin ωt cos ωt."""
+    """Gerono's lemniscate: x = size sin ωt, y = size sin ωt cos ωt."""
 
     size: Length = 4.0
     height: Coordinate = 3.0
@@ -148,7 +147,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
         return x, x * cos(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
-        """Yaw along (cos α, cos 2α): relative to -90° it stays within ±180°, so it never wraps."""
+        """Relative to -90° it stays within ±180°."""
         alpha = self._alpha(t)
         return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
 
@@ -157,7 +156,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Circle around the origin, counter-clockwise from the east."""
+    """Counter-clockwise from the east."""
 
     radius: Length = 2.0
     speed: Speed = 2.0
@@ -189,16 +188,12 @@ class FileOptions(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only
         return self.track_of(None)
 
     def track_of(self, text: str | None) -> Track:
-        """Return the track; `text` replaces the content of the file.
-
-        Raises:
-            TrackFileError: It cannot be flown.
-        """
+        """Return the track; `text` replaces the file."""
         raise NotImplementedError
 
 
 class WaypointFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly through the points of a CSV file with minimum snap, or as fast as possible."""
+    """Fly through points with minimum snap, or as fast as possible."""
 
     speed: Speed | Literal["max"] | None = None
     margin: Annotated[float, msgspec.Meta(ge=0.0, le=0.4)] | None = None
@@ -208,7 +203,7 @@ class WaypointFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class SamplesFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly the samples of a CSV file unchanged."""
+    """Fly samples unchanged."""
 
     def track_of(self, text: str | None) -> Track:
         return sampled(read_samples(Path(self.file), text))
@@ -224,11 +219,7 @@ OPTIONS: dict[str, type[TrackOptions]] = {
 
 
 def through(waypoints: Waypoints, heights: Array | None = None, between: Array | None = None) -> Track:
-    """Return the minimum-snap track through waypoints, with minimum yaw acceleration if they have yaw.
-
-    Its height also passes `heights`, (n, 2), n >= 1: times, s, and heights, m; the track also passes `between`, (n, 4):
-    times, s, and points, m, ENU.
-    """
+    """Return the minimum-snap track, also passing `heights`, (n, 2), and points `between`, (n, 4), by time."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import SNAP, minimise  # slow to load: most do without
 
     times_s = waypoints.times_s
@@ -248,7 +239,7 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
 
 
 def sampled(samples: Samples) -> Track:
-    """Return the track through samples by quintic interpolation, with continuous acceleration."""
+    """Quintic interpolation, with continuous acceleration."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import interpolate
 
     places = interpolate(samples.times_s, samples.motion_enu)
@@ -278,7 +269,7 @@ def _in_time(rows: Array, others: Array | None) -> Array:
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
-    """Return a derivative of the position, (n, 3), in m / s^derivative, ENU; at rest after the end."""
+    """Return a derivative of the position, ENU, (n, 3)."""
     time = track.clock(np.asarray(t, dtype=np.float64), derivative)
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 

@@ -1,4 +1,4 @@
-"""Waypoints with times and yaw, read strictly from CSV."""
+"""Waypoint files."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,15 +20,11 @@ _OPTIONAL = ("t", "yaw")
 
 @dataclass(frozen=True, slots=True)
 class Waypoints:
-    """Waypoints with times.
+    """Points, ENU, (n, 3), with times, (n,), and yaw, unwrapped, or along the path.
 
     Attributes:
-        times_s: Strictly increasing from 0, s, (n,), n >= 2.
-        points_enu_m: (n, 3), m, ENU.
-        yaw_rad: Unwrapped, rad, (n,); None: along the path.
         timed: Whether the file prescribes the times.
-        fastest: Whether to fly as fast as possible.
-        margin: Part of each range reserved for the control law where times are changed.
+        margin: Part of each range reserved for the control law.
     """
 
     path: Path
@@ -40,14 +36,12 @@ class Waypoints:
     margin: float = MARGIN
 
     def stretched(self, factors: Array) -> "Waypoints":
-        """Scale each leg's duration, (n - 1,)."""
         return self.at(np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
 
     def at(self, times_s: Array) -> "Waypoints":
         return replace(self, times_s=times_s)
 
     def leg_at(self, t: float) -> int:
-        """Return the leg at a time, s, from 0 on."""
         return int(np.searchsorted(self.times_s[1:-1], t, side="right"))
 
     def error(self, what: str) -> TrackFileError:
@@ -60,13 +54,9 @@ def read_waypoints(
     margin: float | None = None,
     text: str | None = None,
 ) -> Waypoints:
-    """Read a CSV file, or its `text`, with columns x, y, z (m, ENU), and optionally t (s) and yaw (degrees).
+    """Read columns x, y, z (m, ENU) and optionally t (s) and yaw (degrees), or raise TrackFileError.
 
-    Without `t`, legs are flown at an average of `speed_m_s`, by default 2 m/s, or "max" until a vehicle is known; the
-    first and last, from and to rest, at half of it.
-
-    Raises:
-        TrackFileError: The file cannot be read or flown.
+    Without t, legs are flown at an average of `speed_m_s`, the first and last at half of it.
     """
     table = read_table(path, _REQUIRED, _OPTIONAL, text)
     points, timed = table.matrix(_REQUIRED), "t" in table.values
@@ -80,7 +70,7 @@ def read_waypoints(
 
 
 def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:
-    """Return times at points, s, (n,), at an average speed, and half of it on the first and last leg."""
+    """Return times, s; the first and last leg are at half speed."""
     legs_s = _legs(points_enu_m, speed_m_s)
     legs_s[[0, -1]] *= 2.0
     return np.concatenate([[0.0], np.cumsum(legs_s)])

@@ -1,8 +1,7 @@
-"""Cost of a flight through points: duration plus penalty on exceeded limits, with its gradient.
+"""Duration of a flight plus penalty on exceeded limits, with its gradient.
 
 Source: Z. Wang, X. Zhou, C. Xu and F. Gao, "Geometrically constrained trajectory optimization for multicopters", IEEE
-Transactions on Robotics 38 (2022): few variables (times and points of a minimum-snap path), penalty, unbounded
-durations, adjoint gradient. Derivatives of the demands are by differences, so that their formulas stay in `reach`.
+Transactions on Robotics 38 (2022). Demands are differentiated numerically, so that their formulas stay in `reach`.
 """
 
 from math import factorial, inf
@@ -30,19 +29,15 @@ _ORDERS = np.tile(np.arange(float(SNAP)), 2)
 
 
 class FlightCost:
-    """Duration of a flight, s, plus penalty, as a function of leg times and free points.
+    """Cost as a function of leg times and free points.
 
     Attributes:
-        weight: Weight of the penalty: squared excess in parts of its range (m below the floor), integrated over time.
-        charge_ah: Charge taken from the battery before.
-        floor_m: Lowest height, m, ENU.
+        weight: Of squared excess in parts of its range (m below the floor), integrated over time.
+        charge_ah: Taken before.
     """
 
     def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
-        """`given` are waypoints, (legs + 1, 3), m, ENU; each leg has `pieces` of equal duration.
-
-        The part `margin` of each range is reserved for the control law.
-        """
+        """`given` are waypoints, ENU; each leg has `pieces`; `margin` of each range is reserved."""
         self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
         self._reach, self._given, self._pieces = reach, given, pieces
         self._margin = margin
@@ -52,12 +47,11 @@ class FlightCost:
         self._share[[0, -1]] *= 0.5
 
     def variables(self, legs_s: Array, points: Array) -> Array:
-        """Convert leg times, s, (legs,), and all points, (legs pieces + 1, 3), to unbounded variables."""
+        """Return unbounded variables."""
         chosen = np.arange(len(points)) % self._pieces > 0
         return np.concatenate([_root(legs_s), points[chosen].ravel()])
 
     def flight(self, x: Array) -> tuple[Array, Array]:
-        """Convert variables to leg times and points."""
         legs = len(self._given) - 1
         points = np.empty((legs * self._pieces + 1, 3))
         chosen = np.arange(len(points)) % self._pieces > 0
@@ -65,7 +59,6 @@ class FlightCost:
         return _duration(x[:legs])[0], points
 
     def __call__(self, x: Array) -> tuple[float, Array]:
-        """Return cost and gradient, (n,)."""
         legs_s, points = self.flight(x)
         durations = np.repeat(legs_s / self._pieces, self._pieces)
         forms = elements(durations, self._stiffness)
@@ -88,7 +81,7 @@ class FlightCost:
         return float((durations * (1.0 + penalty)).sum()), gradient
 
     def _penalty(self, motion: Array) -> tuple[Array, Array]:
-        """Return the penalty, (samples, pieces), and its slope, (derivatives, samples, pieces, 3)."""
+        """Return penalty, (samples, pieces), and slope, (derivatives, samples, pieces, 3)."""
         slope = np.zeros_like(motion)
         low = np.maximum(self.floor_m - motion[0, :, :, 2], 0.0)
         slope[0, :, :, 2] = -2.0 * low
@@ -103,7 +96,7 @@ class FlightCost:
         return low * low + (excess * excess).sum(axis=0).reshape(low.shape), slope
 
     def _slope(self, states: Array, beyond: Array, excess: Array) -> Array:
-        """Return the slope of the squared excess (demands, n) with velocity to snap, (4, n, 3)."""
+        """Return the slope of the squared excess, (4, n, 3)."""
         moved = np.repeat(states[:, None], 3 * SNAP, axis=1)
         slope = np.empty_like(states)
         for order, step in enumerate(_STEPS):
@@ -116,25 +109,21 @@ class FlightCost:
         return slope
 
     def _beyond(self, states: Array) -> Array:
-        """Return the excess over each limit, (demands, n), for velocity to snap, (4, n, 3)."""
+        """Return each excess, (demands, n)."""
         demands = self._reach.demands(Motion(*states), self.charge_ah)
         return np.stack([demand.beyond(self._margin) for demand in demands])
 
 
 class _Slopes:
-    """Slopes of a cost with durations, (pieces,), and points, (pieces + 1, 3), of a minimum-snap path."""
+    """Slopes with durations and points of a minimum-snap path."""
 
     def __init__(self, forms: Array, ends: Array, durations: Array) -> None:
-        """`ends` are the derivatives at both ends of each piece, (pieces, 8, 3)."""
         self._forms, self._ends, self._durations = forms, ends, durations
         self.of_durations = np.zeros(len(durations))
         self.of_points = np.zeros((len(durations) + 1, 3))
 
     def add(self, forces: Array) -> None:
-        """Add a cost whose slope with the end derivatives is `forces`, (pieces, 8, 3).
-
-        Durations enter as powers d^order; inner derivatives respond by the adjoint.
-        """
+        """Add a cost with slopes `forces`, (pieces, 8, 3), by the adjoint."""
         at_knots = _at_knots(forces)
         answer = np.zeros((*at_knots.shape[:2], 3))
         if len(answer) > 2:
@@ -147,14 +136,14 @@ class _Slopes:
         self.of_points += (at_knots - _at_knots(reaction))[:, 0]
 
     def _applied(self, ends: Array) -> Array:
-        """Multiply each element by end derivatives, (pieces, 8, 3)."""
+        """Multiply elements by end derivatives."""
         forms = self._forms.reshape(-1, 2 * SNAP, 2 * SNAP)
         applied: Array = (forms[:, :, :, None] * ends[:, None]).sum(axis=2)
         return applied
 
 
 def _sampling() -> Array:
-    """Return the matrix from end derivatives to samples of position to snap, in own time, (5 samples, 8)."""
+    """Return the matrix from end derivatives to samples, (5 samples, 8)."""
     tau = np.arange(_INTERVALS + 1.0) / _INTERVALS
     rows = np.zeros((SNAP + 1, len(tau), 2 * SNAP))
     for order in range(SNAP + 1):
@@ -166,12 +155,12 @@ def _sampling() -> Array:
 
 
 def _at_ends(knots: Array) -> Array:
-    """Convert knots, (pieces + 1, 4, 3), to piece ends, (pieces, 8, 3)."""
+    """Knots (pieces + 1, 4, 3) to ends (pieces, 8, 3)."""
     return np.concatenate([knots[:-1], knots[1:]], axis=1)
 
 
 def _at_knots(ends: Array) -> Array:
-    """Sum piece ends, (pieces, 8, 3), at the knots, (pieces + 1, 4, 3)."""
+    """Sum ends at the knots."""
     knots = np.zeros((len(ends) + 1, SNAP, 3))
     knots[:-1] += ends[:, :SNAP]
     knots[1:] += ends[:, SNAP:]
@@ -185,7 +174,7 @@ def _total(values: Array, pieces_axis: int) -> Array:
 
 
 def _duration(root: Array) -> tuple[Array, Array]:
-    """Return positive durations, s, and their slopes; 1 s at 0."""
+    """Return durations > 0 and their slopes."""
     below = 1.0 / ((0.5 * np.minimum(root, 0.0) - 1.0) * np.minimum(root, 0.0) + 1.0)
     above = (0.5 * np.maximum(root, 0.0) + 1.0) * np.maximum(root, 0.0)
     longer = root > 0.0

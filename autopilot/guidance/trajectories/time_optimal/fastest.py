@@ -1,7 +1,7 @@
-"""The fastest flight through waypoints: optimised leg times, and free points in between.
+"""The fastest flight through waypoints.
 
-First only the leg times are optimised; then legs are halved repeatedly and the new points are optimised too. Each stage
-starts from the previous one with a light penalty. At the end, the flight is slowed down until all limits hold.
+First leg times are optimised, then legs are halved repeatedly to add free points, each stage with a light penalty
+first. Finally the flight is slowed down until all limits hold.
 """
 
 from math import inf
@@ -31,11 +31,7 @@ _SLOWER = (0.0005, 0.05)
 
 
 def fastest(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
-    """Return the fastest track found through waypoints, and its description.
-
-    Raises:
-        TrackFileError: A waypoint is below the floor, or the search fails.
-    """
+    """Return the fastest track and its description, or raise TrackFileError."""
     check_heights(waypoints, floor_m)
     legs_s, points, pieces = np.diff(waypoints.times_s), waypoints.points_enu_m, 1
     while True:
@@ -56,7 +52,7 @@ def _wanted_pieces(legs: int) -> int:
 
 
 def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array, points: Array) -> tuple[Array, Array]:
-    """Return better leg times and points; the battery's state is that of the previous flight."""
+    """Optimise; the battery's state is that of the previous flight."""
     pieces = (len(points) - 1) // len(legs_s)
     cost = FlightCost(reach, waypoints.points_enu_m, pieces, waypoints.margin)
     cost.floor_m = floor_m + _CLEARANCE_M if pieces > 1 else -inf
@@ -76,14 +72,12 @@ def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array
 
 
 def _halved(track: Track, legs_s: Array, pieces: int, floor_m: float) -> Array:
-    """Return a track's points at finer pieces, above the floor."""
     points = position(track, _knots(legs_s, pieces))
     points[:, 2] = np.maximum(points[:, 2], floor_m)
     return points
 
 
 def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) -> tuple[Track, str]:
-    """Slow the track down to the limits; return it with its description."""
     while True:
         track = _track(waypoints, legs_s, points)
         motion = exact_motion(track)

@@ -1,8 +1,7 @@
 """Minimisation by limited-memory BFGS.
 
-Sources: J. Nocedal and S. J. Wright, "Numerical Optimization" (2006), algorithm 7.4 for the direction; A. S. Lewis and
-M. L. Overton, "Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6 for the line search, because
-penalties have kinks. SciPy's sums are by BLAS, with bits that depend on the CPU.
+J. Nocedal and S. J. Wright, "Numerical Optimization" (2006), algorithm 7.4; line search: A. S. Lewis and M. L. Overton,
+"Nonsmooth optimization via quasi-Newton methods" (2013), algorithm 2.6. SciPy's sums depend on the CPU.
 """
 
 from collections import deque
@@ -29,7 +28,7 @@ class _Point(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """A step, the change of the gradient, and their product."""
+    """Step, gradient change, product."""
 
     step: Array
     change: Array
@@ -37,10 +36,7 @@ class _Pair(NamedTuple):
 
 
 def minimise(function: Function, x: Array, iterations: int, tolerance: float) -> Array:
-    """Return a minimum, (n,), after at most `iterations`.
-
-    Stops when the remembered iterations improve less than `tolerance` of the value.
-    """
+    """Return a minimum; stops at improvements below `tolerance` of the value."""
     point = _Point(x, *function(x))
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
     values = deque([point.value], maxlen=_MEMORY)
@@ -80,7 +76,7 @@ def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
 
 
 def _searched(function: Function, start: _Point, direction: Array, length: float) -> _Point | None:
-    """Bisect along a direction for the weak Wolfe conditions; return the best point found."""
+    """Bisect for the weak Wolfe conditions."""
     slope = dot(start.gradient, direction)
     low, high, best = 0.0, inf, None
     for _ in range(_TRIALS if slope < 0.0 else 0):
