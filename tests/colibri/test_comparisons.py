@@ -23,9 +23,9 @@ from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 from tests.support.campaigns import Here
+from tests.support.commands import Refused
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
-INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc"
 
 
 def test_every_figure_of_the_thesis_has_its_place() -> None:
@@ -200,13 +200,11 @@ def test_a_flight_that_kills_its_process_is_lost(
 
 
 def test_a_law_that_cannot_be_built_is_found_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
     laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight", "--profile", "flight:geometric-se3", "--track", "hover", "--duration", "0.5"]
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", *options, "--out", str(tmp_path / "out")])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == "colibri: error: controller geometric-se3 cannot be built: KeyError: 'gain'\n"
+    said = refused("compare", *options, "--out", tmp_path / "out")
+    assert said == "controller geometric-se3 cannot be built: KeyError: 'gain'"
     assert not (tmp_path / "out" / "flights").exists()

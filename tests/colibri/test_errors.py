@@ -11,16 +11,12 @@ import pytest
 
 import colibri
 from colibri.autopilot.control.registry import DecisionError
-from colibri.autopilot.errors import AutopilotError
-from colibri.cli.main import main
 from colibri.common.errors import Error, InFlightError
 from colibri.flights.processes import FlightError
-from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.links.link import LinkError
-from colibri.plant.errors import PlantError
 from colibri.plant.physics.start import IntegrationError
-from colibri.sitl.errors import SitlError
 from colibri.sitl.stepping import NotInTimeError
+from tests.support.commands import Refused
 
 SHIPPED = Path(colibri.__file__).parent
 PACKAGES = {
@@ -104,23 +100,10 @@ def test_no_one_lists_errors_by_hand() -> None:
             assert len(listed) < 2, f"{path}:{caught.lineno}: {listed}"
 
 
-def test_what_is_caught_by_which_base() -> None:
-    assert colibri.Error is Error
-    assert issubclass(LinkError, MavlinkError)
-    for error, base in ((DecisionError, AutopilotError), (IntegrationError, PlantError)):
-        assert issubclass(error, base)
-        assert issubclass(error, InFlightError)
-    assert issubclass(NotInTimeError, SitlError)
+def test_errors_in_flight_and_of_tests_have_a_second_base() -> None:
+    assert issubclass(DecisionError, InFlightError)
+    assert issubclass(IntegrationError, InFlightError)
     assert issubclass(NotInTimeError, AssertionError)
-    for mistake in (AssertionError, ValueError, TypeError, OSError):
-        assert not issubclass(mistake, Error)
-
-
-def exit_code(*command: str) -> int | str | None:
-    try:
-        return main(list(command))
-    except SystemExit as ended:
-        return ended.code
 
 
 def test_a_process_that_cannot_begin_exits_with_2() -> None:
@@ -134,21 +117,15 @@ def test_a_process_that_cannot_begin_exits_with_2() -> None:
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [
-        (FlightError("nan", 1, said=False), 1, "colibri: error: nan; what was logged is in {out}\n"),
-        (LinkError("no way"), 2, "colibri: error: no way\n"),
+        (FlightError("nan", 1, said=False), 1, "nan; what was logged is in {out}"),
+        (LinkError("no way"), 2, "no way"),
     ],
 )
 def test_only_a_flight_that_began_names_its_logs(
-    error: Error,
-    code: int,
-    line: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    error: Error, code: int, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
     def fail(*_: object) -> None:
         raise error
 
     monkeypatch.setattr("colibri.cli.shared.fly_and_report.fly_plan", fail)
-    assert exit_code("fly", "hover", "--quiet", "--out", str(tmp_path)) == code
-    assert capsys.readouterr().err == line.format(out=tmp_path)
+    assert refused("fly", "hover", "--quiet", "--out", tmp_path, code=code) == line.format(out=tmp_path)

@@ -14,7 +14,6 @@ import pytest
 from rich.console import Console
 
 from colibri.autopilot.spec import AutopilotSpec
-from colibri.cli.main import main
 from colibri.common.earth.geodesy import enu_of
 from colibri.common.earth.home import DEFAULT_HOME
 from colibri.flights.fleet import Member, place_of, start_again
@@ -22,7 +21,6 @@ from colibri.flights.fleet_spec import FleetSpec
 from colibri.flights.fleet_status import StatusLines, status_table
 from colibri.flights.launcher import Child, end_children
 from colibri.flights.replay import replay_flight
-from colibri.mavlink.links.open import open_link
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode
 from colibri.plant.spec import PlantSpec
@@ -31,18 +29,6 @@ from tools.harness.processes import wait_for
 from tools.harness.sitl_process import WAITING, Vehicle, vehicle
 
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
-NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
-
-
-def test_a_plant_port_that_is_taken(capfd: pytest.CaptureFixture[str]) -> None:
-    taken = open_link("udpin:127.0.0.1:0")
-    with pytest.raises(SystemExit) as ended:
-        main(["sitl", "--plant-port", taken.url.rpartition(":")[2]])
-    taken.close()
-    assert ended.value.code == 2
-    assert capfd.readouterr().err == (
-        f"colibri: error: {taken.url}: Address already in use; end the program that has this port, or name another\n"
-    )
 
 
 def test_what_only_the_autopilot_can_refuse(tmp_path: Path) -> None:

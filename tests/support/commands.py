@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 from colibri.cli.main import main
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
 FLIGHT = PROFILE.with_name("flight.toml")
+Refused: TypeAlias = Callable[..., str]
+"""(words of a command that is refused, code=exit code) -> the one line that it says, without `colibri: error: `."""
 
 
 def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:

@@ -1,5 +1,6 @@
 """`colibri certify`: what is certified of profile flight, the flights that may not leave it, and what is refused."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from colibri.certification.whole_attitude import WholeAttitude
 from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.commands import Refused
 
 HERE = Path(__file__).parent
 CONDITIONS, VEHICLE = Conditions(0.01, 0.5), load_vehicle("hummingbird")
@@ -176,25 +178,20 @@ def steep(tmp_path: Path) -> str:
     return made(tmp_path, {"max_angle_deg = 70.0": "max_angle_deg = 88.0"})
 
 
-def is_refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["certify", *arguments, "--out", str(tmp_path), "--quiet"])
-    assert end.value.code == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "refused" in line
-    assert "unstable by itself" in line
-    assert not (tmp_path / CERTIFICATE).exists()
-
-
-@pytest.mark.long  # its kernels are compiled for it alone; the next shows the refusal
+@pytest.mark.parametrize(
+    ("profile", "options"),
+    [
+        pytest.param("sluggish", (), marks=pytest.mark.long),  # its kernels are compiled for it alone
+        ("steep", ("--controller", "lpv-mpc", "--least", REFUSED)),
+    ],
+)
 def test_a_profile_that_is_unstable_is_refused(
-    sluggish: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    profile: str, options: tuple[object, ...], request: pytest.FixtureRequest, tmp_path: Path, refused: Refused
 ) -> None:
-    is_refused([sluggish], tmp_path, capsys)
-
-
-def test_so_is_one_whose_lqr_is(steep: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    is_refused([steep, "--controller", "lpv-mpc", "--least", str(REFUSED)], tmp_path, capsys)
+    file = request.getfixturevalue(profile)
+    said = refused("certify", file, *options, "--out", tmp_path, "--quiet", code=1)
+    assert re.search("refused.*unstable by itself", said)
+    assert not (tmp_path / CERTIFICATE).exists()
 
 
 @pytest.mark.long
@@ -232,40 +229,6 @@ def test_what_is_refused_of_the_lqr_is_unstable_indeed(steep: str, scale: float,
         interval = Interval(commands, nothing, inertia, numbers.lag_s, flyer.turn, lambda m, _: (0.0 * m[:, 0],) * 2)
         z = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), remembered])
     assert bool(abs(z).max() > 1e-6) == grows
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["thesis"], "profile thesis: cascade cannot be certified: only lpv-mpc and whole-lpv-mpc can"),
-        (["flight", "--controller", "geometric-se3"], "geometric-se3 cannot be certified"),
-        (["thesis", "--controller", "lpv-mpc"], "profile thesis: has no numbers for lpv-mpc"),
-    ],
-)
-def test_another_law_is_not_certified(
-    arguments: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["certify", *arguments, "--out", str(tmp_path)])
-    assert end.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert told in line
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["nonsense"], "nonsense"),
-        (["flight", "--vehicle", "nonsense"], "nonsense"),
-        (["flight", "--charge", "1.5"], "part of 1"),
-        (["flight", "--moment", "0"], "above zero"),
-    ],
-)
-def test_bad_input_is_told(arguments: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["certify", *arguments, "--out", str(tmp_path)])
-    assert end.value.code == 2
-    assert told in capsys.readouterr().err
 
 
 @pytest.mark.long

@@ -22,10 +22,8 @@ BOOTED_US = 3_000_000
 """The clock of a vehicle began before anybody listened."""
 GRAVITY = 9.81
 _PARTS = 4
-PX4_HOLD, PX4_TAKEOFF, PX4_LAND, PX4_OFFBOARD = (
-    main << 16 | sub << 24 for main, sub in ((4, 3), (4, 2), (4, 6), (6, 0))
-)
-GUIDED, LOITER, LAND, STABILIZE = 4, 5, 9, 0
+PX4_HOLD, PX4_TAKEOFF, PX4_OFFBOARD = (main << 16 | sub << 24 for main, sub in ((4, 3), (4, 2), (6, 0)))
+GUIDED, LOITER, STABILIZE = 4, 5, 0
 ACCEPTED, REJECTED, UNSUPPORTED, FAILED = 0, 1, 3, 4
 _NO_COVARIANCE = (nan,) + (0.0,) * 20
 

@@ -8,57 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.main import main
+from tests.support.commands import Refused
 from tools.harness.sitl_process import vehicle
 
 LINK = "udpin:127.0.0.1:0"
 MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [
 {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397742, 8.545594, 2]},
 {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397752, 8.545594, 3]}]}}"""
-BAD_INPUT = {
-    "no track": ((), "name a TRACK to fly, or --identify"),
-    "unknown track": (("spirl",), 'unknown track "spirl"'),
-    "below the floor": (("hover:height=-3",), "below the floor"),
-    "arms in a dry run": (("spiral", "--arm", "--dry-run"), "--dry-run arms nothing"),
-    "identifies on a track": (("spiral", "--identify"), "--identify hovers"),
-    "no response": (("spiral", "--response", "none.toml"), "none.toml: No such file"),
-    "no mission": (("none.plan",), "none.plan: No such file"),
-    "unknown stack": (("spiral", "--stack", "betaflight"), "invalid choice"),
-}
 
 
-@pytest.mark.parametrize("name", BAD_INPUT)
-def test_bad_input_is_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    options, said = BAD_INPUT[name]
-    with pytest.raises(SystemExit) as end:
-        main(["companion", *options, "--vehicle", LINK])
-    assert end.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
-
-
-@pytest.mark.parametrize(
-    ("url", "said"),
-    [("udpout:192.0.2.1:14540", "reaches beyond this computer"), ("14540", "expected"), ("udpin:nowhere", "expected")],
-)
-def test_a_link_that_is_none_is_one_line(url: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["companion", "hover", "--vehicle", url])
-    assert end.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
-
-
-def test_a_mission_without_a_vehicle_that_says_where_home_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mission_without_a_vehicle_that_says_where_home_is(tmp_path: Path, refused: Refused) -> None:
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
-    with pytest.raises(SystemExit) as end:
-        main(["companion", str(mission), "--vehicle", LINK, "--wait", "0.01", "--out", str(tmp_path / "out")])
-    assert end.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "it has not said where that is" in line
+    said = refused("companion", mission, "--vehicle", LINK, "--wait", "0.01", "--out", tmp_path / "out")
+    assert "it has not said where that is" in said
 
 
 def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProcess[str]:
@@ -84,18 +47,8 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_flight_over_udp_is_handed_over_in_order(tmp_path: Path) -> None:
     with vehicle(tmp_path) as flown:
-        options = (
-            "hover:height=2",
-            "--arm",
-            "--duration",
-            "3",
-            "--max-age",
-            "20000",
-            "--max-gap",
-            "20000",
-            "--min-pace",
-            "1",
-        )
+        late = "--max-age 20000 --max-gap 20000 --min-pace 1"
+        options = f"hover:height=2 --arm --duration 3 {late}".split()
         ended = companion(tmp_path / "out", flown.port, *options)
         assert ended.returncode == 0, ended.stderr
         assert "height reached: hold" in flown.said

@@ -8,11 +8,11 @@ import pytest
 
 import colibri
 from colibri.campaigns.flights import Verdict
-from colibri.cli.main import main
 from colibri.tuning.flying import Flights
 from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
 from tests.support.campaigns import Here, tables_in
+from tests.support.commands import Refused
 from tests.support.tuning import POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned
 
 TABLE = "\n".join(
@@ -206,27 +206,13 @@ def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
         (["--workers", "2", "--dask", "tcp://127.0.0.1:1"], "workers: a cluster has its own"),
     ],
 )
-def test_bad_input_is_refused_in_one_line(
-    options: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_is_refused_in_one_line(options: list[str], said: str, tmp_path: Path, refused: Refused) -> None:
     file = tmp_path / "short.toml"
     file.write_text(TABLE, encoding="utf-8")
-    assert refused([str(file), *options, "--out", str(tmp_path / "out")], capfd).startswith(f"colibri: error: {said}")
+    assert refused("tune", file, *options, "--out", tmp_path / "out").startswith(said)
     assert not (tmp_path / "out").exists()
 
 
-def test_without_optuna_the_extra_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_optuna_the_extra_is_named(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
-    said = refused(["short.toml", "--out", str(tmp_path / "out")], capfd)
-    assert said == "colibri: error: optuna is not installed: pip install colibri-sitl[tune]\n"
-
-
-def refused(options: list[str], capfd: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit) as ended:
-        main(["tune", *options])
-    assert ended.value.code == 2
-    said: str = capfd.readouterr().err
-    assert said.count("\n") == 1
-    return said
+    assert refused("tune", "short.toml") == "optuna is not installed: pip install colibri-sitl[tune]"

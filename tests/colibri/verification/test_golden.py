@@ -11,10 +11,10 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import GROUP
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.cli.computer.verify import GOLDEN_HASHES
-from colibri.cli.main import main
 from colibri.sitl.vehicle import Sitl
 from colibri.verification import golden, golden_flights
 from colibri.verification.cases import Case, SitlCase
+from tests.support.commands import exit_code
 
 SHORT = Case("short", {"track": "line", "profile": "se3", "duration": 0.4})
 CORNER = Case("corner", {"track": "waypoints", "profile": "se3", "duration": 0.4}, golden_flights.WAYPOINTS)
@@ -41,10 +41,7 @@ def verify(tmp_path: Path, hashes: Path, monkeypatch: pytest.MonkeyPatch) -> Ver
 
     def run(*options: str) -> int:
         command = ["verify", "--golden", str(hashes), "--link", "memory", "--out", str(tmp_path / "out")]
-        try:
-            return main([*command, *options])
-        except SystemExit as end:
-            return int(end.code or 0)
+        return int(exit_code([*command, *options]) or 0)
 
     return run
 
@@ -138,26 +135,6 @@ def test_a_file_that_does_not_fit_the_set_is_refused_in_one_line(
     assert str(hashes) in said.err
     assert said.err.count("\n") == 1
     assert not said.out
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["verify", "--golden", "--only", "leap"], "--only leap: there is no such golden flight"),
-        (["verify", "--golden", "--duration", "5"], "--duration does not go with --golden"),
-        (["verify", "--renew"], "--renew goes with --golden alone"),
-        (["verify", "--only", "spiral"], "--only goes with --golden alone"),
-    ],
-)
-def test_what_does_not_go_together_is_refused_in_one_line(
-    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(options)
-    assert end.value.code == 2
-    error = capsys.readouterr().err
-    assert words in error
-    assert error.count("\n") == 1
 
 
 @pytest.mark.long
