@@ -4,15 +4,14 @@ import re
 import socket
 import subprocess
 import sys
-from math import dist, hypot
+from math import hypot
 from pathlib import Path
 
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.common.earth.geodesy import Geodetic, enu_of
-from colibri.common.earth.home import DEFAULT_HOME
 from colibri.flights.fleet_spec import GROUND_PORT, SDK_PORT
+from tests.clients.support.geometry import closest_m, place
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.sitl_process import Vehicle, vehicle
 
@@ -47,12 +46,6 @@ def run(code: str, default_port: int, port: int, folder: Path) -> None:
 def assert_landed(flown: Vehicle) -> None:
     landed = flown.seen.wait_until_disarmed()
     assert abs(landed.height_m) < 0.05
-
-
-def went_to(flown: Vehicle, latitude_deg: float, longitude_deg: float, height_m: float) -> bool:
-    origin = Geodetic(*DEFAULT_HOME[:3])
-    x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, DEFAULT_HOME.altitude_m), origin)
-    return min(dist(sight.position_enu_m, (x, y, height_m)) for sight in flown.seen.sights) < 0.3
 
 
 def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
@@ -97,5 +90,5 @@ def test_mavproxy(tmp_path: Path) -> None:
         flown.seen.wait(lambda sight: sight.height_m > 6.9 and hypot(*sight.velocity_enu_m_s) < 0.05, "the place")
         proxy.type(return_home, "NAV_RETURN_TO_LAUNCH: ACCEPTED")
         assert_landed(flown)
-        assert went_to(flown, 47.3978, 8.5456, 7.0)
+        assert closest_m(flown.seen.sights, place(47.3978, 8.5456, 7.0)) < 0.3
         assert hypot(*flown.seen.now.position_enu_m[:2]) < 0.3

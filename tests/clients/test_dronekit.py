@@ -8,20 +8,12 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.common.earth.geodesy import Geodetic, enu_of
-from colibri.common.earth.home import DEFAULT_HOME
+from tests.clients.support.geometry import place
 from tools.harness.sitl_process import Vehicle, vehicle
 
 PROGRAMS = Path(__file__).parent / "programs"
 SPEED = 4.0
 GIVE_UP_AFTER_S = 180.0
-
-
-def place(latitude_deg: float, longitude_deg: float, height_m: float) -> tuple[float, float, float]:
-    """Return a place in ENU; `height_m` is above home."""
-    origin = Geodetic(*DEFAULT_HOME[:3])
-    x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, DEFAULT_HOME.altitude_m), origin)
-    return (x, y, height_m)
 
 
 def said(program: str, flown: Vehicle) -> list[str]:

@@ -15,8 +15,9 @@ WITHIN_S = 120.0
 """A wall-clock bound for what hangs."""
 
 
-def run(module: str, url: str, folder: Path) -> None:
-    with Client([sys.executable, "-m", f"tests.clients.{module}", url], folder, {"PYTHONPATH": str(ROOT)}) as client:
+def run(script: str, url: str, folder: Path) -> None:
+    command = [sys.executable, "-m", "tests.clients.mavsdk_scripts", script, url]
+    with Client(command, folder, {"PYTHONPATH": str(ROOT)}) as client:
         client.wait(WITHIN_S)
 
 
@@ -46,7 +47,7 @@ def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_mavsdk_over_tcp(tmp_path: Path) -> None:
     with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=3.0) as flown:
-        run("mavsdk_scripts.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
+        run("flights.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
         flown.seen.wait_until_disarmed()
         assert 4.7 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
@@ -54,6 +55,6 @@ def test_mavsdk_over_tcp(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
-        run("programs.mavsdk_generic", flown.mavsdk_url, tmp_path)
+        run("flights.generic", flown.mavsdk_url, tmp_path)
         flown.seen.wait_until_disarmed()
         assert 2.7 < max(sight.height_m for sight in flown.seen.sights) < 3.1

@@ -42,16 +42,7 @@ def until(condition: Callable[[], object], what: str, within_s: float = 60.0) ->
 
 
 def streamed(begin: Callable[[Callable[..., None]], None], next_result: object, within_s: float = 60.0) -> list[Any]:
-    """Run a call that reports as it goes; return what it reported before its result.
-
-    Args:
-        begin: Begins the call, given what to call back.
-        next_result: The result that says that more comes.
-        within_s: Wall-clock bound for what hangs.
-
-    Raises:
-        RuntimeError: The call fails.
-    """
+    """Run a call that reports as it goes, `next_result` while more comes; return its reports."""
     results: Queue[tuple[Any, Any]] = Queue()
     begin(lambda result, data, _=None: results.put((result, data)))
     reports: list[Any] = []
