@@ -234,13 +234,13 @@ def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
     """
     if config.getoption("--sitl-link") == "memory":
         return None
-    from colibri.sitl.backends.launcher import launcher, one_core
+    from colibri.sitl.backends.launcher import Launcher, one_core
 
     xdist: dict[str, Any] = getattr(config, "workerinput", {})
     worker = xdist.get("workerid", "").removeprefix("gw")
     stack.enter_context(one_core(int(worker) if worker.isdecimal() else 0, xdist.get("workercount", 0)))
     if _LAUNCHER not in config.stash:
-        config.stash[_LAUNCHER] = launcher(from_scratch=config.getoption("--sitl-from-scratch"))
+        config.stash[_LAUNCHER] = Launcher(from_scratch=config.getoption("--sitl-from-scratch"))
     return config.stash[_LAUNCHER]
 
 

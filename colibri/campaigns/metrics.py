@@ -2,14 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
 from colibri.campaigns.values import CampaignError
 from colibri.common.errors import unknown
-
-if TYPE_CHECKING:
-    from colibri.experiments.flight import Flight
+from colibri.experiments.flight import Flight
 
 NAMES = (*KEYS, "lost_at_s", "path_lag_s")
 _ALWAYS = ("rmse_after_20s_m", "max_error_after_20s_m", "rmse_m", "max_error_m", "max_tilt_deg", "effort_n_m")
@@ -21,9 +19,9 @@ class Metric(NamedTuple):
     """A column of the table; without a function `of`, the number of that name in the report."""
 
     name: str
-    of: "Callable[[Flight], float | None] | None" = None
+    of: Callable[[Flight], float | None] | None = None
 
-    def value(self, flight: "Flight") -> float | None:
+    def value(self, flight: Flight) -> float | None:
         found = of_report(flight.report, self.name) if self.of is None else self.of(flight)
         return None if found is None or not isfinite(found) else float(found)
 

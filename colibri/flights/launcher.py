@@ -16,7 +16,7 @@ from contextlib import suppress
 from multiprocessing import current_process, get_context
 from pathlib import Path
 from select import select
-from typing import Any, NoReturn, Protocol, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.spec import Starter
@@ -38,18 +38,6 @@ def name_of(spec: ProcessSpec) -> str:
 def can_fork() -> bool:
     """Whether this process may be forked: on Linux with one thread, as locks of others would stay held."""
     return _TASKS.is_dir() and len(list(_TASKS.iterdir())) == 1 and not current_process().daemon
-
-
-class Running(Protocol):
-    """A process that was started."""
-
-    @property
-    def number(self) -> int: ...
-
-    def code(self) -> int | None:
-        """Return the exit code, negative for a signal; `None` while it runs."""
-
-    def kill(self) -> None: ...
 
 
 class Child:

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from math import degrees
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.checkpoint import History
@@ -18,8 +17,7 @@ from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.trajectories.loading import load_track, with_file
-from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.process.recorded_inputs import Inputs, InputsError, Setup, read_inputs
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
@@ -27,26 +25,17 @@ from colibri.common.rotations import earth_from_body, euler_from_quaternion
 from colibri.common.serialization import of_bytes
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
-from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, encode_actuators, encode_state
 from colibri.mavlink.ulog.flight_topics import COMMAND, TRUTH
 from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from colibri.plant.vehicle.description import load_vehicle
 
 _CUT_OFF_US = 1_000_000
 """Largest difference of the logs' ends if the processes are killed."""
 _NO_CLOCK_S = 0.0
 """The wall clock of a replay; decisions must not depend on it."""
-
-
-class Recorded(NamedTuple):
-    """A frame as the autopilot received it, and the command that answered it."""
-
-    time_us: int
-    datagram: bytes
-    command: ActuatorCommand
 
 
 class Answer(NamedTuple):
@@ -127,8 +116,8 @@ def replay_flight(path: Path) -> Replayed:
 
 
 def answers_of(path: Path) -> Iterator[Answer]:
-    """Yield the autopilot's answers to the frames of a recorded flight."""
-    yield from _answers(_read(path))
+    """Return the autopilot's answers to the frames of a recorded flight."""
+    return _answers(_read(path))
 
 
 class _Flight(NamedTuple):
@@ -157,8 +146,8 @@ def _read(path: Path) -> _Flight:
     return flight
 
 
-def _recorded(flight: _Flight) -> Iterator[Recorded]:
-    """Yield each answered frame with its command, up to the first frame missing in the log."""
+def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
+    """Yield time, datagram and command of each answered frame, up to the first frame missing in the log."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
@@ -175,7 +164,7 @@ def _recorded(flight: _Flight) -> Iterator[Recorded]:
             if true.time_us > time_us:
                 return
             datagram = b"".join(encode_state(codec, true))
-        yield Recorded(time_us, datagram, ActuatorCommand(time_us, (c1, c2, c3, c4), bool(armed)))
+        yield time_us, datagram, ActuatorCommand(time_us, (c1, c2, c3, c4), bool(armed))
 
 
 def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:
@@ -211,8 +200,14 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
     known: StateFrame | None = None
     for time_us, datagram, command in _recorded(flight):
         if time_us in setups:
-            autopilot = _begun(setups[time_us])
-            end = _end(setups[time_us], autopilot)
+            setup = setups[time_us]
+            autopilot = _begun(setup)
+            end = AutopilotEnd(
+                system_id=setup.system_id,
+                frame_interval_us=autopilot.frame_interval_us,
+                now_s=_NO_CLOCK_S,
+                feedback=setup.feedback,
+            )
         if autopilot is None:
             continue
         received = end.receive(datagram, _NO_CLOCK_S)
@@ -223,7 +218,10 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
             step = autopilot.step(*received)
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
-        known = _known(frame, step, known)
+        if isinstance(frame, StateFrame):
+            known = frame
+        elif step.estimate is not None:
+            known = step.estimate.frame
         yield Answer(frame.time_us, command, autopilot, step, known)
         served = inbox.get(frame.time_us, ())
         autopilot.serve([Received(each.datagram, each.link, each.address, each.loopback) for each in served])
@@ -263,7 +261,9 @@ def _begun(setup: Setup) -> Autopilot[Any]:
     tables = setup.profile_tables or load_profile(setup.profile)
     profile = tables.with_choices(setup.controller, setup.solver, setup.delay_s)
     vehicle = setup.vehicle_tables or load_vehicle(setup.vehicle)
-    flown = _track(setup, vehicle, profile)
+    flown = None
+    if setup.track is not None:
+        flown = load_track(setup.track, vehicle, profile, setup.floor_m, setup.track_file).track
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
         estimator = estimator_for(setup.feedback, vehicle, setup.origin)
@@ -275,34 +275,8 @@ def _begun(setup: Setup) -> Autopilot[Any]:
     return copter_autopilot(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
 
 
-def _track(setup: Setup, vehicle: Vehicle, profile: Profile) -> Track | None:
-    if setup.track is None:
-        return None
-    if setup.track_file is None:
-        return load_track(setup.track, vehicle, profile, setup.floor_m).track
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "waypoints.csv"
-        path.write_text(setup.track_file, encoding="utf-8")
-        return load_track(with_file(setup.track, path), vehicle, profile, setup.floor_m).track
-
-
-def _end(setup: Setup, autopilot: Autopilot[Any]) -> AutopilotEnd:
-    return AutopilotEnd(
-        system_id=setup.system_id,
-        frame_interval_us=autopilot.frame_interval_us,
-        now_s=_NO_CLOCK_S,
-        feedback=setup.feedback,
-    )
-
-
 def _clock() -> float:
     return _NO_CLOCK_S
-
-
-def _known(frame: Frame, step: Step, before: StateFrame | None) -> StateFrame | None:
-    if isinstance(frame, StateFrame):
-        return frame
-    return before if step.estimate is None else step.estimate.frame
 
 
 def _rotors(command: ActuatorCommand) -> str:

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from colibri.campaigns.definition import Point
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.flights import Common, Flown, Verdict, fly_points
 from colibri.common.types import Array
+from colibri.tuning.definition import Tuning
 from colibri.tuning.space import TuningError
 from colibri.tuning.trials import Begun, Ended
-
-if TYPE_CHECKING:
-    from colibri.tuning.definition import Tuning
 
 _WORST, _EACH = "worst", "each"
 
@@ -64,7 +62,7 @@ class Flights:
 
 
 def fly_trial(
-    tuning: "Tuning",
+    tuning: Tuning,
     begun: Begun,
     flights: Flights,
     scale: Scale | None,
@@ -97,7 +95,7 @@ def fly_trial(
     return _ended(begun, flown, tuple(pooled), scale=scale if begun.number == 0 else None)
 
 
-def scale_of(tuning: "Tuning", flown: Sequence[Flown]) -> Scale:
+def scale_of(tuning: Tuning, flown: Sequence[Flown]) -> Scale:
     """Return the reference values; TuningError if the flights are refused or have no metric."""
     refused = next((each for each in flown if each.verdict is Verdict.REFUSED), None)
     if refused is not None:
@@ -110,7 +108,7 @@ def scale_kept(first: Ended) -> Scale:
     return Scale(tuple(first.attributes[_WORST]), tuple(map(tuple, first.attributes[_EACH])))
 
 
-def _counts(tuning: "Tuning", flown: Sequence[Flown], worst: Sequence[float]) -> list[Array]:
+def _counts(tuning: Tuning, flown: Sequence[Flown], worst: Sequence[float]) -> list[Array]:
     metrics = tuning.campaign.metrics
     return [
         objective.of_flights(flown, metrics, at_most)
@@ -118,7 +116,7 @@ def _counts(tuning: "Tuning", flown: Sequence[Flown], worst: Sequence[float]) ->
     ]
 
 
-def _is_pruned(tuning: "Tuning", begun: Begun, counts: Array, new: int) -> bool:
+def _is_pruned(tuning: Tuning, begun: Begun, counts: Array, new: int) -> bool:
     """Report the last flights to Optuna; return whether to end the trial early."""
     if not tuning.prune_after:
         return False
@@ -127,7 +125,7 @@ def _is_pruned(tuning: "Tuning", begun: Begun, counts: Array, new: int) -> bool:
     return len(counts) < tuning.campaign.flights and begun.trial.should_prune()
 
 
-def _expected(tuning: "Tuning", counts: Array, scale: Scale) -> float:
+def _expected(tuning: Tuning, counts: Array, scale: Scale) -> float:
     """Extrapolate to all seeds by the ratio to the original profile."""
     (objective,) = tuning.objectives
     whole = np.array(scale.each[0])

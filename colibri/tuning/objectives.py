@@ -38,7 +38,7 @@ class Objective(NamedTuple):
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
-        return np.array([min(_known(each, place, worst), worst) for each in flown])
+        return np.array([min(value_of(each, place, worst), worst) for each in flown])
 
     def worst(self, flown: Sequence[Flown], metrics: Sequence[Metric]) -> float:
         """Return the value of a lost flight, from the original profile's flights.
@@ -68,7 +68,7 @@ class Objective(NamedTuple):
         return pool(values, axis=axis)
 
 
-def _known(flown: Flown, place: int, otherwise: float) -> float:
+def value_of(flown: Flown, place: int, otherwise: float) -> float:
     value = flown.metrics[place]
     return value if flown.verdict is Verdict.FLOWN and value is not None else otherwise
 

@@ -9,14 +9,13 @@ from warnings import catch_warnings, simplefilter
 
 from numpy.random import SeedSequence
 
+from colibri.tuning.definition import Tuning
 from colibri.tuning.file_lock import FileLock, JournalLock
 from colibri.tuning.space import TuningError, as_tried, distribution
 
 if TYPE_CHECKING:
     from optuna import Study, Trial
     from optuna.trial import FrozenTrial
-
-    from colibri.tuning.definition import Tuning
 
 _PACKAGE = "colibri-sitl"
 JOURNAL, _LOCKS = "trials.log", "locks"
@@ -60,7 +59,7 @@ class Trials:
     have.
     """
 
-    def __init__(self, folder: Path, tuning: "Tuning") -> None:
+    def __init__(self, folder: Path, tuning: Tuning) -> None:
         optuna = require_optuna()
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._tuning = tuning

@@ -1,22 +1,20 @@
 """Compare a tuned profile with its original on other seeds, in pairs."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.analysis.tables import Row
+from colibri.autopilot.control.profile import Profile
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import Flown
 from colibri.campaigns.values import shown
 from colibri.common.types import Array
-from colibri.tuning.objectives import SHARE_LOST, Objective
-
-if TYPE_CHECKING:
-    from colibri.autopilot.control.profile import Profile
-    from colibri.tuning.definition import Tuning
+from colibri.tuning.definition import Tuning
+from colibri.tuning.objectives import SHARE_LOST, Objective, value_of
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
 ALL = "all"
@@ -69,7 +67,7 @@ class Compared(NamedTuple):
         return (self.what, self.where, str(self.seeds), *(f"{number:.6g}" for number in numbers))
 
 
-def check_campaign(tuning: "Tuning", before: "Profile", after: "Profile") -> Campaign:
+def check_campaign(tuning: Tuning, before: Profile, after: Profile) -> Campaign:
     """Return the campaign that flies both profiles with `check_seeds` and other draws."""
     campaign = tuning.campaign
     return campaign._replace(
@@ -82,7 +80,7 @@ def check_campaign(tuning: "Tuning", before: "Profile", after: "Profile") -> Cam
     )
 
 
-def compare(tuning: "Tuning", table: FlightTable) -> list[Compared]:
+def compare(tuning: Tuning, table: FlightTable) -> list[Compared]:
     """Compare each objective and each other metric."""
     pairs = _Pairs(table)
     others = [metric.name for metric in table.campaign.metrics]
@@ -127,18 +125,13 @@ class _Pairs:
                 self._flown.shape
             )
         place = [metric.name for metric in metrics].index(objective.metric)
-        values = np.array([_value(each, place) for of in (0, 1) for each in self._listed(of)])
+        values = np.array([value_of(each, place, np.nan) for of in (0, 1) for each in self._listed(of)])
         found: Array = values.reshape(self._flown.shape)
         found[:, np.isnan(found).any(axis=0)] = np.nan
         return found
 
     def _listed(self, of: int) -> list[Flown]:
         return list(self._flown[of].ravel())
-
-
-def _value(flown: Flown, place: int) -> float:
-    value = flown.metrics[place]
-    return value if flown.verdict is Verdict.FLOWN and value is not None else np.nan
 
 
 def _compared(objective: Objective, where: str, counts: Array, *, is_objective: bool) -> Compared:

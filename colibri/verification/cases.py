@@ -62,10 +62,10 @@ class SitlCase:
 
     def fly(self, out: Path, link: str) -> str:
         """Fly with the logs in `out`; return the hash of all truth and commands."""
-        from colibri.sitl.backends.launcher import launcher
+        from colibri.sitl.backends.launcher import Launcher
         from colibri.sitl.session import Flights
 
-        begun = launcher(from_scratch=True) if link == "udp" else None
+        begun = Launcher(from_scratch=True) if link == "udp" else None
         with Flights(setting_of([self.setting]), begun) as flights:
             try:
                 sitl = flights.begin()

@@ -7,94 +7,44 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
 
 from colibri.common.spec import to_json
-from colibri.flights.launcher import Child, ProcessSpec, Running, how_it_ended, name_of
+from colibri.flights.launcher import Child, ProcessSpec, how_it_ended, name_of
 from colibri.sitl.backends.lockstep import SessionError
 
 _LAST_WORDS_BYTES = 2000
 
 
-class Launcher(Protocol):
-    """Starts processes whose output goes into a file.
+class Launcher:
+    """Starts processes `from_scratch` as a user does, or forks each autopilot from a loaded server.
 
-    Attributes:
-        starts_plants: False if the plant runs in the test's process.
+    Loading takes longer than most flights. A server starts no plants, which run in the test's process: on a shared
+    core, two processes make better use of the caches than three.
     """
 
-    starts_plants: bool
+    def __init__(self, *, from_scratch: bool = False) -> None:
+        self.starts_plants = from_scratch or not hasattr(os, "fork")
+        self._server: subprocess.Popen[bytes] | None = None
+        if not self.starts_plants:
+            command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
+            self._server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
-    def start(self, spec: ProcessSpec, log: Path) -> Running: ...
-
-    def close(self) -> None: ...
-
-
-class LoggedChild:
-    """A running process and the file of its output."""
-
-    def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
-        self.name = name_of(spec)
-        self.log = log
-        self._running = launcher.start(spec, log)
-        self.number = self._running.number
-
-    def check(self) -> None:
-        """Raise SessionError if the process has died."""
-        code = self._running.code()
-        if code is None:
-            return
-        words = self.last_words()
-        raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
-
-    def last_words(self) -> str:
-        """Return the last line of output that is not a status."""
-        text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
-        lines = [line for line in text.splitlines() if line and not line.startswith("{")]
-        return lines[-1] if lines else ""
-
-    def kill(self) -> None:
-        self._running.kill()
-
-
-class FromScratch:
-    """Starts each process as a user does."""
-
-    starts_plants = True
-
-    def start(self, spec: ProcessSpec, log: Path) -> Running:
-        return Child(spec, log=log)
-
-    def close(self) -> None: ...
-
-
-class Forked:
-    """Forks each autopilot from a loaded server: loading takes longer than most flights.
-
-    Plants run in the test's process: on a shared core, two processes make better use of the caches than three.
-    """
-
-    starts_plants = False
-
-    def __init__(self) -> None:
-        command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
-        self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
-
-    def start(self, spec: ProcessSpec, log: Path) -> Running:
+    def start(self, spec: ProcessSpec, log: Path) -> "Child | _ForkedChild":
+        if self._server is None:
+            return Child(spec, log=log)
         log.touch()
         pid = self._request("start", name_of(spec), str(log), to_json(spec).decode())
         assert pid is not None, "whatever is forked has a number"
         return _ForkedChild(pid, self._request)
 
     def close(self) -> None:
-        assert self._fork_server.stdin is not None, "it is piped"
-        self._fork_server.stdin.close()
-        self._fork_server.wait()
-        if self._fork_server.stdout:
-            self._fork_server.stdout.close()
+        """End the server, and with it the processes it has started."""
+        if self._server is not None:
+            self._server.communicate()
 
     def _request(self, *words: str) -> int | None:
-        stdin, stdout = self._fork_server.stdin, self._fork_server.stdout
+        assert self._server is not None, "it was started"
+        stdin, stdout = self._server.stdin, self._server.stdout
         assert stdin is not None, "it is piped"
         assert stdout is not None, "it is piped"
         try:
@@ -122,8 +72,31 @@ class _ForkedChild:
             self._code = self._request("kill", str(self.number))
 
 
-def launcher(*, from_scratch: bool) -> Launcher:
-    return FromScratch() if from_scratch or not hasattr(os, "fork") else Forked()
+class LoggedChild:
+    """A running process and the file of its output."""
+
+    def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
+        self.name = name_of(spec)
+        self.log = log
+        self._running = launcher.start(spec, log)
+        self.number = self._running.number
+
+    def check(self) -> None:
+        """Raise SessionError if the process has died."""
+        code = self._running.code()
+        if code is None:
+            return
+        words = self.last_words()
+        raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
+
+    def last_words(self) -> str:
+        """Return the last line of output that is not a status."""
+        text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
+        lines = [line for line in text.splitlines() if line and not line.startswith("{")]
+        return lines[-1] if lines else ""
+
+    def kill(self) -> None:
+        self._running.kill()
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from colibri.mavlink.wire.dialect import (
     Codec,
     mav,
 )
+from colibri.sitl.backends.link_clocks import LinkClock
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 
@@ -45,20 +46,17 @@ class Plant(Protocol):
     @property
     def process(self) -> int | None: ...
 
+    @property
+    def clock(self) -> LinkClock: ...
+
     def receive(self, datagram: bytes) -> None:
         """Process a datagram of an autopilot, which may be corrupt."""
 
     def frame(self) -> list[bytes]:
         """Return the datagrams up to the next frame, which comes last."""
 
-    def take(self, answer: bytes) -> None:
-        """Process the answer to the frame."""
-
     def listen(self, timeout_s: float) -> list[bytes]:
         """Return the datagrams sent within `timeout_s`; an unanswered frame is repeated."""
-
-    def clock_s(self) -> float:
-        """Return the time by the link clock, s."""
 
     def close(self) -> None: ...
 
@@ -71,9 +69,6 @@ class Autopilot(Protocol):
 
     def call(self) -> bytes:
         """Return its first datagram to the plant."""
-
-    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        """Process a frame of the plant, and the datagrams of ground stations at its time."""
 
     def expect(self, step_message: StepMessage) -> None:
         """Process the datagrams of ground stations for the next frame."""
@@ -150,14 +145,15 @@ class LockstepSession:
         """
         frame, began = self._frame, self.truth
         step_message = StepMessage(began.time_us, parcels)
+        self.autopilot.expect(step_message)
         if self.trouble.any:
-            answer, to_stations, received = self._struggle(frame, step_message, injected)
+            answer, to_stations, received = self._struggle(frame, began.time_us, injected)
         else:
-            self.autopilot.receive_frame(frame, step_message)
+            self.autopilot.receive(frame)
             # What comes last is waited for first: to be woken for each datagram would cost a turn of the core each.
             to_stations = self.autopilot.to_stations()
             answer = self.autopilot.answer()
-            self.plant.take(answer + injected)
+            self.plant.receive(answer + injected)
             received = self.plant.frame()
         self._frame, self.truth = self._taken_in(received)
         if injected:
@@ -165,24 +161,22 @@ class LockstepSession:
         self.flown = Instant(began, self._command(answer), to_stations, frame, answer)
         return self.flown
 
-    def _struggle(
-        self, frame: bytes, step_message: StepMessage, injected: bytes
-    ) -> tuple[bytes, StepMessage, list[bytes]]:
+    def _struggle(self, frame: bytes, time_us: int, injected: bytes) -> tuple[bytes, StepMessage, list[bytes]]:
         """Pass a frame and its answer over a faulty link.
 
         Return the answer, the datagrams to ground stations, and those of the plant up to its next frame.
         """
         plant, autopilot, up, down = self.plant, self.autopilot, self._up, self._down
-        began_s = plant.clock_s()
-        autopilot.expect(step_message)
+        now_s = plant.clock.now_s
+        began_s = now_s()
         up.put(frame, _us(began_s))
         answer, to_stations, received = b"", None, list[bytes]()
         while True:
-            now_us = _us(plant.clock_s())
+            now_us = _us(now_s())
             for datagram in up.due(now_us):
                 autopilot.receive(datagram)
             for datagram in autopilot.listen():
-                if not answer and answers(datagram, step_message.time_us):
+                if not answer and answers(datagram, time_us):
                     answer, to_stations = datagram, autopilot.to_stations()
                 down.put(datagram + injected, now_us)
             for datagram in down.due(now_us):
@@ -195,7 +189,7 @@ class LockstepSession:
                 received.append(datagram)
                 if is_frame and to_stations is not None:
                     return answer, to_stations, received
-            if plant.clock_s() > began_s + _GIVE_UP_S:
+            if now_s() > began_s + _GIVE_UP_S:
                 raise SessionError("nothing passes between plant and autopilot, however often it is repeated")
 
     def measure_again(self) -> None:

@@ -46,10 +46,10 @@ class MemoryPlant:
         self._answered = False
         self._end = PlantEnd(system_id=spec.system_id, frame_interval_us=round(1e3 / spec.rate) * 1000, serves=serves)
         self.plant: Plant | None = None
-        self._clock = clock or StoppedClock()
+        self.clock: LinkClock = clock or StoppedClock()
 
     def receive(self, datagram: bytes) -> None:
-        command = self._end.receive(datagram, _ADDRESS, self._clock.now_s())
+        command = self._end.receive(datagram, _ADDRESS, self.clock.now_s())
         self._end.received.clear()
         if command is None:
             return
@@ -64,19 +64,13 @@ class MemoryPlant:
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
-    def take(self, answer: bytes) -> None:
-        self.receive(answer)
-
     def listen(self, timeout_s: float) -> list[bytes]:
         if self._answered:
             self._offer()
         else:
-            self._clock.wait(timeout_s)
-            self._end.poll(self._clock.now_s())
+            self.clock.wait(timeout_s)
+            self._end.poll(self.clock.now_s())
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
-
-    def clock_s(self) -> float:
-        return self._clock.now_s()
 
     def close(self) -> None: ...
 
@@ -86,7 +80,7 @@ class MemoryPlant:
             self.plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
         frame, plant_status = self.plant.measure()
-        end.offer(frame, self._clock.now_s(), plant_status, state_frame(self.plant.world))
+        end.offer(frame, self.clock.now_s(), plant_status, state_frame(self.plant.world))
 
 
 class MemoryAutopilot:
@@ -106,7 +100,7 @@ class MemoryAutopilot:
         spec = self._spec
         try:
             self._conductor = _MemoryConductor()
-            self._ground = Ground(spec, *spec.load(), _Silence(), self._conductor)
+            self._ground = Ground(spec, *spec.load(), _Silence("", as_json=False), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
         self.autopilot = self._ground.autopilot
@@ -126,10 +120,6 @@ class MemoryAutopilot:
         self._end.poll(NEVER_LATE_S)
         (call,) = self._end.take_outbox()
         return call
-
-    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        self.expect(step_message)
-        self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
         self._conductor.from_stations = step_message
@@ -165,9 +155,8 @@ class MemoryAutopilot:
 class _MemoryConductor:
     """Passes messages of ground stations within this process."""
 
-    def __init__(self) -> None:
-        self.from_stations: StepMessage | None = None
-        self.to_stations: StepMessage | None = None
+    from_stations: StepMessage | None = None
+    to_stations: StepMessage | None = None
 
     def receive(self) -> StepMessage | None:
         return self.from_stations
@@ -180,8 +169,5 @@ class _MemoryConductor:
 
 class _Silence(Status):
     """Prints no events."""
-
-    def __init__(self) -> None:
-        super().__init__("", as_json=False)
 
     def say(self, event: str, text: str, **facts: Any) -> None: ...

@@ -1,7 +1,6 @@
 """Plant and autopilot, either or both, as processes that this one connects over UDP."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, sleep
@@ -28,7 +27,7 @@ class UdpPlant:
     def __init__(self, launcher: Launcher, spec: PlantSpec, folder: Path) -> None:
         self._child = LoggedChild(launcher, replace(spec, link=_HERE), folder / "plant.said")
         self._link: UdpLink | None = None
-        self._clock = QuickClock()
+        self.clock = QuickClock()
         self._last = self._answer = b""
 
     @property
@@ -36,29 +35,23 @@ class UdpPlant:
         return self._child.number
 
     def receive(self, datagram: bytes) -> None:
-        """Send the autopilot's first datagram."""
         if self._link is None:
             self._link = opened(self._url().replace("udpin", "udpout"))
+        self._answer = datagram
         self._link.send(datagram)
 
     def frame(self) -> list[bytes]:
         assert self._link is not None, "it was called"
         datagrams = []
         while True:
-            datagram, _ = received(self._link, (self._child,), "plant")
+            datagram, _ = received(self._link, self._child)
             if datagram == self._last:  # the answer was lost
-                if self._answer:
-                    self._link.send(self._answer)
+                self._link.send(self._answer)
                 continue
             datagrams.append(datagram)
             if parted(datagram)[1]:
-                self._last, self._answer = datagram, b""
+                self._last = datagram
                 return datagrams
-
-    def take(self, answer: bytes) -> None:
-        assert self._link is not None, "it was called"
-        self._answer = answer
-        self._link.send(answer)
 
     def listen(self, timeout_s: float) -> list[bytes]:
         assert self._link is not None, "it was called"
@@ -68,9 +61,6 @@ class UdpPlant:
             self._child.check()
         self._last = next((datagram for datagram in reversed(datagrams) if parted(datagram)[1]), self._last)
         return datagrams
-
-    def clock_s(self) -> float:
-        return self._clock.now_s()
 
     def close(self) -> None:
         self._child.kill()
@@ -113,15 +103,11 @@ class UdpAutopilot:
         self._time_us = 0
 
     def call(self) -> bytes:
-        _, address = received(self._stations, (self._child,), "autopilot")
+        _, address = received(self._stations, self._child)
         self._stations.speak_with(address)
-        call, address = received(self._link, (self._child,), "autopilot")
+        call, address = received(self._link, self._child)
         self._link.speak_with(address)
         return call
-
-    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
-        self.expect(step_message)
-        self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
         self._time_us = step_message.time_us
@@ -140,13 +126,13 @@ class UdpAutopilot:
     def answer(self) -> bytes:
         """Return the answer to the frame; other datagrams are calls for a plant."""
         while True:
-            datagram, _ = received(self._link, (self._child,), "autopilot")
+            datagram, _ = received(self._link, self._child)
             if answers(datagram, self._time_us):
                 return datagram
 
     def to_stations(self) -> StepMessage:
         while True:
-            packet, _ = received(self._stations, (self._child,), "autopilot")
+            packet, _ = received(self._stations, self._child)
             step_message = self._gathering.take(packet)
             if step_message is not None:
                 return step_message
@@ -167,14 +153,11 @@ def opened(url: str) -> UdpLink:
     return link
 
 
-def received(
-    link: UdpLink, children: Sequence[LoggedChild], name: str, silence_s: float = SILENCE_S
-) -> tuple[bytes, Address]:
+def received(link: UdpLink, child: LoggedChild) -> tuple[bytes, Address]:
     """Return the next datagram; SessionError if the process has died or is silent."""
     began_s = perf_counter()
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:
-        for child in children:
-            child.check()
-        if perf_counter() > began_s + silence_s:
-            raise SessionError(f"the {name} has said nothing for {silence_s:.0f} s, and lives")
+        child.check()
+        if perf_counter() > began_s + SILENCE_S:
+            raise SessionError(f"the {child.name} has said nothing for {SILENCE_S:.0f} s, and lives")
     return datagram

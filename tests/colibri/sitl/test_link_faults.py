@@ -12,7 +12,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packets
-from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher, one_core
+from colibri.sitl.backends.launcher import Launcher, one_core
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import Setting
@@ -28,7 +28,7 @@ BAD = {"loss": 0.2, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "jitter_s"
 
 @pytest.fixture(scope="module")
 def forked() -> Iterator[Launcher]:
-    launcher = Forked()
+    launcher = Launcher()
     yield launcher
     launcher.close()
 
@@ -65,7 +65,7 @@ def test_the_same_flight_of_processes_from_scratch() -> None:
     def hover(sitl: Sitl) -> None:
         sitl.run(0.2)
 
-    assert flown(FromScratch(), hover, airborne=2.0) == flown(None, hover, airborne=2.0)
+    assert flown(Launcher(from_scratch=True), hover, airborne=2.0) == flown(None, hover, airborne=2.0)
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
@@ -193,7 +193,7 @@ def test_a_world_that_there_is_not_is_refused() -> None:
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
 def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
-    launcher = FromScratch() if package == "plant" else forked
+    launcher = Launcher(from_scratch=True) if package == "plant" else forked
     with Flights(Setting(airborne=3.0), launcher) as flights:
         sitl = flights.begin()
         sitl.run(0.1)
@@ -221,7 +221,7 @@ def test_a_fleet_flies_as_each_flies_alone() -> None:
 
 def test_a_process_that_cannot_begin_is_quoted() -> None:
     with (
-        Flights(Setting(vehicle="three", believed="iris"), FromScratch()) as flights,
+        Flights(Setting(vehicle="three", believed="iris"), Launcher(from_scratch=True)) as flights,
         pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*unknown vehicle"),
     ):
         flights.begin()
