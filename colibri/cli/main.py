@@ -6,9 +6,10 @@ import sys
 import threading
 from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
+from importlib import import_module
 
+from colibri.cli.shared.commands import PROCESSES
 from colibri.cli.shared.parser import parser_for, subcommand
-from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import (
     EXIT_FAILED,
@@ -30,7 +31,8 @@ def main(argv: list[str] | None = None) -> int:
     escape_what_no_stream_encodes()
     _check_encoding(given)
     if given and given[0] in PROCESSES:
-        return run_process(given[0], given[1:])
+        process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
+        return process_code
     use_one_thread()
     use_safe_path()
     end_quickly()

@@ -78,14 +78,10 @@ def zone_segments(zone: Zone, bottom_m: float, top_m: float) -> NDArray[np.float
     """Return the outline of a zone at two heights and its upright edges, (n, 2, 3)."""
     closed = np.vstack([zone.corners_m, zone.corners_m[:1]])
     rings = [np.column_stack([closed, np.full(len(closed), height)]) for height in (bottom_m, top_m)]
-    edges = thinned_indices(len(zone.corners_m))
+    corners = len(zone.corners_m)
+    edges = list(range(corners)) if corners <= 3 * _EDGES else [corners * k // _EDGES for k in range(_EDGES)]
     upright = np.stack([rings[0][edges], rings[1][edges]], axis=1).astype(np.float32)
     return np.concatenate([segments(rings[0]), segments(rings[1]), upright])
-
-
-def thinned_indices(corners: int) -> list[int]:
-    """Return the corners with upright edges: all, or four of a circle."""
-    return list(range(corners)) if corners <= 3 * _EDGES else [corners * k // _EDGES for k in range(_EDGES)]
 
 
 def circle(east_m: float, north_m: float, radius_m: float, corners: int = 48) -> Array:

@@ -2,7 +2,7 @@
 
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -133,15 +133,8 @@ def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False
 
 def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None]) -> None:
     """Show the vehicle on a link until interrupted; print the token for commands."""
-    vehicle = LiveVehicle(url)
-    try:
-        page, show = _begin(vehicle, port, browser=browser, say=say)
-        try:
-            _keep_showing(show, Stop().__bool__)
-        finally:
-            page.close()
-    finally:
-        vehicle.close()
+    with _live_page(url, port, browser=browser, say=say) as (_, show):
+        _keep_showing(show, Stop().__bool__)
 
 
 def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
@@ -164,10 +157,8 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
 
     The page runs in a thread of this process, which otherwise only waits for its children.
     """
-    vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
     ends = Event()
-    try:
-        page, show = _begin(vehicle, 0, browser=True, say=say)
+    with _live_page("udpin:127.0.0.1:0", 0, name="vehicle", browser=True, say=say) as (vehicle, show):
         thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)
         thread.start()
         try:
@@ -175,21 +166,21 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
         finally:
             ends.set()
             thread.join()
-            page.close()
-    finally:
-        vehicle.close()
 
 
-def _begin(live: LiveVehicle, port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
-    page = Page([live], serve(port, "Colibri"))
-    say(page.url)
-    token = Token.new()
-    say(f"token for commands: {token.text}")
-    page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
-    show = Show(page, [live], perf_counter(), partial(pass_on, live))
-    if browser:
-        webbrowser.open(page.url)
-    return page, show
+@contextmanager
+def _live_page(
+    url: str, port: int, *, name: str = "", browser: bool, say: Callable[[str], None]
+) -> Iterator[tuple[LiveVehicle, Show]]:
+    with closing(LiveVehicle(url, name)) as vehicle, closing(Page([vehicle], serve(port, "Colibri"))) as page:
+        say(page.url)
+        token = Token.new()
+        say(f"token for commands: {token.text}")
+        page.offer_commands(token, lambda: CHOICES.get(vehicle.autopilot or 0, ()))
+        show = Show(page, [vehicle], perf_counter(), partial(pass_on, vehicle))
+        if browser:
+            webbrowser.open(page.url)
+        yield vehicle, show
 
 
 def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:

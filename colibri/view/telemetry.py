@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
-from colibri.common.rotations import quaternion_from_euler
+from colibri.common.rotations import quaternion_from_euler, tilt_deg
 from colibri.common.types import FourRotors, Quaternion, Vector
 from colibri.mavlink.client.modes import mode_name
 from colibri.mavlink.wire.dialect import Message, mav
@@ -161,11 +161,10 @@ class Telemetry:
 
     def _row(self, place: Vector, now_s: float) -> tuple[float, ...]:
         error = float(np.linalg.norm(np.subtract(place, self._reference())))
-        _, x, y, _ = self._now.attitude
-        tilt = float(np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))))
         rotors = (100.0 * part for part in self._fresh("rotors", now_s, UNKNOWN_ROTORS))
         solver = self._fresh("solver", now_s, (nan,) * 5)
         accuracy = self._fresh("accuracy", now_s, (nan, nan))
+        tilt = tilt_deg(self._now.attitude)
         return (now_s, error, tilt, *rotors, *solver[1:], solver[0], *accuracy, self._fresh("volts", now_s, nan))
 
     # What each message says.

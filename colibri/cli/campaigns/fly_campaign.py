@@ -1,9 +1,9 @@
 """Fly the campaign of a command line and its file, and print the results."""
 
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from typing import Any
 
 from colibri.analysis.tables import print_table
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
@@ -20,14 +20,6 @@ _SHOWN = 5
 _TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
 
 
-class _Bar(Protocol):
-    """A progress bar of a campaign; `kept` flights are there at the start."""
-
-    def begun(self, kept: int) -> None: ...
-
-    def ended(self, flown: Flown) -> None: ...
-
-
 def fly(args: Namespace) -> int:
     try:
         said = vars(args)
@@ -36,7 +28,7 @@ def fly(args: Namespace) -> int:
         given = tables | {"fly": options, "grid": _grid(args), "draw": _once(_draw, args.draws)}
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
         engine = engine_of(args.workers, args.dask)
-        with _progress(planned.name, planned.flights, quiet=args.quiet) as bar:
+        with closing(_Bar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
             results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
     except KeyboardInterrupt:
@@ -115,41 +107,40 @@ def _short(cell: str) -> str:
         return cell
 
 
-@contextmanager
-def _progress(title: str, flights: int, *, quiet: bool) -> Iterator[_Bar]:
-    """Show progress, rate, share lost and time left on standard error."""
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+class _Bar:
+    """Shows progress, rate, share lost and time left on standard error."""
 
-    console = Console(stderr=True)
-    columns: Sequence[Any] = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TextColumn("{task.fields[lost]}"),
-        TimeRemainingColumn(),
-    )
-    bar = Progress(*columns, console=console, disable=quiet or not console.is_terminal, speed_estimate_period=300.0)
-    task = bar.add_task(escape(title), total=flights, rate="", lost="", start=False)
+    def __init__(self, title: str, flights: int, *, quiet: bool) -> None:
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    class Bar:
-        flown = lost = 0
+        console = Console(stderr=True)
+        columns: Sequence[Any] = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TextColumn("{task.fields[lost]}"),
+            TimeRemainingColumn(),
+        )
+        hidden = quiet or not console.is_terminal
+        self._bar = Progress(*columns, console=console, disable=hidden, speed_estimate_period=300.0)
+        self._task = self._bar.add_task(escape(title), total=flights, rate="", lost="", start=False)
+        self._flown = self._lost = 0
 
-        def begun(self, kept: int) -> None:
-            bar.start()
-            bar.start_task(task)
-            bar.update(task, completed=kept)
+    def begun(self, kept: int) -> None:
+        """Start with `kept` flights done."""
+        self._bar.start()
+        self._bar.start_task(self._task)
+        self._bar.update(self._task, completed=kept)
 
-        def ended(self, flown: Flown) -> None:
-            self.flown += 1
-            self.lost += flown.verdict.is_lost
-            elapsed_s = bar.tasks[task].elapsed or 0.0
-            rate = f"{self.flown / elapsed_s:.1f} flights/s" if elapsed_s else ""
-            bar.update(task, advance=1, rate=rate, lost=f"{100.0 * self.lost / self.flown:.1f} % lost")
+    def ended(self, flown: Flown) -> None:
+        self._flown += 1
+        self._lost += flown.verdict.is_lost
+        elapsed_s = self._bar.tasks[self._task].elapsed or 0.0
+        rate = f"{self._flown / elapsed_s:.1f} flights/s" if elapsed_s else ""
+        self._bar.update(self._task, advance=1, rate=rate, lost=f"{100.0 * self._lost / self._flown:.1f} % lost")
 
-    try:
-        yield Bar()
-    finally:
-        bar.stop()
+    def close(self) -> None:
+        self._bar.stop()

@@ -8,11 +8,25 @@ from typing import Any
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import fail, loading
 
-NEEDS_VISER = "the page needs viser: pip install 'colibri-sitl[view]'"
-
 
 def add_view(add: Any) -> None:
     add("--view", action="store_true", help="show it in a browser as it flies; the page's address is the first line")
+
+
+@contextmanager
+def loading_viser() -> Iterator[None]:
+    """Load modules that import viser; end with one line if it is not installed."""
+    try:
+        with loading():
+            yield
+    except ModuleNotFoundError as error:
+        if error.name not in ("viser", "websockets"):
+            raise
+        fail("the page needs viser: pip install 'colibri-sitl[view]'")
+
+
+def say(line: str) -> None:
+    print(line, flush=True)  # noqa: T201
 
 
 @contextmanager
@@ -21,20 +35,11 @@ def viewed(args: Namespace, links: list[str]) -> Iterator[None]:
     if not args.view:
         yield
         return
+    with loading_viser():
+        from colibri.view.run import page_beside
     try:
-        with loading():
-            from colibri.view.run import page_beside
-    except ModuleNotFoundError as error:
-        if error.name not in ("viser", "websockets"):
-            raise
-        fail(NEEDS_VISER)
-    try:
-        with page_beside(_say) as link:
+        with page_beside(say) as link:
             args.gcs = [*links, link]
             yield
     except Error as error:
         fail(str(error))
-
-
-def _say(line: str) -> None:
-    print(line, flush=True)  # noqa: T201

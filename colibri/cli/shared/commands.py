@@ -171,3 +171,8 @@ GROUPS: dict[str, dict[str, Command]] = {
 }
 """Subcommands by purpose; a subcommand's name is also that of its file."""
 COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}
+PROCESSES = {
+    "plant": "the vehicle and its world, waiting for an autopilot",
+    "autopilot": "the autopilot, calling a plant",
+}
+"""The two processes of a flight, with command lines of their own."""

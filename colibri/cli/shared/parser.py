@@ -7,8 +7,7 @@ from shutil import get_terminal_size
 from textwrap import dedent, indent, wrap
 from typing import NoReturn, Protocol, cast
 
-from colibri.cli.shared.commands import COMMANDS, GROUPS
-from colibri.cli.shared.processes import PROCESSES
+from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.common.process.arguments import ArgumentParser
 
 _MAX_WIDTH = 120

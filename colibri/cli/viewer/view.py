@@ -3,9 +3,9 @@
 from argparse import Namespace
 from pathlib import Path
 
-from colibri.cli.shared.beside import NEEDS_VISER
+from colibri.cli.shared.beside import loading_viser, say
 from colibri.common.process.arguments import ArgumentParser, natural
-from colibri.common.process.lifecycle import fail, loading
+from colibri.common.process.lifecycle import fail
 
 _LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:")
 
@@ -35,27 +35,18 @@ def run(args: Namespace) -> int:
     if args.port > 65535:
         fail(f"--port: must be from 0 to 65535, not {args.port}")
     recorded = not links and not args.export
-    try:
-        with loading():
-            if recorded:
-                from colibri.view.opening import show_recorded
-            else:
-                from colibri.view.run import export, show_live
-    except ModuleNotFoundError as error:
-        if error.name not in ("viser", "websockets"):
-            raise
-        fail(NEEDS_VISER)
+    with loading_viser():
+        if recorded:
+            from colibri.view.opening import show_recorded
+        else:
+            from colibri.view.run import export, show_live
     try:
         if recorded:
-            show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
+            show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=say)
         elif args.export:
             export([Path(what) for what in args.what], args.export)
         else:
-            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
+            show_live(links[0], args.port, browser=not args.no_browser, say=say)
     except Error as error:
         fail(str(error))
     return 0
-
-
-def _say(line: str) -> None:
-    print(line, flush=True)  # noqa: T201

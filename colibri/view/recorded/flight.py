@@ -43,6 +43,10 @@ class Columns(NamedTuple):
     def columns(self, *names: str) -> Array:
         return np.stack([self.named[name] for name in names], axis=1)
 
+    def at(self, time_s: float, *names: str) -> Array:
+        """Interpolate some columns, (len(names),)."""
+        return np.array([_between(self.times_s, self.named[name], time_s) for name in names])
+
 
 class RecordedFlight:
     """A recorded flight, reduced for display; a `Source`."""
@@ -64,7 +68,6 @@ class RecordedFlight:
         self.airframe = airframe_of(self.plan.plant_vehicle)
         self.span_s = (float(self._truth.times_s[0]), float(self._truth.times_s[-1]))
         self._place = self._truth.columns("x", "y", "z")
-        self._speeds = self._truth.columns("u", "v", "w")
         self._reference = _reference(self.plan, self._truth.times_s, self._decisions)
         self._full_speed = self.plan.plant_vehicle.rotors.max_speed
         self._horizons: Horizons | None = None
@@ -85,13 +88,13 @@ class RecordedFlight:
 
     def at(self, time_s: float) -> Snapshot:
         """Interpolate the vehicle's state between samples."""
-        times_s = self._truth.times_s
+        truth, times_s = self._truth, self._truth.times_s
         row = int(np.searchsorted(times_s, time_s + 1e-9))
         at_s = min(max(time_s, self.span_s[0]), self.span_s[1])
         place = _between(times_s, self._place, at_s)
-        attitude = _between(times_s, self._truth.columns("qw", "qx", "qy", "qz"), at_s)
+        attitude = truth.at(at_s, "qw", "qx", "qy", "qz")
         qw, qx, qy, qz = (attitude / np.linalg.norm(attitude)).tolist()
-        w1, w2, w3, w4 = (self._rotor_speeds(at_s) / self._full_speed).tolist()
+        w1, w2, w3, w4 = (truth.at(at_s, "omega1", "omega2", "omega3", "omega4") / self._full_speed).tolist()
         first = int(np.searchsorted(times_s, at_s - _TRAIL_S))
         trail = np.vstack([thinned(self._place[first:row], _TRAIL_POINTS), place])
         estimate, sigma = self._estimated(at_s)
@@ -99,17 +102,17 @@ class RecordedFlight:
             time_s=at_s,
             position_enu_m=_vector(place),
             attitude=(qw, qx, qy, qz),
-            velocity_enu_m_s=earth_from_body((qw, qx, qy, qz), _vector(_between(times_s, self._speeds, at_s))),
+            velocity_enu_m_s=earth_from_body((qw, qx, qy, qz), _vector(truth.at(at_s, "u", "v", "w"))),
             rotors=(w1, w2, w3, w4),
             reference_enu_m=_vector(_between(times_s, self._reference, at_s)),
             trail=trail,
             horizon=NO_POINTS if self._horizons is None else self._horizons.at(at_s),
-            wind_enu_m_s=_vector(_between(times_s, self._truth.columns("wind_east", "wind_north", "wind_up"), at_s)),
+            wind_enu_m_s=_vector(truth.at(at_s, "wind_east", "wind_north", "wind_up")),
             estimate_enu_m=estimate,
             sigma_m=sigma,
             mode=f"track {self.plan.spec.track}, {self.plan.profile.controller}",
             armed=True,
-            battery=_battery(float(_between(times_s, self._truth.columns("voltage_v"), at_s)[0])),
+            battery=_battery(float(truth.at(at_s, "voltage_v")[0])),
             texts=self._said(at_s),
         )
 
@@ -147,22 +150,18 @@ class RecordedFlight:
         return tuple(charts)
 
     def _estimation_chart(self, estimate: Columns) -> Chart:
-        truth = _interpolated(estimate.times_s, self._truth.times_s, self._place)
+        truth = np.stack([np.interp(estimate.times_s, self._truth.times_s, axis) for axis in self._place.T], axis=1)
         wrong = estimate.columns("x", "y", "z") - truth
         bound = 3.0 * estimate.columns("sd_x", "sd_y", "sd_z").max(axis=1)[:, None]
         names = ("east", "north", "up", "(3σ)", "(-3σ)")
         values = np.hstack([wrong, bound, -bound])
         return _chart("estimate - truth, m", names, estimate.times_s, values, np.linalg.norm(wrong, axis=1))
 
-    def _rotor_speeds(self, time_s: float) -> Array:
-        return _between(self._truth.times_s, self._truth.columns("omega1", "omega2", "omega3", "omega4"), time_s)
-
     def _estimated(self, time_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         if self._estimate is None or not len(self._estimate.times_s):
             return NOWHERE, NOWHERE
-        times_s = self._estimate.times_s
-        place = _between(times_s, self._estimate.columns("x", "y", "z"), time_s)
-        return _vector(place), _vector(_between(times_s, self._estimate.columns("sd_x", "sd_y", "sd_z"), time_s))
+        estimate = self._estimate
+        return _vector(estimate.at(time_s, "x", "y", "z")), _vector(estimate.at(time_s, "sd_x", "sd_y", "sd_z"))
 
     def _said(self, time_s: float) -> tuple[str, ...]:
         until = [text for at_s, text in self._events if at_s <= time_s]
@@ -233,10 +232,6 @@ def _between(times_s: Array, rows: Array, time_s: float) -> Array:
     part = min(max((time_s - times_s[before]) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
     between: Array = rows[before] + part * (rows[after] - rows[before])
     return between
-
-
-def _interpolated(at_s: Array, times_s: Array, rows: Array) -> Array:
-    return np.stack([np.interp(at_s, times_s, column) for column in rows.T], axis=1)
 
 
 def _tilt_deg(quaternions: Array) -> Array:

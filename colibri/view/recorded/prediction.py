@@ -8,7 +8,6 @@ import numpy as np
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.common.types import Array
-from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
 from colibri.flights.replay import answers_of
 
@@ -24,7 +23,7 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
     """
     plan = plan_of(folder)
     loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
-    forecaster = _forecaster(plan, loop)
+    forecaster = Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)
     decisions = 0
     for answer in answers_of(folder):
         if answer.step.decision is None or answer.known is None:
@@ -35,7 +34,3 @@ def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
             if points:
                 here = answer.known.position_enu_m
                 yield answer.time_us / 1e6, np.array([here, *(point.position_enu_m for point in points)])
-
-
-def _forecaster(plan: FlightPlan, loop: ControlLoop) -> Forecaster:
-    return Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)

@@ -17,9 +17,8 @@ import pytest
 
 from colibri.cli.computer.completion import SHELLS
 from colibri.cli.main import main
-from colibri.cli.shared.commands import COMMANDS
+from colibri.cli.shared.commands import COMMANDS, PROCESSES
 from colibri.cli.shared.parser import parser_of, subcommand
-from colibri.cli.shared.processes import PROCESSES
 from colibri.flights.provenance import plan_of
 from tests.support.commands import FLIGHT, VEHICLE, edited, exit_code
 
@@ -30,7 +29,6 @@ HELP = """
 import sys
 from colibri.cli.computer.completion import SHELLS
 from colibri.cli.main import main
-from colibri.cli.shared.processes import PROCESSES
 try:
     main(["--help"])
 finally:

@@ -6,9 +6,8 @@ from pathlib import Path
 from textwrap import dedent
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
-from colibri.cli.shared.commands import COMMANDS, GROUPS
+from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.cli.shared.parser import parser_of
-from colibri.cli.shared.processes import PROCESSES
 from colibri.plant.__main__ import command_line as plant_command_line
 from tools.pages.tables import code
 
