@@ -1,4 +1,4 @@
-"""The vehicle that flies: its description, its nonlinear dynamics, and the process that integrates them."""
+"""The simulated vehicle: its description, its nonlinear dynamics, and the process that integrates them."""
 
 from typing import TYPE_CHECKING
 

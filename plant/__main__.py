@@ -1,4 +1,4 @@
-"""`colibri plant`: the command line of the plant. It listens before it loads what takes time to load."""
+"""`colibri plant`: the command line of the plant. It listens on its link before the slow imports."""
 
 import sys
 from collections.abc import Sequence
@@ -21,7 +21,6 @@ DEFAULT_LINKS = {
 
 
 def command_line() -> ArgumentParser:
-    """Return the parser of the command line."""
     parser = ArgumentParser(
         prog="colibri plant",
         description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
@@ -40,12 +39,10 @@ def command_line() -> ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the plant of a command line; return the exit code."""
     return run_plant(*read_process(PlantSpec, command_line().parse_args(argv)))
 
 
 def run_plant(spec: PlantSpec, starter: Starter) -> int:
-    """Run a plant; return the exit code."""
     if spec.realtime and (spec.serve != "colibri" or spec.speed == inf):
         fail("--realtime follows the wall clock for `colibri autopilot`: no --serve beside it, and no --speed max")
     url = spec.link or DEFAULT_LINKS[spec.serve]

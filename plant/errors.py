@@ -4,4 +4,4 @@ from colibri.common.errors import Error
 
 
 class PlantError(Error):
-    """A vehicle that cannot be simulated, or no further."""
+    """The vehicle cannot be simulated, or not any further."""

@@ -1,4 +1,4 @@
-"""What a plant flies, in what, and how it begins: options of every command that flies, and of `colibri plant`."""
+"""Options of the plant, its world and its start."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -69,11 +69,11 @@ class WorldSpec:
 
     @property
     def weather(self) -> Weather:
-        """The weather of the flight."""
+        """Wind, gusts and turbulence."""
         return Weather(self.wind, self.gusts, self.turbulence, self.seed)
 
     def started(self, usual: Start) -> Start:
-        """Return the start: `usual` but for the values that are given."""
+        """Return `usual` with the given values replaced."""
         return usual._replace(**self.start)
 
 
@@ -116,5 +116,5 @@ class PlantSpec(WorldSpec, ProcessSpec):
 
     @property
     def pace(self) -> float:
-        """How many times real time to fly."""
+        """Speed, times real time."""
         return self.speed or (1.0 if self.realtime else inf)

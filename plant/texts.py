@@ -1,4 +1,4 @@
-"""The world's options as texts: wind, gusts, how a flight begins."""
+"""The world's options as texts: wind, gusts, start."""
 
 from argparse import ArgumentTypeError
 from itertools import pairwise
@@ -11,7 +11,6 @@ from colibri.plant.physics.start import Start
 
 
 def start_values(text: str) -> dict[str, float]:
-    """Read how a flight begins, `KEY=VALUE[,KEY=VALUE...]`."""
     return dict(_start_value(pair) for pair in text.split(","))
 
 
@@ -31,12 +30,10 @@ GUST = "SPEED@FROM:start=S,duration=S"
 
 
 def wind(text: str) -> Wind | RecordedWind:
-    """Read a wind of the command line: `SPEED@FROM`, or a file if it ends in `.csv`."""
     return recorded_wind(Path(text)) if text.endswith(".csv") else constant_wind(text)
 
 
 def gust(text: str) -> Gust:
-    """Read a gust of the command line, `SPEED@FROM:start=S,duration=S`."""
     blows, _, times = text.partition(":")
     peak = constant_wind(blows)
     values = dict(pair.split("=", 1) for pair in times.split(",") if "=" in pair)
@@ -52,11 +49,7 @@ def gust(text: str) -> Gust:
 
 
 def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
-    """Read a wind from a CSV file with a header of t,east,north,up: s and m/s; or from `text` that was in it.
-
-    Raises:
-        ArgumentTypeError: The file cannot be read, or is none; the message names file, line and what is wrong.
-    """
+    """Read a wind from a CSV file, or from `text` that was in it."""
     try:
         lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
@@ -85,11 +78,6 @@ def _row(path: Path, line: int, text: str) -> tuple[int, tuple[float, float, flo
 
 
 def constant_wind(text: str) -> Wind:
-    """Read a wind that is always the same, `SPEED@FROM`.
-
-    Raises:
-        ArgumentTypeError: It is none.
-    """
     speed, _, direction = text.partition("@")
     try:
         value = Wind(number(speed), number(direction))

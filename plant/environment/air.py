@@ -1,4 +1,4 @@
-"""How the air moves where the vehicle is: mean wind, gusts and turbulence, held over each frame."""
+"""Velocity of the air at the vehicle: mean wind, gusts and turbulence, held over each frame."""
 
 from math import hypot
 
@@ -10,14 +10,13 @@ CALM: Vector = (0.0, 0.0, 0.0)
 
 
 class Air:
-    """The air of one weather: (what it remembers, where the vehicle is) -> velocity.
+    """The air of one weather.
 
     Attributes:
-        steady: Its velocity, ENU, m/s, where that is always the same; None where it changes.
+        steady: Velocity, ENU, m/s, where it is constant; `None` where it changes.
     """
 
     def __init__(self, weather: Weather) -> None:
-        """Begin with the mean wind, gusts and turbulence of `weather`."""
         self._gusts = weather.gusts
         self._intensity = weather.turbulence
         self._turbulence = Turbulence(weather.seed)
@@ -25,13 +24,12 @@ class Air:
         self.blow(weather.wind)
 
     def blow(self, wind: Wind | RecordedWind) -> None:
-        """Have another mean wind from now on; gusts and turbulence stay."""
+        """Replace the mean wind; gusts and turbulence stay."""
         self._wind = wind
         self._mean = wind.velocity_at(0.0) if wind.constant else None
         self.steady = None if self._gusts or self._intensity else self._mean
 
     def begin(self, height_m: float) -> tuple[Vector, Eddies | None]:
-        """Return the air's velocity at time 0, ENU, m/s, and its eddies."""
         wind = self._mean_at(0.0)
         if self._intensity is None:
             return self._with_gusts(wind, 0.0), None
@@ -41,7 +39,7 @@ class Air:
     def go_on(
         self, eddies: Eddies | None, time_us: int, height_m: float, velocity_enu_m_s: Vector, duration_us: int
     ) -> tuple[Vector, Eddies | None]:
-        """Return the air's velocity, ENU, m/s, and its eddies, at `time_us`, the end of a frame begun with `eddies`."""
+        """Return velocity, ENU, m/s, and turbulence at the end of a frame that began with `eddies`."""
         time_s = time_us * 1e-6
         wind = self._mean_at(time_s)
         moving = self._with_gusts(wind, time_s)
@@ -64,7 +62,7 @@ class Air:
 
 
 def _with_eddies(velocity: Vector, wind: Vector, eddies: Eddies, scale: Scales) -> Vector:
-    """Return `velocity` with eddies whose axes are along the mean `wind`."""
+    """Add the eddies, whose axes are along the mean `wind`, to `velocity`."""
     along, left, up = eddy_velocity(eddies, scale)
     speed = hypot(wind[0], wind[1])
     e, n = (wind[0] / speed, wind[1] / speed) if speed > 0.0 else (1.0, 0.0)

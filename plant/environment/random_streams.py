@@ -1,4 +1,4 @@
-"""Chance: one stream of random numbers for each thing that has any, so that none changes another's."""
+"""Independent streams of random numbers, one per consumer: a change to one leaves the others as they are."""
 
 from collections.abc import Iterator
 from enum import IntEnum
@@ -10,7 +10,7 @@ _BLOCK = 1024
 
 
 class Source(IntEnum):
-    """What has streams of its own, however many others there are."""
+    """Consumers of random numbers."""
 
     SENSORS = 0
     WEATHER = 1
@@ -18,10 +18,7 @@ class Source(IntEnum):
 
 
 class Chance:
-    """A stream of standard normal numbers, of 24 bits each.
-
-    NumPy takes the rare ones of the tail from libm, whose last bit differs by computer.
-    """
+    """Standard normal numbers of 24 bits: beyond, NumPy's tail depends on the computer's libm."""
 
     def __init__(self, seed: SeedSequence) -> None:
         self._generator = default_rng(seed)
@@ -37,7 +34,6 @@ class Chance:
         return self._left.pop()
 
     def take(self, count: int) -> list[float]:
-        """Return the next numbers, so many."""
         taken: list[float] = []
         while len(taken) < count:
             if not self._left:
@@ -52,5 +48,4 @@ class Chance:
 
 
 def streams(seed: int, source: Source, count: int) -> list[Chance]:
-    """Return independent streams; the same for the same `seed` (not negative)."""
     return [Chance(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]

@@ -1,12 +1,13 @@
-"""Dryden's turbulence as MIL-F-8785C has it at low altitude: white noise through shaping filters, (memory) -> memory.
+"""Dryden turbulence as in MIL-F-8785C at low altitude: white noise through shaping filters.
 
 Spectra, one-sided over angular frequency, with V the airspeed:
-Φu(ω) = σu² (2 Lu / π V) / (1 + (Lu ω / V)²), Φv and Φw(ω) = σ² (L / π V) (1 + 3 (L ω / V)²) / (1 + (L ω / V)²)².
 
-The filters are kept normalised, with stationary states of variance 1: what height and airspeed change are the rates at
-which they forget and the σ that scales them. Their discretisation is exact while those hold. The noise is a
-function of seed and frame, so that a memory has but one future. Turning of the air (p, q, r) is left out: a quadrotor's
-span is small against the eddies.
+- Φu(ω) = σu² (2 Lu / π V) / (1 + (Lu ω / V)²)
+- Φv and Φw(ω) = σ² (L / π V) (1 + 3 (L ω / V)²) / (1 + (L ω / V)²)²
+
+The filters have variance 1; height and airspeed set their decay rates and the σ that scales them. The discretisation is
+exact while these hold. Noise depends on seed and frame alone. Rotation of the air is left out: a quadrotor's span is
+small against the eddies.
 """
 
 from math import sqrt
@@ -24,9 +25,9 @@ W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 
 """Wind at 20 feet, the measure of the turbulence."""
 MIN_HEIGHT_M = 10.0 / FEET_PER_M
 MAX_HEIGHT_M = 1000.0 / FEET_PER_M
-"""The formulas hold between these; what is lower or higher is as at the nearer one."""
+"""The formulas hold between these heights; outside, the nearer one is used."""
 MIN_AIRSPEED_M_S = 1.0
-"""Frozen eddies must be flown through to be felt: what hangs in calm air would feel the same forever."""
+"""A vehicle that hangs in calm air would otherwise stay in the same frozen eddy forever."""
 
 _SQRT_3 = sqrt(3.0)
 _BLOCK = 256
@@ -34,12 +35,7 @@ _NOISES = 5
 
 
 class Eddies(NamedTuple):
-    """What the filters remember.
-
-    Attributes:
-        u: Along the mean wind.
-        v, w: Across it, and upwards: first and second state.
-    """
+    """State of the filters along the mean wind (`u`), across it and upwards."""
 
     frame: int
     u: float
@@ -48,13 +44,7 @@ class Eddies(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """The turbulence at one height.
-
-    Attributes:
-        sigma_uv_m_s: σu = σv, standard deviation along and across the mean wind.
-        sigma_w_m_s: σw, upwards.
-        length_uv_m, length_w_m: Lu = Lv, and Lw.
-    """
+    """Standard deviations and lengths at one height; `uv` is horizontal: σu = σv, Lu = Lv."""
 
     sigma_uv_m_s: float
     sigma_w_m_s: float
@@ -63,7 +53,6 @@ class Scales(NamedTuple):
 
 
 def scales(intensity: Intensity, height_m: float) -> Scales:
-    """Return intensities and lengths at a height above ground, MIL-F-8785C, 3.7.3.4."""
     height_m = min(max(height_m, MIN_HEIGHT_M), MAX_HEIGHT_M)
     slope = 0.177 + 0.000823 * height_m * FEET_PER_M
     sigma_w = 0.1 * W20_KNOTS[intensity] * KNOT_M_S
@@ -71,7 +60,7 @@ def scales(intensity: Intensity, height_m: float) -> Scales:
 
 
 def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
-    """Return what the eddies add to the wind: along it, across it to the left, and upwards, m/s."""
+    """Return the velocity along the mean wind, across it to the left, and upwards, m/s."""
     horizontal = scale.sigma_uv_m_s
     return horizontal * eddies.u, horizontal * _across(eddies.v), scale.sigma_w_m_s * _across(eddies.w)
 
@@ -80,17 +69,14 @@ class Turbulence:
     """The turbulence of one seed."""
 
     def __init__(self, seed: int) -> None:
-        """Let everything that is by chance follow from `seed`."""
         self._key = np.random.SeedSequence(seed, spawn_key=(Source.WEATHER,)).generate_state(2, np.uint64)
         self._block: tuple[int, list[list[float]]] = (-1, [])
 
     def begin(self) -> Eddies:
-        """Return how the air is at first: as if it had blown forever."""
         u, v1, v2, w1, w2 = self._noise(0)
         return Eddies(1, u, (v1, 0.5 * (v1 + v2)), (w1, 0.5 * (w1 + w2)))
 
     def step(self, eddies: Eddies, scale: Scales, airspeed_m_s: float, duration_s: float) -> Eddies:
-        """Return the eddies that meet the vehicle after `duration_s`."""
         way_m = max(airspeed_m_s, MIN_AIRSPEED_M_S) * duration_s
         n1, n2, n3, n4, n5 = self._noise(eddies.frame)
         along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
@@ -98,7 +84,6 @@ class Turbulence:
         return Eddies(eddies.frame + 1, u, _twice(eddies.v, along, n2, n3), _twice(eddies.w, up, n4, n5))
 
     def _noise(self, frame: int) -> list[float]:
-        """Return a frame's white noise: independent, of variance 1."""
         block, row = divmod(frame, _BLOCK)
         if self._block[0] != block:
             chance = np.random.Generator(np.random.Philox(key=self._key, counter=block << 128))
@@ -107,10 +92,10 @@ class Turbulence:
 
 
 def _twice(x: tuple[float, float], way: float, n1: float, n2: float) -> tuple[float, float]:
-    """Return the states of two equal lags in a row, x1' = a (n - x1) and x2' = a (x1 - x2), after a t = `way`.
+    """Advance two equal lags in series, x1' = a (n - x1) and x2' = a (x1 - x2), by a t = `way`.
 
-    Their stationary covariance P is [[1, 1/2], [1/2, 1/2]], so that the noise added on the way has the covariance
-    P - Φ P Φᵀ, Φ = exp(-way) [[1, 0], [way, 1]]; here by its Cholesky factor.
+    With P = [[1, 1/2], [1/2, 1/2]] stationary, the noise has the covariance P - Φ P Φᵀ, Φ = exp(-way) [[1, 0], [way,
+    1]].
     """
     fade = exp(-way)
     squared = fade * fade

@@ -1,7 +1,4 @@
-"""The weather that a flight is flown in: wind, gusts, turbulence.
-
-Velocities are those of the air, ENU, m/s. `air` makes one velocity of them.
-"""
+"""The weather of a flight: wind, gusts, turbulence. Velocities of the air are ENU, m/s."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -16,32 +13,28 @@ Intensity: TypeAlias = Literal["light", "moderate", "severe"]
 
 INTENSITIES: tuple[Intensity, ...] = ("light", "moderate", "severe")
 MAX_SPEED_M_S = 150.0
-"""No wind on Earth's ground was ever faster."""
+"""Above any wind recorded on the ground."""
 
 
 class Wind(NamedTuple):
-    """A constant wind as meteorology has it: `from_deg` clockwise from north, 270 blows from west to east."""
+    """A constant wind; `from_deg` is clockwise from north, 270 blows from west to east."""
 
     speed_m_s: float
     from_deg: float
 
     @property
     def velocity_enu_m_s(self) -> Vector:
-        """Velocity of the air."""
         direction = radians(self.from_deg)
         return (-self.speed_m_s * sin(direction), -self.speed_m_s * cos(direction), 0.0)
 
     @property
     def constant(self) -> bool:
-        """Whether it is always the same."""
         return True
 
     def velocity_at(self, _time_s: float) -> Vector:
-        """Return the velocity of the air at a time."""
         return self.velocity_enu_m_s
 
     def __str__(self) -> str:
-        """Return what `wind` reads back."""
         return f"{self.speed_m_s!r}@{self.from_deg!r}"
 
 
@@ -55,11 +48,9 @@ class RecordedWind:
 
     @property
     def constant(self) -> bool:
-        """Whether it is always the same."""
         return len(self.times_s) == 1
 
     def velocity_at(self, time_s: float) -> Vector:
-        """Return the velocity of the air at a time."""
         after = bisect_right(self.times_s, time_s)
         if after in (0, len(self.times_s)):
             return self.velocities_enu_m_s[max(0, after - 1)]
@@ -69,24 +60,17 @@ class RecordedWind:
         return (a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]))
 
     def __str__(self) -> str:
-        """Return what `wind` reads back."""
         return str(self.path)
 
 
 class Gust(NamedTuple):
-    """A discrete gust that comes on and dies away as V/2 (1 - cos 2π(t - start)/duration).
-
-    Attributes:
-        wind: Its peak, V.
-        duration_s: How long it lasts; the peak is in the middle.
-    """
+    """A discrete gust, V/2 (1 - cos 2π(t - start)/duration), with `wind` its peak V."""
 
     wind: Wind
     start_s: float
     duration_s: float
 
     def velocity_at(self, time_s: float) -> Vector:
-        """Return the velocity that it adds to the air at a time."""
         phase = (time_s - self.start_s) / self.duration_s
         if not 0.0 < phase < 1.0:
             return (0.0, 0.0, 0.0)
@@ -95,12 +79,11 @@ class Gust(NamedTuple):
         return (share * east, share * north, share * up)
 
     def __str__(self) -> str:
-        """Return what `gust` reads back."""
         return f"{self.wind}:start={self.start_s!r},duration={self.duration_s!r}"
 
 
 class Weather(NamedTuple):
-    """All that moves the air; `seed` is the turbulence's."""
+    """All movement of the air; `seed` chooses the turbulence."""
 
     wind: Wind | RecordedWind
     gusts: tuple[Gust, ...] = ()

@@ -1,4 +1,4 @@
-"""Whether the plant's fixed step can integrate a vehicle on the ground: by the poles of feet and rotors against it."""
+"""Check that the plant's fixed step can integrate a vehicle on the ground, by the poles of its contact points."""
 
 from typing import NamedTuple
 
@@ -15,19 +15,13 @@ _BISECTIONS = 40
 
 
 class _Hardness(NamedTuple):
-    """What makes the ground of a vehicle hard, by its keys there."""
-
     stiffness_n_m: float
     damping_n_s_m: float
     slip_damping_n_s_m: float
 
 
 def check_contact(vehicle: Vehicle) -> None:
-    """Check that the ground of a vehicle, if it has one, is soft enough for the plant's step.
-
-    Raises:
-        VehicleError: It is not; the message has each key that is too large, and the largest value that would do.
-    """
+    """Raise a `VehicleError` with the largest valid values if the ground is too hard for the plant's step."""
     ground = vehicle.ground
     if ground is None:
         return
@@ -51,7 +45,7 @@ def check_contact(vehicle: Vehicle) -> None:
 
 
 def _max_rate(vehicle: Vehicle, hardness: _Hardness) -> float:
-    """Return a bound on the poles of the level vehicle on its feet, and of the one that lies on its rotors, rad/s."""
+    """Return a bound on the poles, rad/s, of the vehicle on its feet and on its rotors."""
     assert vehicle.ground is not None
     inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
     points_m = vehicle.ground.contacts_m(vehicle.rotors)
@@ -65,7 +59,7 @@ def _max_rate(vehicle: Vehicle, hardness: _Hardness) -> float:
 
 
 def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:
-    """Return the 6 x 6 matrix that maps a small motion (m, rad) of the body to force and moment against it."""
+    """Return the 6 x 6 matrix from a small motion (m, rad) of the body to the force and moment against it."""
     matrix, weights = np.zeros((6, 6)), np.array(along_axes)[:, None, None]
     for x, y, z in contacts_m:
         motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])

@@ -1,8 +1,7 @@
 """The vehicle's equations of motion, x' = f(x), as one compiled kernel.
 
-x is the rigid body's `STATE`, then the four rotor speeds in the vehicle's unit, then the charge taken from the battery
-in Ah: 18 values. The attitude is a quaternion, so that no attitude is singular: body velocity m/s and body rates rad/s
-in FLU, position m in ENU, and the unit quaternion that turns FLU into ENU.
+x has 18 values: the rigid body's `STATE`, four rotor speeds in the vehicle's unit, and the charge used, Ah. Velocity
+m/s and rates rad/s are FLU, position m is ENU; the unit quaternion turns FLU into ENU.
 """
 
 from collections.abc import Sequence
@@ -25,58 +24,37 @@ _HALVINGS = 60
 
 
 class Parameters(NamedTuple):
-    """The numbers of a vehicle and of the air around it. What is not modelled has the defaults, which leave no trace.
-
-    A kernel sees them as a record of the same fields: see `packed`.
-
-    Attributes:
-        gravity_m_s2: Gravitational acceleration, towards -z of ENU.
-        thrust: Of each rotor along body z, N per speed unit squared.
-        yaw_moment: Of each rotor about body z, with its sign, N m per speed unit squared.
-        momentum: Angular momentum of each rotor along body z, with its sign, N m s per speed unit.
-        rotor_x_m, rotor_y_m: Forward and left of each rotor.
-        top_speed: Of a rotor, at the battery's full voltage.
-        lag_up_s, lag_down_s: Time constants of rotors that speed up and slow down; infinite where they follow at once.
-        linear_drag_n_s_m: Of the airframe, along the FLU axes.
-        rotor_drag: Of one rotor in its plane, N per m/s and per speed unit.
-        power: Electrical power of each rotor, W per speed unit cubed.
-        full_voltage_v, empty_voltage_v: Open-circuit voltage of the full and of the empty battery.
-        capacity_ah: The charge that empties it.
-        contacts_m: Points in FLU that the ground can touch, (8, 3).
-        ground_m: Height of the ground, z of ENU; -inf for none.
-        stiffness_n_m, damping_n_s_m: Of the ground at one point; the damping is against sinking in and coming out.
-        slip_damping_n_s_m: Friction of one point that creeps, before Coulomb's limit: N for each m/s.
-    """
+    """Numbers of a vehicle and of the air around it; the defaults switch an effect off. Kernels take them `packed`."""
 
     mass_kg: float
     gravity_m_s2: float
     inertia_kg_m2: Vector
-    thrust: FourRotors
-    yaw_moment: FourRotors
-    momentum: FourRotors
-    rotor_x_m: FourRotors
-    rotor_y_m: FourRotors
-    top_speed: float
+    thrust: FourRotors  # N per speed unit squared
+    yaw_moment: FourRotors  # N m per speed unit squared, with its sign
+    momentum: FourRotors  # angular momentum along body z, N m s per speed unit, with its sign
+    rotor_x_m: FourRotors  # forward
+    rotor_y_m: FourRotors  # left
+    top_speed: float  # at the battery's full voltage
     wind_enu_m_s: Vector
-    lag_up_s: float = inf
+    lag_up_s: float = inf  # time constant; inf: the rotors follow at once
     lag_down_s: float = inf
-    linear_drag_n_s_m: Vector = (0.0, 0.0, 0.0)
-    rotor_drag: float = 0.0
-    power: FourRotors = (0.0, 0.0, 0.0, 0.0)
-    full_voltage_v: float = 1.0
-    empty_voltage_v: float = 1.0
+    linear_drag_n_s_m: Vector = (0.0, 0.0, 0.0)  # of the airframe, along the FLU axes
+    rotor_drag: float = 0.0  # in its plane, N per m/s and per speed unit
+    power: FourRotors = (0.0, 0.0, 0.0, 0.0)  # electrical, W per speed unit cubed
+    full_voltage_v: float = 1.0  # open-circuit
+    empty_voltage_v: float = 1.0  # open-circuit
     resistance_ohm: float = 0.0
     capacity_ah: float = inf
-    contacts_m: Array = np.zeros((8, 3))
-    ground_m: float = -inf
-    stiffness_n_m: float = 0.0
-    damping_n_s_m: float = 0.0
+    contacts_m: Array = np.zeros((8, 3))  # points in FLU that can touch the ground
+    ground_m: float = -inf  # z of ENU; -inf: no ground
+    stiffness_n_m: float = 0.0  # of the ground at one point
+    damping_n_s_m: float = 0.0  # against sinking in and coming out
     friction: float = 0.0
-    slip_damping_n_s_m: float = 0.0
+    slip_damping_n_s_m: float = 0.0  # friction of a creeping point, below Coulomb's limit
 
 
 class Wrench(NamedTuple):
-    """What acts on the body at its centre of mass, in FLU."""
+    """Force and moment on the body at its centre of mass, FLU."""
 
     force_n: Vector
     moment_n_m: Vector
@@ -84,7 +62,7 @@ class Wrench(NamedTuple):
 
 @compiled
 def rotor_wrench(speeds: FourRotors, parameters: Parameters) -> Wrench:
-    """Return thrust and moments of the rotors, THESIS [2.2]: force (0, 0, U1), moment (U2, U3, U4)."""
+    """Return force (0, 0, U1) and moment (U2, U3, U4) of the rotors, THESIS [2.2]."""
     u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
         squared = speeds[i] * speeds[i]
@@ -98,7 +76,7 @@ def rotor_wrench(speeds: FourRotors, parameters: Parameters) -> Wrench:
 
 @compiled
 def rotor_momentum(speeds: FourRotors, parameters: Parameters) -> float:
-    """Return the angular momentum h of the rotors along body z, N m s. With THESIS's Ω and J, h = -J Ω (erratum 2)."""
+    """Return the angular momentum h along body z, N m s; h = -J Ω in the thesis's symbols (erratum 2)."""
     h = parameters.momentum
     return h[0] * speeds[0] + h[1] * speeds[1] + h[2] * speeds[2] + h[3] * speeds[3]
 
@@ -108,13 +86,6 @@ def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, 
     """Return (p', q', r') by Euler's equation with rotors, THESIS [2.8].
 
     I ω' + (0, 0, h') = -ω × (I ω + (0, 0, h)) + τ. The gyroscopic moment -ω × (0, 0, h) = (-q h, p h, 0) does no work.
-
-    Args:
-        rate: p, q, r in FLU, rad/s.
-        moment: τ in FLU, N m.
-        h: Angular momentum of the rotors along body z, N m s.
-        h_rate: Its rate of change, N m: what spins the rotors up turns the body back.
-        inertia: Ix, Iy, Iz, kg m².
     """
     p, q, r = rate
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
@@ -127,16 +98,10 @@ def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, 
 
 @compiled
 def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: Parameters) -> Wrench:
-    """Return the drag of airframe and rotors.
+    """Return the drag of airframe and rotors; `air` is the velocity through the air, FLU.
 
-    The airframe's is linear in its airspeed. A rotor's is proportional to its speed and to its own airspeed in its
-    plane, -c Ω (v + ω × r), as in Faessler, Franchi and Scaramuzza (RA-L 2018) and RotorS.
-
-    Args:
-        air: Velocity of the centre of mass through the air, FLU, m/s.
-        rate: p, q, r in FLU, rad/s.
-        speeds: Rotor speeds, the vehicle's unit.
-        parameters: The vehicle's.
+    The airframe's is linear, a rotor's -c Ω (v + ω × r) in its plane: Faessler, Franchi, Scaramuzza (RA-L 2018),
+    RotorS.
     """
     linear = parameters.linear_drag_n_s_m
     fx, fy, fz, yaw = -linear[0] * air[0], -linear[1] * air[1], -linear[2] * air[2], 0.0
@@ -152,17 +117,10 @@ def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: Param
 
 @compiled
 def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, parameters: Parameters) -> Wrench:
-    """Return what the ground does: at each point below it a spring and a damper that only push, and friction.
+    """Return the ground's wrench: at each point below it a spring and a damper that only push, and friction.
 
-    Friction is Coulomb's, μ N against the slip, but never stiffer than `slip_damping_n_s_m`: a point that stands
-    creeps instead of sticking, and the equations stay as smooth for a hard landing as for a soft one.
-
-    Args:
-        height_m: z of ENU of the centre of mass.
-        velocity: Of the centre of mass, FLU, m/s.
-        rate: p, q, r in FLU, rad/s.
-        R: FLU to ENU.
-        parameters: The vehicle's.
+    Friction is Coulomb's up to a stiffness of `slip_damping_n_s_m`: points creep instead of sticking, which keeps the
+    equations smooth. `velocity` is FLU.
     """
     fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     p, q, r = rate
@@ -188,8 +146,7 @@ def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, p
 def battery(speeds: FourRotors, charge_ah: float, parameters: Parameters) -> tuple[float, float]:
     """Return the battery's terminal voltage, V, and its current, A.
 
-    The open-circuit voltage falls linearly with the charge taken, and no further once it is empty. Power P at terminal
-    voltage V = V0 - R I: V² - V0 V + R P = 0. No more than V0² / 4R can be drawn, at half the open-circuit voltage.
+    V² - V0 V + R P = 0, with V0 falling linearly with the charge used. At most V0² / 4R can be drawn.
     """
     power_w = 0.0
     for i in range(4):
@@ -203,7 +160,7 @@ def battery(speeds: FourRotors, charge_ah: float, parameters: Parameters) -> tup
 
 @compiled
 def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
-    """Return x' = f(x), (18,), while the rotors are commanded to the speeds `target`, the vehicle's unit."""
+    """Return x' = f(x), (18,), with the rotors commanded to `target`."""
     change = np.empty_like(x)
     write_derivative(change, x, target, parameters[0])
     return change
@@ -211,7 +168,7 @@ def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
 
 @compiled
 def specific_force(x: Array, parameters: Packed) -> Vector:
-    """Return what an accelerometer at the centre of mass feels, m/s² in FLU: acceleration without gravity."""
+    """Return the specific force at the centre of mass, FLU, m/s²."""
     numbers = parameters[0]
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
     fx, fy, fz = _wrench(x, R, (x[13], x[14], x[15], x[16]), numbers).force_n
@@ -220,7 +177,7 @@ def specific_force(x: Array, parameters: Packed) -> Vector:
 
 @compiled
 def hold(start: Array, target: FourRotors, parameters: Packed, x: Array) -> None:
-    """Write x as a command finds it, (18,): rotors without lag turn at once at what the battery can hold."""
+    """Write x at the start of a command: rotors without lag turn at once as fast as the battery allows."""
     put(start, x)
     numbers = parameters[0]
     if numbers.lag_up_s == np.inf:
@@ -231,7 +188,7 @@ def hold(start: Array, target: FourRotors, parameters: Packed, x: Array) -> None
 
 @compiled
 def close(x: Array, parameters: Packed) -> float:
-    """Put rotor speeds that rounding carried past their limits back on them, in place; return the battery's voltage."""
+    """Clip rotor speeds in place after rounding; return the battery's voltage."""
     for i in range(13, 17):
         x[i] = min(max(x[i], 0.0), parameters[0].top_speed)
     return battery((x[13], x[14], x[15], x[16]), x[17], parameters[0])[0]
@@ -239,7 +196,7 @@ def close(x: Array, parameters: Packed) -> float:
 
 @compiled
 def close_attitude(x: Array) -> bool:
-    """Scale the attitude of x, (18,), to unit length, in place; return whether all of x is finite."""
+    """Normalise the quaternion of x in place; return whether all of x is finite."""
     qw, qx, qy, qz = x[9], x[10], x[11], x[12]
     norm = sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
     for i in range(9, 13):
@@ -251,14 +208,12 @@ def close_attitude(x: Array) -> bool:
 
 
 def attitude_of(state: Sequence[float]) -> Quaternion:
-    """Return the attitude quaternion of a state."""
     qw, qx, qy, qz = state[9:13]
     return (qw, qx, qy, qz)
 
 
 @compiled
 def write_derivative(change: Array, x: Array, target: FourRotors, parameters: Parameters) -> None:
-    """Write `derivative` to `change`, (18,); the parameters are a record of `packed`."""
     speeds = (x[13], x[14], x[15], x[16])
     voltage_v, current_a = battery(speeds, x[17], parameters)
     speed_rates = _speed_rates(speeds, target, voltage_v, parameters)
@@ -285,7 +240,6 @@ def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: Parameters) -> 
 
 @compiled
 def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters: Parameters) -> None:
-    """Write the rates of velocity, position and attitude: Newton in the body frame, and kinematics."""
     u, v, w, p, q, r = x[0], x[1], x[2], x[3], x[4], x[5]
     qw, qx, qy, qz = x[9], x[10], x[11], x[12]
     fx, fy, fz = wrench.force_n
@@ -302,7 +256,6 @@ def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters
 
 @compiled
 def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, parameters: Parameters) -> FourRotors:
-    """Return how fast the rotor speeds change: first-order lags towards what the voltage allows of the command."""
     maximum = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
     return (
         _lag(speeds[0], min(target[0], maximum), parameters),
@@ -319,7 +272,7 @@ def _lag(speed: float, target: float, parameters: Parameters) -> float:
 
 @compiled
 def _share_held(target: FourRotors, charge_ah: float, parameters: Parameters) -> float:
-    """Return the share of the top speed at which rotors that try to follow `target` leave just the voltage for it."""
+    """Return the share of the top speed at which rotors that follow `target` leave just the voltage for it."""
     low, high = 0.0, 1.0
     if _voltage_share(target, high, charge_ah, parameters) >= high:
         return high
@@ -334,7 +287,6 @@ def _share_held(target: FourRotors, charge_ah: float, parameters: Parameters) ->
 
 @compiled
 def _voltage_share(target: FourRotors, share: float, charge_ah: float, parameters: Parameters) -> float:
-    """Return terminal over full voltage while the rotors turn at `target`, but at most at `share` of the top speed."""
     maximum = share * parameters.top_speed
     speeds = (min(target[0], maximum), min(target[1], maximum), min(target[2], maximum), min(target[3], maximum))
     return battery(speeds, charge_ah, parameters)[0] / parameters.full_voltage_v

@@ -1,4 +1,4 @@
-"""Two ways to go on by a frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4), over one compiled f(x)."""
+"""Integrators of one frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4)."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -38,7 +38,7 @@ _ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 
 _STAGES = 7
 _SAFETY, _MIN_FACTOR, _MAX_FACTOR, _EXPONENT = 0.9, 0.2, 10.0, -0.2
 _TOO_SMALL = 1e-14
-"""A step of this part of the frame is none."""
+"""Smallest step, in parts of the frame."""
 
 
 def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
@@ -53,7 +53,7 @@ def _steps(duration_s: float) -> int:
 
 
 def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
-    """Integrate by the embedded pair of Dormand and Prince, to a tight tolerance; nan if no step is small enough."""
+    """Integrate by Dormand-Prince; nan if the step size underflows."""
     end = np.empty_like(x)
     voltage_v, done = dormand_prince(x, target, parameters, duration_s, end)
     if not done:
@@ -62,7 +62,6 @@ def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: 
 
 
 def solver(name: Integrator) -> Solver:
-    """Return the solver of that name."""
     return adaptive_step if name == "adaptive" else fixed_step
 
 
@@ -70,7 +69,7 @@ def solver(name: Integrator) -> Solver:
 def runge_kutta_4(
     start: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int, x: Array
 ) -> float:
-    """Write x after `duration_s` by the classical fourth-order rule in `steps` equal steps; return the voltage then."""
+    """Write x after `duration_s` in `steps` equal steps; return the voltage then."""
     h = duration_s / steps
     hold(start, target, parameters, x)
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
@@ -93,11 +92,10 @@ def runge_kutta_4(
 def dormand_prince(
     start: Array, target: FourRotors, parameters: Packed, duration_s: float, x: Array
 ) -> tuple[float, bool]:
-    """Write x after `duration_s`; return the voltage then, and whether it got there.
+    """Write x after `duration_s`; return the voltage then, and whether the end was reached.
 
-    J. R. Dormand and P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied
-    Mathematics 6(1), 1980; error norm and step control as E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary
-    Differential Equations I, II.4.
+    Dormand and Prince, J. Comput. Appl. Math. 6(1), 1980; step control as in Hairer, Nørsett and Wanner, Solving
+    Ordinary Differential Equations I, II.4.
     """
     hold(start, target, parameters, x)
     k = np.empty((_STAGES, x.size))
@@ -128,7 +126,6 @@ def dormand_prince(
 
 @compiled
 def _error(x: Array, y: Array, h: float, k: Array) -> float:
-    """Return the error of a step from x to y in parts of what is tolerated; infinite where it is no number."""
     total = 0.0
     for i in range(x.size):
         difference = 0.0

@@ -1,4 +1,4 @@
-"""A vehicle and the air around it -> the numbers that the kernel takes."""
+"""Convert a vehicle and the wind to the kernel's parameters."""
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> Parameters:
-    """Return the numbers of `vehicle` in a wind."""
     thrust, _, _, yaw_moment = vehicle.allocation()
     east, north, up = wind_enu_m_s
     x_m, y_m = np.array(vehicle.rotors.position_m).T

@@ -1,4 +1,4 @@
-"""How a flight begins: position, attitude, velocity, rotors."""
+"""The start of a flight: position, attitude, velocity, rotors."""
 
 from math import radians
 from typing import NamedTuple
@@ -21,29 +21,21 @@ class IntegrationError(PlantError, InFlightError):
 
 
 class Start(NamedTuple):
-    """How the vehicle begins. Angles are Z-Y'-X''.
+    """Initial state; position and velocity are ENU, angles Z-Y'-X'', rates FLU."""
 
-    Attributes:
-        x, y, z: Position, ENU, m.
-        phi, theta, psi: Roll, pitch, yaw, degrees.
-        vx, vy, vz: Velocity, ENU, m/s.
-        p, q, r: Body rates, FLU, rad/s.
-        rotors: Speed of every rotor, turns per minute.
-    """
-
-    x: float = 0.0
+    x: float = 0.0  # m
     y: float = 0.0
     z: float = 0.0
-    phi: float = 0.0
+    phi: float = 0.0  # degrees
     theta: float = 0.0
     psi: float = 0.0
-    vx: float = 0.0
+    vx: float = 0.0  # m/s
     vy: float = 0.0
     vz: float = 0.0
-    p: float = 0.0
+    p: float = 0.0  # rad/s
     q: float = 0.0
     r: float = 0.0
-    rotors: float = 0.0
+    rotors: float = 0.0  # rpm, of every rotor
 
     @property
     def attitude(self) -> Quaternion:
@@ -52,21 +44,15 @@ class Start(NamedTuple):
 
     @property
     def velocity_flu_m_s(self) -> Vector:
-        """The velocity in the body frame."""
         w, x, y, z = self.attitude
         return earth_from_body((w, -x, -y, -z), (self.vx, self.vy, self.vz))
 
     def __str__(self) -> str:
-        """Return what `start_values` reads back."""
         return ",".join(f"{key}={value!r}" for key, value in self._asdict().items())
 
 
 def check_start(start: Start, vehicle: Vehicle) -> None:
-    """Check that a vehicle can start like that.
-
-    Raises:
-        VehicleError: Its rotors do not turn so fast, it would start in the ground, or its ground is too hard.
-    """
+    """Raise a `VehicleError` if a vehicle cannot start there."""
     check_contact(vehicle)
     if not 0.0 <= vehicle.speed_from_rpm(start.rotors) <= vehicle.rotors.max_speed:
         raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
@@ -83,4 +69,4 @@ DEFAULT_STARTS = {
     Feedback.STATE: Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0),
     Feedback.SENSORS: Start(y=-1.0, psi=90.0),
 }
-"""The thesis's spiral; or below it on the ground, where an estimator finds its bearings."""
+"""The thesis's spiral; on sensors below it on the ground, where the estimator initialises."""

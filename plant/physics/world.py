@@ -1,4 +1,4 @@
-"""The world: vehicle, rotors, battery and time, advanced one frame at a time: (world, command) -> world."""
+"""The world: vehicle, rotors, battery and time, advanced one frame at a time."""
 
 from math import isfinite, nan
 from typing import NamedTuple
@@ -28,30 +28,19 @@ _RIGID = len(STATE)
 
 
 class World(NamedTuple):
-    """Everything that the next step depends on.
-
-    Attributes:
-        state: `equations.STATE`, 13 values.
-        rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
-        voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
-        wind_enu_m_s: Velocity of the air where the vehicle is, held until the next step ends.
-    """
+    """The complete state of the simulation."""
 
     time_us: int
-    state: State
-    rotor_speeds: FourRotors
+    state: State  # `equations.STATE`
+    rotor_speeds: FourRotors  # the vehicle's unit; without lag, of the last step
     charge_used_ah: float = 0.0
-    voltage_v: float = nan
-    wind_enu_m_s: Vector = CALM
+    voltage_v: float = nan  # at the terminals; nan before the first step and without a battery
+    wind_enu_m_s: Vector = CALM  # at the vehicle, held until the next step ends
     eddies: Eddies | None = None
 
 
 def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER) -> World:
-    """Return a world at time 0, with a full battery.
-
-    Raises:
-        VehicleError: The vehicle cannot start like that.
-    """
+    """Return a world at time 0, with a full battery."""
     check_start(start, vehicle)
     speed = vehicle.speed_from_rpm(start.rotors)
     state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
@@ -60,13 +49,10 @@ def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER
 
 
 class Physics:
-    """The laws of one vehicle in one weather: how its world goes on."""
+    """Dynamics of one vehicle in one weather."""
 
     def __init__(self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER) -> None:
-        """Fly `vehicle`, integrated by `integrator`, in `weather`.
-
-        What is compiled is loaded here, not in the first step.
-        """
+        """Load the compiled kernels here, not in the first step."""
         self._air = Air(weather)
         self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
         self._wind = self._parameters["wind_enu_m_s"][0]
@@ -82,11 +68,7 @@ class Physics:
         close_attitude(self._end[1])
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
-        """Advance by `duration_us` with the rotors commanded to `command`.
-
-        Raises:
-            IntegrationError: The state cannot be integrated any further.
-        """
+        """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
         self._feel_wind(world)
         x, voltage_v = self._integrate(self._vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         if not close_attitude(x):
@@ -105,16 +87,12 @@ class Physics:
         return after
 
     def specific_force(self, world: World) -> Vector:
-        """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
-
-        Rotors without lag turn as they did up to now.
-        """
+        """Return the ideal accelerometer reading at the centre of mass, FLU, m/s²."""
         self._feel_wind(world)
         force: Vector = specific_force(self._vector(world), self._parameters)
         return force
 
     def battery(self, world: World) -> PlantBattery | None:
-        """Return what the battery gives; None without one."""
         if self._battery is None:
             return None
         (a, b, c, d), (i, j, k, m) = self._power, world.rotor_speeds
@@ -124,33 +102,32 @@ class Physics:
         return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
 
     def hold_rotor(self, rotor: int, speed: float | None) -> None:
-        """Have a rotor turn at a speed (the vehicle's unit) whatever is commanded; None: it follows commands again."""
+        """Hold a rotor at a speed regardless of commands; `None` releases it."""
         held = self._held or [None] * len(_STANDING)
         held[rotor] = speed
         self._held = held if any(it is not None for it in held) else None
 
     def weaken_rotor(self, rotor: int, part: float) -> None:
-        """Have a rotor make a part of the thrust and torque that it was built for, and take that part of the power."""
+        """Scale a rotor's thrust, torque and power."""
         for name in ("thrust", "yaw_moment", "power"):
             self._parameters[name][0, rotor] = part * self._as_built[name][0, rotor]
         self._power = self._parameters["power"][0].tolist()
 
     def resist(self, times: float) -> None:
-        """Have the battery resist so many times as much as it was built to."""
+        """Multiply the battery's resistance."""
         self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
 
     def blow(self, wind: Wind) -> None:
-        """Have another mean wind from now on; with gusts or turbulence on it, from the next step on."""
+        """Replace the mean wind; with gusts or turbulence it acts from the next step on."""
         self._air.blow(wind)
         if self._air.steady is not None:
             self._wind[:] = self._air.steady
 
     def carry(self, mass_kg: float) -> None:
-        """Have a payload at the centre of mass: it adds to the mass, and to no moment of inertia."""
+        """Add a payload at the centre of mass; the moments of inertia stay."""
         self._parameters["mass_kg"] = self._as_built["mass_kg"] + mass_kg
 
     def _vector(self, world: World) -> Array:
-        """Return x of the equations: that which the world was made of, where it is the last one."""
         last, x = self._end
         return x if world is last else np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
 
@@ -159,10 +136,7 @@ class Physics:
             self._wind[:] = world.wind_enu_m_s
 
     def _target(self, command: ActuatorCommand) -> FourRotors:
-        """Return the rotor speeds that a command asks for: at least idle while armed, none while not.
-
-        A rotor that is held does as it does.
-        """
+        """Return the commanded rotor speeds: at least idle while armed, zero while not."""
         target = _STANDING
         if command.armed:
             c1, c2, c3, c4 = command.controls
@@ -175,7 +149,6 @@ class Physics:
 
 
 def state_frame(world: World) -> StateFrame:
-    """Return the frame of state feedback of a world."""
     u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = world.state
     attitude = (qw, qx, qy, qz)
     return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))

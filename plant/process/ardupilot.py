@@ -1,13 +1,11 @@
 """The plant's end of ArduPilot's JSON interface, as a state machine: (datagram, sender, wall-clock time) -> reply.
 
-ArduPilot sends one binary datagram for each step that it wants, and waits for one JSON object. After about a second of
-silence it sends the same frame_count again. Source: ArduPilot, libraries/SITL/examples/JSON/readme.md and SIM_JSON.cpp.
+ArduPilot sends one binary datagram per step, and repeats it after about a second without a reply. Source: ArduPilot,
+libraries/SITL/examples/JSON/readme.md and SIM_JSON.cpp.
 
-- Each request advances the world by 1/frame_rate; its remainders in µs are carried, so that time keeps step with it.
-- A frame_count that comes again gets the remembered reply.
-- One that is smaller than the last is an ArduPilot that was started again: so is the world, at time 0.
-- A pulse of 1000 to 2000 µs is a rotor's speed from none to its top speed, or its thrust, as the vehicle file has it.
-  Thrust is the square of the speed: MOT_THST_EXPO is then 1, otherwise 0.
+- Each request advances the world by 1/frame_rate; remainders in µs are carried over, so that time does not drift.
+- A repeated frame_count gets the stored reply; a smaller one means a restart: the world begins again at time 0.
+- A pulse of 1000 to 2000 µs is a rotor's speed, zero to top, or its thrust, as the vehicle file defines.
 """
 
 from collections import Counter
@@ -34,15 +32,9 @@ _MIN_RATE_HZ = 10
 
 
 class ArduPilotEnd:
-    """The plant's end: steps a world at each request.
-
-    Attributes:
-        peer: Where ArduPilot is, None until it has called.
-        dropped: What was received and not obeyed, by reason.
-    """
+    """Steps a world at each request; `dropped` counts ignored datagrams."""
 
     def __init__(self, physics: Physics, start: World, motors: Numbering, rotors: Rotors) -> None:
-        """Let `physics` go on from `start`; `motors` has ArduPilot's order of the `rotors`."""
         self._physics = physics
         self._start = start
         self._motors = motors
@@ -58,11 +50,6 @@ class ArduPilotEnd:
         self._reply = b""
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> bytes | None:
-        """Take one datagram in; return what is to be sent back.
-
-        Raises:
-            IntegrationError: The state cannot be integrated any further.
-        """
         form = _FORMATS.get(len(datagram))
         fields = form.unpack(datagram) if form else ()
         if form is None or fields[0] != _MAGIC[form]:
@@ -105,7 +92,7 @@ def _control(pulse_us: int) -> float:
 
 
 def _encode(world: World, physics: Physics) -> bytes:
-    """Return the JSON of a world. ArduPilot's parser wants no space behind a colon."""
+    """Return the JSON of a world; ArduPilot's parser rejects a space behind a colon."""
     frame = state_frame(world)
     values = {
         "timestamp": world.time_us / _SECOND_US,

@@ -1,4 +1,4 @@
-"""The plant as a server of ArduPilot: it answers on a link, and ArduPilot's clock is the only one."""
+"""The plant as a server of ArduPilot, whose clock is the only one."""
 
 from math import inf
 from time import perf_counter
@@ -21,7 +21,6 @@ from colibri.plant.vehicle.parameter_files import ardupilot_thrust_curve
 
 
 def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
-    """Serve ArduPilot on `link` as the command line asks; return the exit code."""
     try:
         weather = spec.weather
         vehicle = load_vehicle(spec.vehicle).without(spec.without)
@@ -46,44 +45,28 @@ REPEATED_AFTER_S = 0.5
 
 
 class _Flight:
-    """One ArduPilot's flight.
-
-    Attributes:
-        began_s: When its first request came, by the wall clock.
-        answered_s: When its last one was answered.
-        steps: Requests that have advanced the world.
-    """
-
     def __init__(self, now_s: float, status: Status) -> None:
-        """Begin now; progress is reported through `status`."""
         self.began_s = self.answered_s = now_s
         self.steps = 0
         self._progress = Progress(status)
 
     def answered(self, time_us: int, now_s: float, steps: int) -> None:
-        """Count a request, answered now, that has advanced the world by `steps` to `time_us`."""
         self.answered_s = now_s
         self.steps += steps
         self._progress.report(time_us / 1e6, now_s - self.began_s)
 
 
 class ArduPilotServer:
-    """Answers one ArduPilot after the other, each from the start."""
+    """Serves one ArduPilot after another, each from the start."""
 
     def __init__(self, end: ArduPilotEnd, link: UdpLink, status: Status, stop: Stop, logs: PlantLogs | None) -> None:
-        """Answer on `link` by `end` until `stop`."""
         self._end, self._link, self._status, self._stop, self._logs = end, link, status, stop, logs
         self._silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", perf_counter())
         self._flight = _Flight(perf_counter(), status)
         self._answered_s = -inf
 
     def serve(self, *, duration_s: float) -> None:
-        """Answer until a flight is `duration_s` long, or a signal ends it.
-
-        Raises:
-            IntegrationError: The state cannot be integrated any further.
-            LogError: A log cannot be written.
-        """
+        """Serve until a flight is `duration_s` long, or until a signal."""
         while not self._stop and self._end.world.time_us < duration_s * 1e6:
             received = self._link.receive(MAX_WAIT_S)
             now_s = perf_counter()
@@ -94,10 +77,9 @@ class ArduPilotServer:
         self._report(self._end.world.time_us, "ended", "ended")
 
     def _answer(self, received: tuple[bytes, Address], now_s: float) -> None:
-        """Answer what has come.
+        """Answer a request, once even if it was repeated meanwhile, e.g. while the plant was loading.
 
-        A request that has come again before it was answered, for instance while the plant was loading, is answered
-        once: ArduPilot would take the second reply for that to its next request, and so fly a step late for good.
+        ArduPilot would match a second reply to its next request, and fly one step late from then on.
         """
         late = now_s > self._answered_s + REPEATED_AFTER_S
         for datagram, sender in dict.fromkeys([received, *self._link.receive_now()]) if late else (received,):
@@ -121,7 +103,6 @@ class ArduPilotServer:
             self._flight.answered(self._end.world.time_us, now_s, int(advanced))
 
     def _report(self, time_us: int, event: str, text: str) -> None:
-        """Report the end of a flight: that is when it was answered last."""
         if self._logs:
             self._logs.flush()
         flight, end = self._flight, self._end

@@ -1,4 +1,4 @@
-"""What the plant records of a flight: the truth at every frame, and on request every MAVLink frame."""
+"""Logs of the plant: the true state at every frame, and on request every MAVLink frame."""
 
 from functools import partial
 from pathlib import Path
@@ -20,13 +20,12 @@ TRAFFIC = "flight.tlog"
 
 
 def truth_row(world: World) -> tuple[float, ...]:
-    """Return the row of `TRUTH`; `nan` volts without a battery."""
     battery = (world.voltage_v, world.charge_used_ah)
     return (world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s)
 
 
 class TruthLog:
-    """Writes the truth to a log, also as PX4's topics where these are recorded."""
+    """Writes the truth, also as PX4's topics where these are recorded."""
 
     def __init__(self, log: TopicLog, vehicle: Vehicle) -> None:
         capacity_ah = 0.0 if vehicle.battery is None else vehicle.battery.capacity_ah
@@ -36,11 +35,6 @@ class TruthLog:
             self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah))
 
     def write_world(self, world: World) -> None:
-        """Append the truth.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         row = truth_row(world)
         self._log.add(TRUTH, row)
         if self._blocks and self._thinning.is_due(world.time_us):
@@ -48,17 +42,10 @@ class TruthLog:
 
 
 class PlantLogs:
-    """The plant's files: `flight.ulg`, beside the autopilot, which begins it, and on request `flight.tlog`."""
+    """The plant's files: `flight.ulg`, shared with the autopilot, and on request `flight.tlog`."""
 
     def __init__(self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, tlog: bool = False) -> None:
-        """Write into `folder`.
-
-        Args:
-            folder: Of the flight; the log of an earlier flight in it is removed.
-            vehicle: That is flown.
-            boot_unix_us: Unix time at simulated time 0; without it times of `flight.tlog` are simulated.
-            tlog: Whether every MAVLink frame is written to `flight.tlog`.
-        """
+        """Write into `folder`; without `boot_unix_us`, times of `flight.tlog` are simulated."""
         self._folder, self._vehicle, self._boot_unix_us, self._has_tlog = folder, vehicle, boot_unix_us, tlog
         self._open()
 
@@ -70,43 +57,30 @@ class PlantLogs:
         self._tlog = TlogWriter(self._folder / TRAFFIC) if self._has_tlog else None
 
     def begin_again(self) -> None:
-        """Begin the files of another flight; those of the last one become `flight-1.ulg`, `flight-1.tlog`, and so on.
-
-        Raises:
-            LogError: The last one's cannot be written or renamed.
-        """
+        """Rename the files to `flight-1.ulg`, `flight-1.tlog` and so on, and begin others."""
         self.flush()
         self.close()
         set_aside(*(self._folder / name for name in (FILE, TRAFFIC)))
         self._open()
 
     def write_world(self, world: World) -> None:
-        """Append the truth."""
         self._truth.write_world(world)
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
-        """Append what was received and sent at simulated time `time_us`."""
         for outgoing in sent:
             received = [*received, *outgoing.frames]
         self.write_frames(time_us, received)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
-        """Append frames of simulated time `time_us`."""
         if self._tlog:
             self._tlog.write(self._boot_unix_us + time_us, frames)
 
     def flush(self) -> None:
-        """Write what waits.
-
-        Raises:
-            LogError: It cannot be written.
-        """
         self._log.flush()
         if self._tlog:
             self._tlog.flush()
 
     def close(self) -> None:
-        """Write what waits, if that can be done, and close all."""
         self._log.close()
         if self._tlog:
             self._tlog.close()

@@ -1,4 +1,4 @@
-"""The plant as a simulator of PX4: in lockstep with it, or, while it starts, at the pace of the wall clock."""
+"""The plant as a simulator of PX4: in lockstep, or, while PX4 starts, at the pace of the wall clock."""
 
 from math import hypot
 from time import perf_counter, sleep
@@ -33,7 +33,6 @@ from colibri.plant.vehicle.parameter_files import px4_gps_delay_ms
 
 
 def run(spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> int:
-    """Serve PX4 on `link` as the command line asks; return the exit code."""
     try:
         simulator = Simulator(spec, link, status, stop)
     except Error as error:
@@ -44,17 +43,9 @@ def run(spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> int:
 
 
 class Simulator:
-    """Serves one PX4 after the other, each from the start.
-
-    It has more attributes than most classes: all that a flight begins with is kept, to begin the next one with.
-    """
+    """Serves one PX4 after another, each from the start."""
 
     def __init__(self, spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> None:
-        """Fly as the command line asks.
-
-        Raises:
-            VehicleError: There is no such vehicle, or PX4 cannot fly it.
-        """
         weather = spec.weather
         vehicle = load_vehicle(spec.vehicle).without(spec.without)
         if vehicle.sensors is None:
@@ -77,7 +68,6 @@ class Simulator:
         self._time_us = 0
 
     def serve(self) -> None:
-        """Wait for a PX4 and fly with it, and then with the next, until the time is over or a signal ends it."""
         over = False
         while not self._stop and not over:
             if self._link.target is not None:
@@ -89,12 +79,11 @@ class Simulator:
                 over = self._fly()
 
     def close(self) -> None:
-        """Close the logs."""
         if self._logs:
             self._logs.close()
 
     def _fly(self) -> bool:
-        """Fly from the start with the PX4 that has called; return whether the time is over, and not only PX4 gone."""
+        """Fly with the connected PX4; return whether the time is over, rather than PX4 gone."""
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
         world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
@@ -123,13 +112,11 @@ class Simulator:
         return not gone
 
     def _due_s(self, pace: Pace, world: World) -> float:
-        """Return when a frame is due: flat out at once, but while PX4 is starting, at the pace of the wall clock."""
         now_s = perf_counter()
         due_s = pace.due_s(world.time_us - self._interval_us, now_s)
         return due_s if self._end.lockstep else max(due_s, now_s + self._interval_us * 1e-6)
 
     def _offer(self, world: World, suite: SensorSuite) -> None:
-        """Send a frame, and log what there is to log while PX4 computes its answer."""
         truth = self._truth(world) if self._end.wants_truth(world.time_us) else None
         self._end.offer(suite.measure(world), truth, perf_counter())
         sent = self._send()
@@ -148,7 +135,7 @@ class Simulator:
         return Truth(state, geodetic_of(state.position_enu_m, self._origin), acceleration, airspeed_m_s)
 
     def _await_answer(self, world: World, silence: Silence) -> bool:
-        """Wait for the answer to a frame; return False if there will be none."""
+        """Return False if PX4 goes before it has answered."""
         end, call = self._end, self._end.calls
         silence.end(perf_counter())
         while not end.answered and not self._stop:
@@ -166,7 +153,6 @@ class Simulator:
         return ActuatorCommand(world.time_us, self._rotors.speeds_of(self._order.to_vehicle(controls)), armed)
 
     def _exchange(self, timeout_s: float) -> None:
-        """Send what is to be sent, and receive what comes within a time."""
         self._log_sent(self._send())
         for datagram, sender in receive_soon(self._link, timeout_s):
             self._end.receive(datagram, sender)
@@ -177,21 +163,19 @@ class Simulator:
             self._end.close(address)
 
     def _send(self) -> list[tuple[bytes, ...]]:
-        """Send what is to be sent; return the frames of each datagram."""
         outbox = self._end.take_outbox()
         for frames, address in outbox:
             self._link.send(b"".join(frames), address)
         return [frames for frames, _ in outbox]
 
     def _log_sent(self, sent: list[tuple[bytes, ...]]) -> None:
-        """Log what was sent at the time of the last frame, behind what was received before."""
         if self._logs and sent:
             self._log_received()
             for frames in sent:
                 self._logs.write_frames(self._time_us, list(frames))
 
     def _log_received(self) -> None:
-        """Log what was received since last asked, at the time of the last frame; another PX4's in files of its own."""
+        """Log new received frames; another PX4 gets new files."""
         if self._logs and self._end.calls > self._logged_calls:
             self._logs.begin_again()
             self._logged_calls, self._time_us = self._end.calls, 0
@@ -200,7 +184,7 @@ class Simulator:
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:
-        """Wait, and receive all that comes before: an answer must not be taken for that to the next frame."""
+        """Wait, and receive meanwhile: an answer must not be matched to the next frame."""
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             if self._end.lockstep:
                 sleep(min(early_s, MAX_WAIT_S))

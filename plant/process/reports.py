@@ -1,4 +1,4 @@
-"""What every server of the plant reports, and how it ends: silence of the autopilot, the end of a flight, errors."""
+"""Reports of the plant's servers: silence of the autopilot, end of the flight, errors."""
 
 import shlex
 from collections.abc import Iterator
@@ -22,26 +22,20 @@ SILENT_AFTER_S = 2.0
 class Closable(Protocol):
     """A link or a log."""
 
-    def close(self) -> None:
-        """Close it."""
+    def close(self) -> None: ...
 
 
 def awaiting(whom: str, link: GroundLink) -> str:
-    """Return in words how a plant on `link` comes to speak with an autopilot: it waits for it, or calls it."""
     return f"waiting for {whom} on {link.url}" if link.target is None else f"calling {whom} at {link.url}"
 
 
 def all_parameters_by(vehicle: str, whom: str) -> str:
-    """Return in words which command writes all parameters by which another autopilot flies a vehicle."""
     return f"all of it by: colibri vehicle {shlex.quote(vehicle)} --for {whom}"
 
 
 @contextmanager
 def closing(*opened: Closable | None, out: Path | None = None) -> Iterator[None]:
-    """Fly within: garbage stays uncollected, an error ends the process with one line, and `opened` is closed after.
-
-    What was the error is also in `out`, if there is such a folder.
-    """
+    """Fly without garbage collection, then close `opened`; an error ends the process with one line."""
     try:
         with gc_frozen():
             yield
@@ -54,10 +48,9 @@ def closing(*opened: Closable | None, out: Path | None = None) -> Iterator[None]
 
 
 class Silence:
-    """Reports once that an autopilot is silent, and once that it is back; by the wall clock or in simulated time."""
+    """Reports once that an autopilot is silent, and once that it is back."""
 
     def __init__(self, status: Status, allowed_s: float, back: str, began_s: float) -> None:
-        """Report through `status` a silence of `allowed_s`, counted from `began_s`; its end as `back`."""
         self._status = status
         self._allowed_s = allowed_s
         self._back = back
@@ -65,13 +58,12 @@ class Silence:
         self._reported = False
 
     def end(self, now_s: float) -> None:
-        """Count from now on, and report the end of a silence that was reported."""
         if self._reported:
             self._status.say("answered", self._back)
         self._since_s, self._reported = now_s, False
 
     def lasts(self, now_s: float, missing: str, time_us: int, waiting: str) -> bool:
-        """Return whether the silence has just become too long; report then what is missing, and since when."""
+        """Return whether the silence has just become too long; if so, report it."""
         if self._reported or now_s - self._since_s < self._allowed_s:
             return False
         self._reported = True
@@ -89,7 +81,6 @@ def report_end(
     ended_s: float | None = None,
     **figures: Any,
 ) -> None:
-    """Report the end of a flight at simulated time `time_us`; by the wall clock from `began_s` to `ended_s`, or now."""
     time_s = time_us / 1e6
     wall_time_s = (perf_counter() if ended_s is None else ended_s) - began_s
     status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)

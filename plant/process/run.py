@@ -17,18 +17,12 @@ from colibri.plant.vehicle.description import load_vehicle
 
 
 def builder_of(spec: PlantSpec) -> PlantBuilder:
-    """Return what builds the plant of a command line.
-
-    Raises:
-        VehicleError: There is no such vehicle, or it cannot start like that.
-    """
     vehicle = load_vehicle(spec.vehicle).without(spec.without)
     starts = {it: nudged(spec.started(DEFAULT_STARTS[it])) for it in served_by(vehicle)}
     return PlantBuilder(spec, vehicle, starts, integrator=spec.integrator, origin=spec.home.origin)
 
 
 def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
-    """Serve one flight on `link` as the command line asks; return the exit code."""
     try:
         builder = builder_of(spec)
     except Error as error:

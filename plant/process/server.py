@@ -1,4 +1,4 @@
-"""The plant on a link: in lockstep, or as hardware would be: following the wall clock, waiting for no answer."""
+"""The plant on a link: in lockstep, or at the pace of the wall clock, like hardware."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -23,18 +23,13 @@ _STANDING = (0.0, 0.0, 0.0, 0.0)
 
 
 class Pace:
-    """When each frame is due by the wall clock.
-
-    A flight that was held up for longer than a moment stays late: it does not hurry past those who fly it.
-    """
+    """Wall-clock deadlines of frames; a flight held up for longer than a moment stays late instead of hurrying."""
 
     def __init__(self, speed: float, now_s: float) -> None:
-        """Begin now, at `speed` times real time; infinite for flat out."""
         self.speed = speed
         self._began_s = now_s
 
     def due_s(self, time_us: int, now_s: float) -> float:
-        """Return the wall-clock time at which simulated time `time_us` is due."""
         due_s = self._began_s + time_us / 1e6 / self.speed
         held_up_s = max(0.0, now_s - due_s - _CATCH_UP_S)
         self._began_s += held_up_s
@@ -42,7 +37,7 @@ class Pace:
 
 
 class Server:
-    """Drives the plant's end of the conversation over a link."""
+    """The plant's end of the lockstep; with `streams_truth`, the true state follows each frame."""
 
     def __init__(
         self,
@@ -54,7 +49,6 @@ class Server:
         *,
         streams_truth: bool = False,
     ) -> None:
-        """Serve `end` on `link` until `stop`; where it `streams_truth`, each frame has the true state behind it."""
         self._link = link
         self._end = end
         self._status = status
@@ -72,12 +66,7 @@ class Server:
         return self._end.peer is not None
 
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
-        """Fly for `duration_s` at `speed` times real time, or until a signal ends the process.
-
-        Raises:
-            IntegrationError: The state cannot be integrated any further.
-            LogError: A log cannot be written, and the flight would have had an end.
-        """
+        """Fly for `duration_s` at `speed` times real time, or until a signal."""
         self._ends = isfinite(duration_s)
         began_s = perf_counter()
         pace, progress = Pace(speed, began_s), Progress(self._status)
@@ -97,11 +86,9 @@ class Server:
         )
 
     def _own_figures(self) -> tuple[str, dict[str, float]]:
-        """Return what the last line has besides the frames, as text and as figures."""
         return "", {}
 
     def _advance(self, plant: Plant, pace: Pace) -> bool:
-        """Send a frame when it is due, and go on with its answer; return False if a signal came first."""
         if isfinite(pace.speed):
             self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
         command = self._exchange(plant)
@@ -111,7 +98,6 @@ class Server:
         return True
 
     def _offer(self, plant: Plant) -> float:
-        """Send the plant's frame; return the wall-clock time, s."""
         world = plant.world
         frame, plant_status = plant.measure(with_battery=self._end.sends_battery(world.time_us))
         now_s = perf_counter()
@@ -125,7 +111,7 @@ class Server:
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
-        """Send a frame until its answer comes; None if a signal came first."""
+        """Send a frame until its answer comes; return `None` if a signal came first."""
         due_s = now_s = self._offer(plant)
         silence = Silence(self._status, SILENT_AFTER_S, "the autopilot answers again", now_s)
         while not self._stop:
@@ -145,7 +131,7 @@ class Server:
         self._logged = world
 
     def _keep(self, write: Callable[[PlantLogs], None]) -> None:
-        """Write to the logs; a flight that has no end goes on without one that cannot be written."""
+        """Write to the logs; an endless flight goes on without a log that cannot be written."""
         if self._logs is None:
             return
         try:
@@ -164,20 +150,18 @@ class Server:
         return command
 
     def _send(self) -> list[Outgoing]:
-        """Send what is to be sent, and return it."""
         sent = self._end.take_outbox()
         for outgoing in sent:
             self._link.send(outgoing.datagram, outgoing.address)
         return sent
 
     def _send_and_log(self) -> None:
-        """Send what is to be sent, and log it; without that what was received is logged behind the next frame."""
         sent = self._send()
         if sent:
             self._log_traffic(sent)
 
     def _log_traffic(self, sent: list[Outgoing]) -> None:
-        """Log what was received since last asked, and then what was sent, at the time of the last frame."""
+        """Log newly received frames, then `sent`, at the time of the last frame."""
         received, time_us = self._end.received, self._time_us
         self._keep(lambda logs: logs.write_traffic(time_us, received, sent))
         received.clear()
@@ -188,7 +172,7 @@ class Server:
 
 
 class FreeServer(Server):
-    """Sends each frame when it is due; the rotors follow the newest command from the moment at which it came."""
+    """Sends each frame when it is due; the rotors follow the newest command, or stop after `cut_after_s` without."""
 
     def __init__(
         self,
@@ -200,7 +184,6 @@ class FreeServer(Server):
         *,
         cut_after_s: float,
     ) -> None:
-        """Serve `end` on `link` until `stop`; stop the rotors where no command comes for `cut_after_s`, simulated."""
         super().__init__(link, end, status, stop, logs)
         self._missing = f"no command for {cut_after_s:g} s"
         self._silence = Silence(status, cut_after_s, "the autopilot answers again", 0.0)
@@ -213,7 +196,6 @@ class FreeServer(Server):
         return f", {self._answers} of them answered", figures
 
     def _advance(self, plant: Plant, pace: Pace) -> bool:
-        """Send a frame, and go on with the commands that come until the next one is due."""
         begin_us = plant.world.time_us
         due_s = pace.due_s(begin_us + plant.interval_us, self._offer(plant))
         faults: list[Fault | WorldChange] = []

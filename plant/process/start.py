@@ -5,5 +5,4 @@ from colibri.plant.physics.start import Start
 
 
 def nudged(start: Start) -> Start:
-    """Return a start moved by `nudge_m` to the east and north: 0 except in tests."""
     return start._replace(x=start.x + nudge_m(), y=start.y + nudge_m())

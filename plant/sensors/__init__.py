@@ -1,1 +1,1 @@
-"""What each sensor makes of the truth, with its errors and its faults."""
+"""Sensors of the plant: the true state in, measurements with errors and faults out."""

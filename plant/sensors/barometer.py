@@ -1,4 +1,4 @@
-"""The plant's barometer: the standard atmosphere, a slow drift, and noise."""
+"""The plant's barometer: standard atmosphere, slow drift, noise."""
 
 from colibri.common.earth.atmosphere import pressure_pa
 from colibri.mavlink.hil.faults import BAROMETER

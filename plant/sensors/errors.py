@@ -1,4 +1,4 @@
-"""How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
+"""Errors of sensors, driven by standard normal numbers, exact at any interval."""
 
 from math import sqrt
 
@@ -13,47 +13,30 @@ _DRAWN = 128
 
 
 class GaussMarkov:
-    """A drift that forgets: first-order, of constant variance, x' = -x / T + w.
-
-    After Δ it is x exp(-Δ / T) plus chance of variance σ² (1 - exp(-2 Δ / T)).
-    """
+    """A first-order Gauss-Markov drift: after Δ, x exp(-Δ / T) plus noise of variance σ² (1 - exp(-2 Δ / T))."""
 
     def __init__(self, deviation: float, time_s: float, chance: Chance) -> None:
-        """Begin somewhere in the stationary distribution of σ = `deviation`, with T = `time_s`."""
         self._deviation = deviation
         self._time_s = time_s
         self._chance = chance
         self.value = deviation * next(chance)
 
     def after(self, elapsed_s: float) -> float:
-        """Return the drift so much later."""
         kept = exp(-elapsed_s / self._time_s)
         self.value = kept * self.value + self._deviation * sqrt(1.0 - kept * kept) * next(self._chance)
         return self.value
 
 
 class Triad:
-    """Three axes of white noise on a bias that walks at random, sampled at an interval, cut at the sensor's range.
+    """Three axes of white noise on a random-walk bias, clipped at the sensor's range.
 
-    White noise is that of a mean over the interval, density / √interval (IEEE Std 952, annex C).
-
-    Attributes:
-        bias: As it is switched on.
+    White noise is a mean over the interval, density / √interval (IEEE Std 952, annex C).
     """
 
     def __init__(
         self, density: float, walk: float, turn_on: float, limit: float, interval_s: float, chance: Chance
     ) -> None:
-        """Switch on.
-
-        Args:
-            density: White noise, units / √Hz.
-            walk: Of the bias, units / s / √Hz.
-            turn_on: Standard deviation of the bias at the start, units.
-            limit: What is larger is cut, units.
-            interval_s: Between two samples.
-            chance: Standard normal numbers.
-        """
+        """Take units / √Hz for `density`, units / s / √Hz for `walk`; `turn_on` is the bias's standard deviation."""
         self._limit = limit
         self._chance = chance
         self._walk, self._noise = walk * sqrt(interval_s), density / sqrt(interval_s)
@@ -62,7 +45,6 @@ class Triad:
         self._drawn: list[list[float]] = []
 
     def measure(self, truth: Vector) -> Vector:
-        """Return the sample of `truth`, one interval after the one before."""
         limit = self._limit
         if not self._drawn:
             self.draw()
@@ -73,7 +55,7 @@ class Triad:
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
 
     def draw(self, left: int = 0) -> None:
-        """Have bias and white noise of samples to come, of many at once, where no more than `left` are still drawn."""
+        """Draw bias and white noise of many samples at once, unless more than `left` are still unused."""
         if len(self._drawn) > left:
             return
         drawn = np.array(self._chance.take(6 * _DRAWN)).reshape(_DRAWN, 6)

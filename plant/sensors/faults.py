@@ -1,4 +1,4 @@
-"""What faults do to the output of sensors: each frame goes through them on its way out."""
+"""Faults of sensors, applied to each frame on its way out."""
 
 from collections import deque
 from typing import Any
@@ -13,10 +13,9 @@ from colibri.plant.vehicle.sensors import Sensors
 
 
 class Reading:
-    """The output of one sensor, with a fault or none."""
+    """The output of one sensor, with or without a fault."""
 
     def __init__(self, row: Instrument, chance: Chance) -> None:
-        """Be well; `chance` are standard normal numbers, drawn only for more noise."""
         self._add, self._at = row.add, row.at
         self._chance = chance
         self._fault: Fault | None = None
@@ -25,13 +24,13 @@ class Reading:
         self._later: deque[tuple[int, Any]] = deque()
 
     def begin(self, fault: Fault, now_us: int, last: Any) -> None:
-        """Have a fault from now on, in place of any other; or none, where it is OK. `last` was its last output."""
+        """Begin a fault, or end it with kind OK."""
         self._fault = None if fault.kind == OK else fault
         self._since_us, self._last = now_us, last
         self._later.clear()
 
     def report(self, now_us: int, value: Any) -> Any:
-        """Return the output for a measurement; either is None where there is nothing new."""
+        """Return the output for a measurement; either is `None` without a new value."""
         fault = self._fault
         if fault is None:
             return value
@@ -63,10 +62,9 @@ class Reading:
 
 
 class SensorFaults:
-    """The faults of all sensors of one vehicle, whose FAILURE_UNIT are `units`."""
+    """Faults of all sensors of one vehicle, by FAILURE_UNIT."""
 
     def __init__(self, seed: int, parts: Sensors | None) -> None:
-        """Have none; more noise will be by chance of `seed`."""
         chances = dict(zip(SENSORS, streams(seed, Source.FAULTS, len(SENSORS)), strict=True))
         rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
         self._readings = {row.unit: (row, Reading(row, chances[row.unit])) for row in rows}
@@ -77,14 +75,13 @@ class SensorFaults:
         self._any = False
 
     def begin(self, fault: Fault, now_us: int) -> None:
-        """Begin or end a fault; it shows from the next frame on."""
         self._any = True
         row, reading = self._readings[fault.unit]
         held = self._reported is not None and row.group
         reading.begin(fault, now_us, getattr(self._reported, row.field) if held else self._last.get(row.field))
 
     def through(self, frame: SensorFrame) -> SensorFrame:
-        """Return the frame that is sent for a frame; each is the next one."""
+        """Return the frame to send; call it once a frame."""
         reported = self._changed(frame, self._reported or frame) if self._any else frame
         self._reported = reported
         for field in self._own:

@@ -1,4 +1,4 @@
-"""The plant's GPS receiver: it measures at its own rate, and sends later."""
+"""The plant's GPS receiver: it measures at its rate, and reports after its delay."""
 
 from collections import deque
 from dataclasses import replace
@@ -19,10 +19,9 @@ from colibri.plant.vehicle.sensors import Gps
 
 
 class GpsReceiver:
-    """Fixes of the past: position with white and correlated errors, velocity with white ones."""
+    """Delayed fixes: position with white and correlated errors, velocity with white ones."""
 
     def __init__(self, part: Gps, origin: Geodetic, chance: Chance) -> None:
-        """Switch on a receiver of a vehicle whose ENU frame begins at `origin`."""
         self._part = part
         self._origin = origin
         self._chance = chance
@@ -33,7 +32,7 @@ class GpsReceiver:
         self._pending: deque[GpsFix] = deque()
 
     def measure(self, time_us: int, position_enu_m: Vector, velocity_enu_m_s: Vector) -> None:
-        """Measure now, at `time_us`, to report after the receiver's delay."""
+        """Sample a fix now; it is delivered after the receiver's delay."""
         part, chance = self._part, self._chance
         if self._measured_us is not None:
             for drift in self._drifts:
@@ -64,7 +63,6 @@ class GpsReceiver:
         self._pending.append(fix)
 
     def report(self, time_us: int) -> GpsFix | None:
-        """Return the fix that is due at `time_us` and was not returned before."""
         if self._pending and self._pending[0].time_us <= time_us:
             return self._pending.popleft()
         return None
@@ -75,7 +73,7 @@ def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
     seen: list[World] = []
 
     def catch_up() -> None:
-        """Measure what was seen: nobody hears of it for the receiver's delay."""
+        """Measure the world seen at the previous frame: the fix is due only after the receiver's delay."""
         while seen:
             world = seen.pop()
             u, v, w, _, _, _, x, y, z = world.state[:9]
@@ -94,7 +92,7 @@ def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
 
 
 def _moved(fix: GpsFix, error: Vector) -> GpsFix:
-    """Return a fix that is off by metres east, north and up; it claims to be as good as ever."""
+    """Displace a fix by metres east, north and up; its stated accuracy stays."""
     return replace(fix, place=geodetic_of(error, fix.place))
 
 

@@ -1,4 +1,4 @@
-"""The plant's accelerometer and gyroscope: they measure at every frame."""
+"""The plant's accelerometer and gyroscope, sampled at every frame."""
 
 from functools import partial
 

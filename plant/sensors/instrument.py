@@ -1,4 +1,4 @@
-"""The interface of a sensor: the true world in, its output at that frame out; and what faults do to that."""
+"""The interface of a sensor: the true world in, its output at that frame out."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias, TypeVar
@@ -10,26 +10,24 @@ from colibri.plant.physics.world import Physics, World
 
 T = TypeVar("T")
 Measure: TypeAlias = Callable[[World], Any]
-"""The world at a frame, each the next one -> a sensor's output; None where that is nothing new."""
+"""The world at each frame -> a sensor's output; None without a new one."""
 
 _ROUNDING = 1e-9
 
 
 def as_it_is(value: T, _now_us: int) -> T:
-    """Return a value that has no time of its own."""
     return value
 
 
 def vector_sum(value: Vector, error: Vector) -> Vector:
-    """Return a vector with an error."""
     return (value[0] + error[0], value[1] + error[1], value[2] + error[2])
 
 
 class Setting(NamedTuple):
-    """Where the sensors of one vehicle are.
+    """The surroundings of a vehicle's sensors.
 
     Attributes:
-        ahead: Where each puts what it can do before it measures, whatever the world will be; it need not be done.
+        ahead: Optional work of each sensor that can be done before the next world is known.
     """
 
     physics: Physics
@@ -39,36 +37,26 @@ class Setting(NamedTuple):
 
 
 class Instrument(NamedTuple):
-    """A sensor that a vehicle may have.
+    """A sensor that a vehicle may have."""
 
-    Attributes:
-        part: Its table in the vehicle file's sensors; a vehicle without it has no such sensor.
-        field: Of `SensorFrame`.
-        group: Of `Updated`: its field then holds the last output; 0 where that is None between two values.
-        switched_on: (table, setting, standard normal numbers of its own) -> its measure.
-        add: (value, error of a fault) -> value with that error.
-        at: (value, simulated time in µs) -> value that claims to be of that time.
-    """
-
-    part: str
-    field: str
-    group: int
-    unit: int
+    part: str  # its table in the vehicle file
+    field: str  # of `SensorFrame`
+    group: int  # bit of `Updated` if the field keeps its last output; 0 if it is None between outputs
+    unit: int  # FAILURE_UNIT
     switched_on: Callable[[Any, Setting, Chance], Measure]
-    add: Callable[[Any, Vector], Any] = vector_sum
-    at: Callable[[Any, int], Any] = as_it_is
+    add: Callable[[Any, Vector], Any] = vector_sum  # (value, error of a fault) -> erroneous value
+    at: Callable[[Any, int], Any] = as_it_is  # (value, time in µs) -> value with that time stamp
 
 
 class Rate:
     """Samples at the first frame at or after each multiple of its interval."""
 
     def __init__(self, rate_hz: float) -> None:
-        """Be due first at the first frame."""
         self._rate_mhz = rate_hz * 1e-6
         self._samples = -1
 
     def is_due(self, time_us: int) -> bool:
-        """Whether there is a sample at this frame; to be asked once a frame."""
+        """Return whether there is a sample; call it once a frame."""
         samples = int(time_us * self._rate_mhz + _ROUNDING)
         due = samples > self._samples
         self._samples = samples

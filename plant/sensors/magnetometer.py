@@ -1,4 +1,4 @@
-"""The plant's magnetometer: the earth's field in the body, the vehicle's own, and noise."""
+"""The plant's magnetometer: Earth's field in body axes, hard iron, noise."""
 
 from colibri.common.earth.magnetic_field import field_enu_gauss
 from colibri.common.rotations import earth_from_body

@@ -1,4 +1,4 @@
-"""The plant's rangefinder: it looks down its own axis onto flat ground, and sees what is nearest in its beam."""
+"""The plant's rangefinder: distance to the nearest point of flat ground in its beam."""
 
 from math import hypot, inf
 

@@ -1,8 +1,4 @@
-"""The sensors of the plant: truth in, what each sensor makes of it out.
-
-What they measure depends on the seed, the simulated time and the truth alone: each has a stream of chance of its own,
-and the same frame asked for twice is the same frame.
-"""
+"""All sensors of the plant; measurements depend on seed, simulated time and truth alone."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,12 +20,11 @@ _TIME, _UPDATED, _TEMPERATURE = _PLACE["time_us"], _PLACE["updated"], _PLACE["te
 
 
 def served_by(vehicle: Vehicle) -> list[Feedback]:
-    """Return the feedback that a vehicle can give."""
     return [Feedback.STATE] if vehicle.sensors is None else list(Feedback)
 
 
 class SensorSuite:
-    """All sensors of one vehicle."""
+    """All sensors of one vehicle; frames pass through `faults`, if given."""
 
     def __init__(
         self,
@@ -41,7 +36,6 @@ class SensorSuite:
         interval_us: int,
         faults: SensorFaults | None = None,
     ) -> None:
-        """Switch on `parts`, by the chance of `seed` (not negative); frames go through `faults`, where given."""
         self._faults = faults
         self._origin = origin
         self._ahead: list[Callable[[], None]] = []
@@ -57,14 +51,14 @@ class SensorSuite:
         self._frame: SensorFrame | None = None
 
     def measure(self, world: World) -> SensorFrame:
-        """Return what they measure of `world`; each frame is the next one, or the one before again."""
+        """Return the frame of `world`: the next one, or the previous one again."""
         if self._frame is None or self._frame.time_us != world.time_us:
             frame = self._measured(world)
             self._frame = frame if self._faults is None else self._faults.through(frame)
         return self._frame
 
     def prepare(self) -> None:
-        """Do what can be done before the next world is known."""
+        """Do the work that needs no knowledge of the next world."""
         for do in self._ahead:
             do()
 

@@ -1,4 +1,4 @@
-"""The table of sensors that a vehicle may have: one that is added is a row here and a file beside."""
+"""Table of the sensors that a vehicle may have; a new one is a row here and a file beside it."""
 
 from colibri.plant.sensors import barometer, gps, inertial, magnetometer, rangefinder
 from colibri.plant.sensors.instrument import Instrument
@@ -12,9 +12,8 @@ ROWS: tuple[Instrument, ...] = (
     gps.ROW,
     rangefinder.ROW,
 )
-"""The place of a row is that of its stream of chance: what is new belongs at the end."""
+"""The position of a row selects its random stream: append new rows."""
 
 
 def is_fitted(row: Instrument, parts: Sensors) -> bool:
-    """Whether a vehicle has a sensor."""
     return getattr(parts, row.part) is not None

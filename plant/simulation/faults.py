@@ -1,7 +1,4 @@
-"""Faults of one vehicle: what MAV_CMD_INJECT_FAILURE asks for, done to its rotors, its battery and its sensors.
-
-A fault happens at an instant between two frames; what it does then depends on the world and on the seed alone.
-"""
+"""Faults of one vehicle by MAV_CMD_INJECT_FAILURE, each at an instant between two frames."""
 
 from collections.abc import Sequence
 
@@ -16,10 +13,9 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Faults:
-    """What has gone wrong with one vehicle."""
+    """Active faults of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
-        """Begin with everything well; rotors and battery fail in `physics`."""
         self._physics = physics
         self._battery = vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)
@@ -31,7 +27,6 @@ class Faults:
         self._taken_ah = 0.0
 
     def inject(self, asked: Fault, world: World) -> tuple[World, FaultResult]:
-        """Have a fault happen at the time of `world`; return the world after it, and what became of it."""
         fault = judged(asked, self.parts)
         if isinstance(fault, Refusal):
             return world, FaultResult(asked.unit, asked.kind, fault.result)
@@ -46,7 +41,6 @@ class Faults:
         return world, FaultResult(fault.unit, fault.kind, RESULT_ACCEPTED)
 
     def inject_all(self, asked: Sequence[Fault], world: World) -> tuple[World, tuple[FaultResult, ...]]:
-        """Have several happen, in order."""
         results = []
         for fault in asked:
             world, result = self.inject(fault, world)
@@ -61,7 +55,7 @@ class Faults:
             self._physics.weaken_rotor(rotor, fault.values[0] if fault.kind == WRONG else 1.0)
 
     def _on_battery(self, fault: Fault, world: World) -> World:
-        """Take charge from the battery, or give back what was taken: what the flight itself has used stays used."""
+        """Take charge from the battery, or restore it; the flight's own consumption stays."""
         assert self._battery is not None, "what there is none of does not fail"
         left, resistance = fault.values[:2] if fault.kind == WRONG else (0.0, 1.0)
         used_ah = world.charge_used_ah - self._taken_ah

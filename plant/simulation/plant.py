@@ -1,4 +1,4 @@
-"""The plant as a pure composition, measured frame by frame, that goes on with each answer; and what builds it."""
+"""The plant as a pure composition of physics, sensors and faults, stepped frame by frame."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,24 +21,18 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Actuation:
-    """Commands on their way to the rotors, which follow the last that has arrived, also between two frames.
-
-    Attributes:
-        delay_us: From the frame that the last answers to its arrival; None before any has arrived.
-    """
+    """Delayed commands: the rotors follow the last one that has arrived, also between two frames."""
 
     def __init__(self, first: ActuatorCommand) -> None:
-        """Follow `first` until another arrives."""
         self._now = first
         self.delay_us: int | None = None
         self._coming: deque[tuple[int, ActuatorCommand]] = deque()
 
     def arrive(self, from_us: int, command: ActuatorCommand) -> None:
-        """Have a command arrive at a simulated time, not before those that were sent earlier."""
         self._coming.append((from_us, command))
 
     def spans(self, begin_us: int, end_us: int) -> Iterator[tuple[ActuatorCommand, int]]:
-        """Yield what is followed from one time to another, and for how long, µs."""
+        """Yield commands and their durations, µs."""
         now_us = begin_us
         while now_us < end_us:
             while self._coming and self._coming[0][0] <= now_us:
@@ -50,7 +44,7 @@ class Actuation:
 
 
 class Plant:
-    """One vehicle in its world."""
+    """One vehicle in its world; a command acts twice `latency_us` after the frame that it answers."""
 
     def __init__(
         self,
@@ -64,7 +58,6 @@ class Plant:
         interval_us: int,
         latency_us: int = 0,
     ) -> None:
-        """Begin with `world`; the command that answers a frame acts from twice `latency_us` later: there and back."""
         self.world = world
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
@@ -84,18 +77,17 @@ class Plant:
         self._results: tuple[FaultResult, ...] = ()
 
     def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
-        """Return the frame of the world as it is now, and what goes beside it; of the battery only if that is sent."""
         battery = self._physics.battery(self.world) if with_battery else None
         status = PlantStatus(battery, self._results, self._actuation.delay_us or None)
         return ReceivedFrame(self._measure(self.world), status)
 
     def prepare(self) -> None:
-        """Do what the next frame needs whatever the answer to this one is, while the autopilot computes it."""
+        """Prepare the next frame while the autopilot computes its answer to this one."""
         if self._suite is not None:
             self._suite.prepare()
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
-        """Go on to the next frame, with the answer to this one and with faults that happen now."""
+        """Advance to the next frame with the answer to this one, and with faults that happen now."""
         self._results = ()
         if faults:
             self.inject(faults)
@@ -103,7 +95,7 @@ class Plant:
         self.go_on()
 
     def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
-        """Have faults happen and the world change now; the results of faults go with the next frame."""
+        """Inject faults and changes of the world now; results of faults go with the next frame."""
         for each in asked:
             if isinstance(each, WindChange):
                 self._physics.blow(Wind(each.speed_m_s, each.from_deg))
@@ -113,22 +105,17 @@ class Plant:
         self.world, self._results = self.faults.inject_all(faults, self.world)
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:
-        """Take a command that is on its way since `sent_us`."""
         self._actuation.arrive(sent_us + self._round_trip_us, command)
 
     def go_on(self) -> None:
-        """Advance to the next frame.
-
-        Raises:
-            IntegrationError: The state cannot be integrated any further.
-        """
+        """Advance to the next frame."""
         begin_us = self.world.time_us
         for command, duration_us in self._actuation.spans(begin_us, begin_us + self.interval_us):
             self.world = self._physics.step(self.world, command, duration_us)
 
 
 class PlantBuilder:
-    """Builds plants of one vehicle in one world: all of them but what an autopilot asks for."""
+    """Builds plants of one vehicle in one world."""
 
     def __init__(
         self,
@@ -139,13 +126,7 @@ class PlantBuilder:
         integrator: Integrator = "rk4",
         origin: Geodetic = DEFAULT_ORIGIN,
     ) -> None:
-        """Fly `vehicle` from one of `starts` in the world of `spec`; what is compiled is loaded here.
-
-        `vehicle` and `starts` have their part of `spec` already.
-
-        Raises:
-            VehicleError: It cannot start like that.
-        """
+        """Load the compiled kernels; `vehicle` and `starts` already include their part of `spec`."""
         weather = spec.weather
         self.vehicle = vehicle
         self.starts = starts
@@ -155,7 +136,6 @@ class PlantBuilder:
         self._origin = origin
 
     def build(self, feedback: Feedback, interval_us: int) -> Plant:
-        """Return a plant that begins now, and sends `feedback` every `interval_us`."""
         return Plant(
             self._worlds[feedback],
             self.vehicle,

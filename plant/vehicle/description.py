@@ -37,7 +37,6 @@ class Body(Table, frozen=True, kw_only=True):
     """Ix, Iy, Iz about the FLU axes."""
 
     def __post_init__(self) -> None:
-        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         ix, iy, iz = sorted(self.inertia_kg_m2)
         if ix + iy < iz:
@@ -78,7 +77,6 @@ class Rotors(Table, frozen=True, kw_only=True):
     """Without it, rotors follow their commands at once."""
 
     def __post_init__(self) -> None:
-        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         if self.idle_speed >= self.max_speed:
             raise ValueError("idle_speed: must lie below max_speed")
@@ -86,25 +84,19 @@ class Rotors(Table, frozen=True, kw_only=True):
             raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
 
     def speeds_of(self, controls: FourRotors) -> FourRotors:
-        """Return the parts of the top speed that the controls of another autopilot mean."""
+        """Return rotor speeds, in parts of the top speed, for another autopilot's controls."""
         if self.control == "speed":
             return controls
         a, b, c, d = map(sqrt, controls)
         return (a, b, c, d)
 
     def controls_of(self, speeds: FourRotors) -> FourRotors:
-        """Return the controls by which another simulator turns the rotors at these parts of the top speed."""
         if self.control == "speed":
             return speeds
         a, b, c, d = (speed * speed for speed in speeds)
         return (a, b, c, d)
 
     def numbering(self) -> Numbering:
-        """Return how PX4 and ArduPilot number the rotors.
-
-        Raises:
-            VehicleError: They number none that are where these are.
-        """
         found = numbering(self.position_m, self.direction)
         if found is None:
             raise VehicleError(
@@ -125,8 +117,7 @@ class Drag(Table, frozen=True, kw_only=True):
 class Ground(Table, frozen=True, kw_only=True):
     """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
 
-    Stiffness, damping and Coulomb's friction are those of the ground at one foot; it damps sinking in and coming out.
-    Height 0 is that of the centre of mass of the vehicle at rest on its feet.
+    Values apply per foot. Height 0 is the centre of mass of the vehicle at rest on its feet.
     """
 
     foot_position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
@@ -140,7 +131,7 @@ class Ground(Table, frozen=True, kw_only=True):
     """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
 
     def contacts_m(self, rotors: Rotors) -> Array:
-        """Return the points in FLU that can touch the ground, (8, 3): the feet, and the rotors in the plane z = 0."""
+        """Return the points in FLU that can touch the ground, (8, 3): feet, then rotors."""
         feet = [(x, y, -self.foot_depth_m) for x, y in self.foot_position_m]
         return np.array([*feet, *((x, y, 0.0) for x, y in rotors.position_m)])
 
@@ -148,7 +139,7 @@ class Ground(Table, frozen=True, kw_only=True):
 class Battery(Table, frozen=True, kw_only=True):
     """A battery: a voltage that falls linearly with the charge taken, behind a resistance.
 
-    Full and empty voltage are without load. The rotors' top speed is proportional to the terminal voltage.
+    Voltages are without load. The rotors' top speed is proportional to the terminal voltage.
     """
 
     full_voltage_v: Positive
@@ -159,16 +150,15 @@ class Battery(Table, frozen=True, kw_only=True):
     """Mechanical power of the rotors over electrical power."""
 
     def __post_init__(self) -> None:
-        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         if self.empty_voltage_v > self.full_voltage_v:
             raise ValueError("empty_voltage_v: must not lie above full_voltage_v")
 
 
 class Vehicle(Table, frozen=True, kw_only=True):
-    """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`).
+    """A quadrotor in SI units, except for rotor speeds (`rotors.speed_unit`).
 
-    What is None is not modelled.
+    Parts that are `None` are not modelled.
     """
 
     name: str
@@ -181,25 +171,16 @@ class Vehicle(Table, frozen=True, kw_only=True):
     sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
-        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
 
     def replace(self, key: str, value: Any) -> "Vehicle":
-        """Return the vehicle with another value at a dotted key, `body.mass_kg` say.
-
-        Raises:
-            VehicleError: There is no such key, or it cannot have this value.
-        """
+        """Return the vehicle with another value at a dotted key such as `body.mass_kg`."""
         return replaced(self, key, value, VehicleError)
 
     def without(self, parts: Iterable[str]) -> "Vehicle":
-        """Return the vehicle with `parts` not modelled: of `rotor-lag`, `drag`, `ground`, `battery`.
-
-        Raises:
-            KeyError: There is no such part.
-        """
+        """Return the vehicle without some of the parts `rotor-lag`, `drag`, `ground`, `battery`."""
         vehicle = self
         for part in parts:
             vehicle = msgspec.structs.replace(vehicle, **_WITHOUT[part](vehicle))
@@ -225,23 +206,22 @@ class Vehicle(Table, frozen=True, kw_only=True):
 
     @property
     def rad_s_per_speed_unit(self) -> float:
-        """How many rad/s one unit of the vehicle's rotor speeds is."""
+        """The vehicle's unit of rotor speed, in rad/s."""
         return _RAD_S_PER_UNIT[self.rotors.speed_unit]
 
     def allocation(self) -> Array:
-        """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
+        """Return the 4 x 4 matrix from squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
         return _allocation(self.rotors)
 
     def max_wrench(self) -> Array:
-        """Return the largest U1 (N), U2, U3, U4 (N m) that the rotors can make, each on its own, (4,)."""
+        """Return the largest U1 (N), U2, U3, U4 (N m) of the rotors, each on its own, (4,)."""
         max_wrench: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
         return max_wrench
 
     def rotor_momentum(self) -> Array:
         """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
 
-        `conserving`: h = J (Ω1 - Ω2 + Ω3 - Ω4) with Ω in rad/s. `as-printed`: the thesis's +J Ω [2.8], opposite in
-        sign, and Ω in the file's unit.
+        `as-printed` is the thesis's +J Ω [2.8]: opposite in sign to J (Ω1 - Ω2 + Ω3 - Ω4), and Ω in the file's unit.
         """
         spin = _spin(self.rotors) * self.rotors.inertia_kg_m2
         if self.rotors.gyroscopic_term == "as-printed":
@@ -255,19 +235,14 @@ def vehicle_names() -> list[str]:
 
 
 def vehicle_text(name: str) -> str:
-    """Return the file of a vehicle that comes with Colibri.
-
-    Raises:
-        VehicleError: There is none of that name.
-    """
     return named_text("vehicle", _FOLDER, name, VehicleError)
 
 
 def load_vehicle(given: str | Vehicle) -> Vehicle:
-    """Read a vehicle by its name, or from a file if the name ends in `.toml`; one that is given is returned.
+    """Read a vehicle by its name, or from a file if the name ends in `.toml`; a `Vehicle` is returned as it is.
 
     Raises:
-        VehicleError: There is no such vehicle, or the file has a missing, unknown or impossible key.
+        VehicleError: The vehicle is unknown, or the file has a missing, unknown or impossible key.
     """
     return given if isinstance(given, Vehicle) else read_named("vehicle", _FOLDER, given, Vehicle, VehicleError)
 
@@ -280,7 +255,6 @@ def _allocation(rotors: Rotors) -> Array:
 
 
 def _spin(rotors: Rotors) -> Array:
-    """Return +1 for a rotor that turns counter-clockwise seen from above, -1 for the others."""
     return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
 
 

@@ -1,8 +1,8 @@
-"""How other autopilots number a vehicle's rotors, found from where they are and which way they turn.
+"""Numbering of a vehicle's rotors by other autopilots.
 
-PX4 and ArduPilot number quadrotors alike: '+' is right, left, front, rear; 'x' is front right, rear left, front left,
-rear right. The first two turn counter-clockwise and the last two clockwise, or in a reversed frame the other way round.
-Sources: PX4 Airframes Reference, Quadrotor x and +; ArduPilot, AP_MotorsMatrix.cpp, MOTOR_FRAME_QUAD.
+PX4 and ArduPilot number alike: '+' is right, left, front, rear; 'x' is front right, rear left, front left, rear right.
+The first two turn counter-clockwise and the last two clockwise, or in a reversed frame the other way round. Sources:
+PX4 Airframes Reference, Quadrotor x and +; ArduPilot, AP_MotorsMatrix.cpp, MOTOR_FRAME_QUAD.
 """
 
 from collections.abc import Sequence
@@ -23,42 +23,30 @@ _FRAME_TYPES: dict[tuple[Shape, bool], int] = {("+", False): 0, ("+", True): 6, 
 
 
 class Numbering(NamedTuple):
-    """How others number the rotors of a vehicle.
-
-    Attributes:
-        reverse: Whether every rotor turns the other way than is usual.
-        rotors: For each of their motors in turn, the index of the rotor in the vehicle file.
-    """
+    """Rotor order of PX4 and ArduPilot: for each of their motors, the index in the vehicle file."""
 
     shape: Shape
     reverse: bool
     rotors: tuple[int, int, int, int]
 
     def to_vehicle(self, motors: FourRotors) -> FourRotors:
-        """Return what is given for each motor in the order of the vehicle file."""
         a, b, c, d = self.rotors
         given = [0.0, 0.0, 0.0, 0.0]
         given[a], given[b], given[c], given[d] = motors
         return (given[0], given[1], given[2], given[3])
 
     def to_motors(self, rotors: FourRotors) -> FourRotors:
-        """Return what is given for each rotor of the vehicle file in the order of their motors."""
         a, b, c, d = self.rotors
         return (rotors[a], rotors[b], rotors[c], rotors[d])
 
     @property
     def ardupilot_frame_type(self) -> int:
-        """ArduPilot's parameter FRAME_TYPE; that of an 'x' that turns the other way is called H."""
+        """FRAME_TYPE; ArduPilot calls a reversed 'x' H."""
         return _FRAME_TYPES[self.shape, self.reverse]
 
 
 def numbering(position_m: Sequence[tuple[float, float]], direction: Sequence[str]) -> Numbering | None:
-    """Return how others number rotors; None if they are neither a '+' nor an 'x', or do not turn as in one.
-
-    Args:
-        position_m: x forward, y left of each.
-        direction: `ccw` or `cw` of each, seen from above.
-    """
+    """Return the numbering; `None` if the rotors are neither a '+' nor an 'x', or do not turn as in one."""
     bearings_deg = [degrees(atan2(-y, x)) for x, y in position_m]
     for shape, wanted_deg in _BEARINGS_DEG.items():
         nearest = [[i for i in range(4) if _apart_deg(bearings_deg[i], want) < _NEAR_DEG] for want in wanted_deg]

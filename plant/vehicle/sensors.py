@@ -1,8 +1,7 @@
-"""The sensors of a vehicle: numbers of named parts with units, as tables of the vehicle file.
+"""The sensors of a vehicle, as tables of the vehicle file.
 
-The plant measures by them; the autopilot's estimator assumes them. Noise, drift and the bias at the start are standard
-deviations, along each axis; noise is white, drift a first-order Gauss-Markov process. Densities and walks are for each
-root of hertz. What is beyond a range is cut; what is nearer or farther than a rangefinder's is not seen.
+Noise (white), drift (first-order Gauss-Markov) and turn-on bias are standard deviations along each axis; densities and
+walks are per root hertz. Values beyond a range are clipped; a rangefinder does not see beyond its own.
 """
 
 from typing import Annotated
@@ -89,14 +88,13 @@ class Rangefinder(Part, frozen=True, kw_only=True):
     """Of the sensor above the ground while the vehicle stands on its feet."""
 
     def __post_init__(self) -> None:
-        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         if self.min_m >= self.max_m:
             raise ValueError("min_m: must lie below max_m")
 
 
 class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All sensors of a vehicle; what is None it has not."""
+    """All sensors of a vehicle; it may lack a rangefinder."""
 
     accelerometer: Accelerometer
     gyroscope: Gyroscope
