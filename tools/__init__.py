@@ -1,1 +1,1 @@
-"""The repository's own scripts; nothing of it is shipped."""
+"""The repository's own scripts, which are not shipped."""

@@ -1,4 +1,4 @@
-"""`python -m tools.bench`, or `make bench`: `colibri bench`, its flights beside RotorPy's where that is installed."""
+"""`python -m tools.bench`, or `make bench`: `colibri bench`, with RotorPy's flights where that is installed."""
 
 import sys
 from collections.abc import Sequence
@@ -12,7 +12,6 @@ from tools.bench import rotorpy_peer
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure what the command line says; return the exit code."""
     parser = ArgumentParser(prog="python -m tools.bench", description="How fast it flies, beside RotorPy.")
     add_options(parser)
     args = parser.parse_args(argv)

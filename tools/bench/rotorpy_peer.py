@@ -1,4 +1,4 @@
-"""RotorPy, the peer to compare with: its Hummingbird under its SE(3) controller, in one process."""
+"""RotorPy, for comparison: its Hummingbird under its SE(3) controller, in one process."""
 
 import os
 import sys
@@ -12,12 +12,11 @@ MISSING = "RotorPy is not installed: pip install 'colibri-sitl[bench]' brings it
 
 
 def installed() -> bool:
-    """Tell whether RotorPy can be flown."""
     return find_spec("rotorpy") is not None
 
 
 def real_time_factor(frames_hz: int, duration_s: float) -> float:
-    """Fly a lemniscate; return simulated over wall-clock time. Loading is not counted."""
+    """Fly a lemniscate; return simulated over wall-clock time, without loading."""
     environment = _environment(frames_hz)
     with catch_warnings():
         simplefilter("ignore")

@@ -1,7 +1,6 @@
-"""How many tasks a second the scheduler of a cluster hands out, and how much memory it takes for them.
+"""Tasks a second and memory of a cluster's scheduler.
 
-`python -m tools.bench.scheduler [TASKS]`: a scheduler and two workers of many threads, and as jobs in place of flights
-a sleep of 10 ms, one a task.
+`python -m tools.bench.scheduler [TASKS]`: a scheduler and two workers of many threads; each task sleeps for 10 ms.
 """
 
 import subprocess
@@ -21,13 +20,11 @@ ALONE = ("--no-dashboard", "--host", "127.0.0.1")
 
 
 def sleeping(sleep_s: float, job: int) -> int:
-    """Sleep in place of a flight."""
     sleep(sleep_s)
     return job
 
 
 def main() -> None:
-    """Print tasks per second, and the scheduler's memory, every tenth of the way."""
     tasks = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     address = f"tcp://127.0.0.1:{PORT}"
     with ExitStack() as stack:

@@ -1,1 +1,1 @@
-"""Exceptions thrown into each part of a flight: what flies on, what lands, what is said."""
+"""Exceptions thrown into each part of a flight, and the outcome of each flight."""

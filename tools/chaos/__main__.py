@@ -22,11 +22,10 @@ from tools.chaos.places import PLACES, Thrower
 SPAN_S = 4.8
 """Over which the instants of a situation are spread."""
 TIMES = (1.0, inf)
-"""How many exceptions are thrown from an instant on: at each other instant one, at those between all."""
+"""Exceptions thrown from an instant on: one at every other instant, at those between all."""
 
 
 def main() -> int:
-    """Fly all cases; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tools.chaos", description=__doc__)
     parser.add_argument("--instants", type=int, default=20, help="of each situation (default %(default)s)")
     parser.add_argument("--place", action="append", default=[], metavar="NAME", help="only places that contain this")
@@ -50,7 +49,7 @@ def main() -> int:
 
 
 def table(cases: list[dict[str, Any]]) -> list[str]:
-    """Return a row for each place: what came of it in each situation, and what was said."""
+    """Return a row for each place: outcomes in each situation, and the most common STATUSTEXT."""
     outcomes: dict[str, dict[str, Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
     said: dict[str, Counter[str]] = defaultdict(Counter)
     for case in cases:
@@ -108,7 +107,6 @@ def _fly_situations(flight: Sitl, feedback: Feedback, places: list[str], instant
 
 
 def _wait(pid: int) -> None:
-    """Wait for a process, and end with it where it has failed."""
     if os.waitpid(pid, 0)[1] != 0:
         os._exit(1)
 
@@ -119,7 +117,6 @@ def _go_on(flight: Sitl, situation: str, seconds: float) -> None:
 
 
 def _fly(flight: Sitl, place: str, times: float, case: dict[str, Any], out: int) -> None:
-    """Fly one case in a process of its own."""
     pid = os.fork()
     if pid == 0:
         verdict = Flown(flight, case["situation"], Thrower(place, times)).judged()

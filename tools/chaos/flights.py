@@ -1,4 +1,4 @@
-"""The flights into which exceptions are thrown: a situation prepared, flown on, and judged."""
+"""Flights into which exceptions are thrown: a situation is prepared, flown on, and judged."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,13 +25,7 @@ _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 class Verdict(NamedTuple):
-    """What became of a flight.
-
-    Attributes:
-        outcome: "flown on", "landed", "not reached", or what did not hold.
-        thrown: How many exceptions were thrown.
-        said: The first STATUSTEXT about it.
-    """
+    """Outcome of a flight, the number of exceptions thrown, and the first STATUSTEXT about them."""
 
     outcome: str
     thrown: int
@@ -39,45 +33,38 @@ class Verdict(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether what must hold does."""
         return self.outcome in ("flown on", "landed", "not reached")
 
 
 @contextmanager
 def airborne(feedback: Feedback) -> Iterator[Sitl]:
-    """Fly a vehicle that hovers."""
     with Flights(setting_of([{"feedback": feedback, "strict": False}]), None) as flights:
         flight = flights.begin()
         flight.takeoff(HEIGHT_M)
         yield flight
 
 
-def hover(flight: Sitl) -> None:
-    """Hover."""
+def hover(flight: Sitl) -> None: ...
 
 
 def track(flight: Sitl) -> None:
-    """Fly the lemniscate."""
     flight.set_param("TRACK", 2)
     flight.select(Mode.TRACK)
     flight.run(4.0)
 
 
 def offboard(flight: Sitl) -> None:
-    """Fly by velocity setpoints."""
     flight.setpoint(velocity=(3.0, 1.0, 0.0))
     flight.select(Mode.OFFBOARD)
 
 
 def mission(flight: Sitl) -> None:
-    """Fly a mission."""
     there = ((20.0, 10.0), (-20.0, -10.0), (20.0, 10.0))
     flight.upload_mission(items.waypoint(east, north, 6.0) for east, north in there)
     flight.select(Mode.MISSION)
 
 
 def landing(flight: Sitl) -> None:
-    """Land."""
     flight.select(Mode.LAND)
     flight.run(0.5)
 
@@ -88,15 +75,14 @@ SITUATIONS: dict[str, Callable[[Sitl], None]] = {
 
 
 class Flown:
-    """A flight with a thrower in it, watched."""
+    """A flight with a thrower in it."""
 
     def __init__(self, flight: Sitl, situation: str, thrower: Thrower) -> None:
-        """Go on with a flight in a situation; the thrower is armed at once."""
         self._flight, self._situation, self._thrower = flight, situation, thrower
         self._frames = 0
 
     def judged(self) -> Verdict:
-        """Fly on, and judge."""
+        """Arm the thrower, fly on, and judge."""
         flight, copter = self._flight, self._flight.inside.copter
         flight.gcs.forget()
         self._thrower.arm()
@@ -129,7 +115,7 @@ class Flown:
         return "never landed"
 
     def _step(self) -> str:
-        """Fly a frame, with all that clients send; return what does not hold."""
+        """Fly a frame with all clients' traffic; return the violated condition, if any."""
         flight, n = self._flight, self._frames
         self._frames += 1
         if n % 25 == 1:

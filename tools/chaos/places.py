@@ -1,9 +1,8 @@
-"""Where exceptions are thrown: methods of the vehicle's parts, by module and dotted name."""
+"""Places for exceptions: methods of the vehicle's parts, by module and dotted name."""
 
-from collections.abc import Callable
 from importlib import import_module
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 PACKAGE = "colibri."
 
@@ -66,60 +65,28 @@ PLACES: tuple[str, ...] = (
 
 
 class ChaosError(Exception):
-    """Thrown."""
-
-
-class Found(NamedTuple):
-    """A place.
-
-    Attributes:
-        owner: The class.
-        name: Of its method.
-        method: Itself.
-    """
-
-    owner: type
-    name: str
-    method: Callable[..., Any]
-
-
-def found(place: str) -> Found:
-    """Return where a place is.
-
-    Raises:
-        AttributeError, ImportError: It is called otherwise by now.
-    """
-    module, _, dotted = place.partition(":")
-    owner_name, _, name = dotted.partition(".")
-    owner = getattr(import_module(PACKAGE + module), owner_name)
-    return Found(owner, name, vars(owner)[name])
+    """Thrown on purpose."""
 
 
 class Thrower:
-    """Throws in one place, from the moment it is armed.
-
-    Attributes:
-        thrown: How often it has.
-    """
+    """Throws in one place up to `times` exceptions while armed; `thrown` counts them."""
 
     def __init__(self, place: str, times: float = inf) -> None:
-        """Throw `times` times."""
-        self._place, self._times = found(place), times
+        module, _, dotted = place.partition(":")
+        owner, _, self._name = dotted.partition(".")
+        self._owner = getattr(import_module(PACKAGE + module), owner)
+        self._method = vars(self._owner)[self._name]
+        self._times = times
         self.thrown = 0
 
     def arm(self) -> None:
-        """Throw from now on."""
-        owner, name, method = self._place
-
         def throwing(*args: Any, **options: Any) -> Any:
             if self.thrown >= self._times:
-                return method(*args, **options)
+                return self._method(*args, **options)
             self.thrown += 1
-            raise ChaosError(name)
+            raise ChaosError(self._name)
 
-        setattr(owner, name, throwing)
+        setattr(self._owner, self._name, throwing)
 
     def disarm(self) -> None:
-        """Put the place back in order."""
-        owner, name, method = self._place
-        setattr(owner, name, method)
+        setattr(self._owner, self._name, self._method)

@@ -1,4 +1,4 @@
-"""One flight of two real processes under fire, and what must hold after it."""
+"""One flight of two real processes under fire, and the conditions checked after it."""
 
 import signal
 from hashlib import sha256
@@ -21,13 +21,12 @@ _EXIT_CODES = {"plant": 0, "autopilot": 130}
 
 
 class Outcome(NamedTuple):
-    """What a campaign came to.
+    """Outcome of a campaign.
 
     Attributes:
-        sent: Bad datagrams sent, by whom they were for and of which kind.
-        lost: Datagrams that the kernel dropped because a receiver was too slow.
+        sent: Bad datagrams, by receiver and kind.
+        lost: Datagrams dropped by the kernel because a receiver was too slow.
         memory_mib: Resident memory after a tenth of the flight and at its end, by process.
-        failures: What did not hold, in words.
     """
 
     sent: dict[tuple[str, str], int]
@@ -66,7 +65,7 @@ def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> Outcome:
 
 
 def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
-    """Wait until so much is flown; return why it never will be, if so."""
+    """Wait until `time_s` is flown; return the failure if the flight ends or stalls before."""
     flown_s, moved_at_s = -1.0, monotonic()
     while flown_s < time_s:
         sleep(_LOOK_EVERY_S)
@@ -82,7 +81,7 @@ def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
 
 
 def _end(processes: dict[str, Process]) -> list[str]:
-    """Let the plant end by itself and the autopilot by SIGINT; return what was wrong with that."""
+    """Let the plant end by itself and the autopilot by SIGINT; return wrong exit codes."""
     codes = {"plant": processes["plant"].wait()}
     processes["autopilot"].process.send_signal(signal.SIGINT)
     codes["autopilot"] = processes["autopilot"].wait()
@@ -90,7 +89,7 @@ def _end(processes: dict[str, Process]) -> list[str]:
 
 
 def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]:
-    """Compare what each process says it could not read with what it was sent: equal only if all of it arrived."""
+    """Compare unreadable datagrams counted and sent: equal only if all of them arrived."""
     failures = []
     for name, process in processes.items():
         counted = unreadable(process.events("ended")[-1]["dropped"])
@@ -116,7 +115,7 @@ def _rss(pid: int) -> int:
 
 
 def _kernel_drops(processes: dict[str, Process]) -> int:
-    """Sum the last column of /proc/net/udp over the sockets of the processes; 0 where there is no such file."""
+    """Sum the last column of /proc/net/udp over the sockets of the processes; 0 without such a file."""
     table = Path("/proc/net/udp")
     alive = [psutil.Process(process.process.pid) for process in processes.values() if process.process.poll() is None]
     ports = {connection.laddr.port for process in alive for connection in process.net_connections("udp4")}

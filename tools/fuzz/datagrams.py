@@ -1,8 +1,7 @@
-"""Datagrams that nobody should have to fear: random bytes, and frames whose CRC is right and whose content is not.
+"""Hostile datagrams: random bytes, and frames with a right CRC and wrong content.
 
-What is not made here, but by negligible chance, is what the genuine peer may say: a valid message that names just the
-moment awaited could not be told from the peer's own without signing. Neither is a frame interval asked for before the
-flight: whoever sends these datagrams begins with the flight.
+Left out are valid messages for the awaited moment, which only signing could tell from the peer's, and requests for a
+frame interval before the flight.
 """
 
 import random
@@ -26,7 +25,7 @@ from tools.fuzz.frames import (
 )
 
 FRAME_US = 100_000
-"""Between two frames of the flight under fire."""
+"""Interval of the flight under fire."""
 
 _CONVERSATION = (HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS)
 _SET_MESSAGE_INTERVAL = 511
@@ -36,15 +35,14 @@ _QUATERNIONS = ((1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.0, 0.6, 0.8, 0.0)
 
 
 class Fuzzer:
-    """Makes datagrams by chance, for one receiver: a method for each kind of them.
+    """Random datagrams for one `receiver`, and hostile ones in the name of its `peer`.
 
     Attributes:
-        moment_us: Simulated time that the flight is at, beyond its start: broken messages name it, valid ones never.
-        good: The last good datagram to the receiver, to be spoilt.
+        moment_us: Simulated time of the flight: broken messages carry it, valid ones never do.
+        good: The last good datagram to the receiver, to be corrupted.
     """
 
     def __init__(self, chance: random.Random, peer: Ids, receiver: Ids) -> None:
-        """Aim at `receiver`, in the name of its `peer` where that is hostile; all chance comes from `chance`."""
         self._chance = chance
         self._peer = peer
         self._receiver = receiver
@@ -65,7 +63,7 @@ class Fuzzer:
         )
 
     def random(self) -> bytes:
-        """Return random bytes; some begin like a frame, some are a good or hostile datagram, spoilt."""
+        """Return random bytes; some begin like a frame, some are a corrupted good or hostile datagram."""
         chance = self._chance
         kind = chance.randrange(4)
         if kind == 0:
@@ -79,19 +77,18 @@ class Fuzzer:
         return bytes(spoilt)
 
     def hostile(self) -> bytes:
-        """Return one to three pieces with right CRCs and wrong contents."""
+        """Return one to three frames with right CRCs and wrong contents."""
         # The same half all along a datagram: a receiver takes the last of each, and two good ones would be a frame.
         self._attitude_is_broken = self._chance.random() < 0.5
         return b"".join(self._chance.choice(self._kinds)() for _ in range(self._chance.choice((1, 1, 1, 2, 3))))
 
     def _any_message(self) -> bytes:
-        """Any message of the dialect, those of the conversation more often, with random bits."""
         message_id = self._chance.choice((self._chance.choice(KNOWN), self._chance.choice(_CONVERSATION)))
         payload = self._chance.randbytes(payload_size(message_id))
         return frame(message_id, payload, self._peer, sequence=self._chance.randrange(256))
 
     def _wrong_length(self) -> bytes:
-        """A message of the conversation cut short, which MAVLink fills with zeros, or longer than it is defined."""
+        """Return a message cut short, which MAVLink fills with zeros, or longer than defined."""
         length = self._chance.choice((0, 1, self._chance.randrange(2, 12), self._chance.randrange(256), 255))
         payload = self._chance.choice((b"\xff" * length, self._chance.randbytes(length)))
         return frame(self._chance.choice(_CONVERSATION), payload, self._peer)
@@ -101,12 +98,12 @@ class Fuzzer:
         return frame(message_id, self._chance.randbytes(self._chance.randrange(256)), self._peer)
 
     def _foreign(self) -> bytes:
-        """What the peer could well have said just now, said by somebody else."""
+        """Return a plausible message of the peer from another source."""
         source = self._chance.choice(((2, self._peer[1]), (self._peer[0], 77), self._receiver, (255, 190), (0, 0)))
         return self._valid_state(self.moment_us, source) + self._valid_actuators(self.moment_us, source)
 
     def _state(self) -> bytes:
-        """Both halves of a frame in the peer's name: one of them broken, one missing, or the frame out of step."""
+        """Return both halves of a frame: one broken, one missing, or the frame out of step."""
         kind = self._chance.randrange(3)
         if kind == 0:
             return self._valid_state(self._another_moment_us(), self._peer)
@@ -121,7 +118,7 @@ class Fuzzer:
         return self._chance.choice((attitude + position, position + attitude, attitude, position))
 
     def _actuators(self) -> bytes:
-        """A command in the peer's name: for this moment with a control that no rotor can follow, or for another."""
+        """Return an impossible control for this moment, or a command for another moment."""
         if self._chance.random() < 0.5:
             return self._valid_actuators(self._another_moment_us(), self._peer)
         controls = [self._chance.random() for _ in range(16)]
@@ -129,7 +126,7 @@ class Fuzzer:
         return frame(ACTUATORS, pack("<QQ16fB", self.moment_us, 1, *controls, 0xFF), self._peer)
 
     def _command(self) -> bytes:
-        """A command: any, or another frame interval, which a flight that has begun must refuse."""
+        """Return any command, or another frame interval, which must be refused in flight."""
         command = self._chance.choice((_SET_MESSAGE_INTERVAL, 400, self._chance.randrange(65536)))
         message_id = self._chance.choice((float(ATTITUDE), self._value()))
         interval_us = self._chance.choice((1000.0, 50_000.0, 1e6, self._value()))
@@ -143,7 +140,7 @@ class Fuzzer:
         return frame(ACK, pack("<H", command) + self._chance.randbytes(8), self._peer)
 
     def _flagged(self) -> bytes:
-        """A frame that says it is signed, its signature random, or with flags that nobody knows."""
+        """Return a frame flagged as signed, with a random signature, or with unknown flags."""
         flags = self._chance.choice((1, 1, 1, self._chance.randrange(2, 256)))
         signature = self._chance.randbytes(13) if flags & 1 else b""
         time_us = self._another_moment_us()
@@ -157,7 +154,7 @@ class Fuzzer:
         return frame_v1(message_id, self._chance.randbytes(payload_size(message_id)), self._peer)
 
     def _another_moment_us(self) -> int:
-        """Return a moment that a receiver of this datagram neither awaits nor soon will."""
+        """Return a moment that the receiver neither awaits nor soon will."""
         chance = self._chance
         past = self.moment_us - FRAME_US * chance.randrange(1, 100)
         future = self.moment_us + FRAME_US * chance.randrange(10, 1000)

@@ -1,4 +1,4 @@
-"""A vehicle and its clients without processes or files: a million messages take minutes."""
+"""A vehicle and its clients in one process, without files: a million messages take minutes."""
 
 from typing import Any
 
@@ -28,23 +28,15 @@ STANDING = Start()
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 _AS_IT_IS = load_profile("flight")
 _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
-"""With a frame for each control sample and none between: a third less to compute."""
+"""A frame for each control sample, without frames between: a third less to compute."""
 
 
 class BareFlight(Stepped, Steered):
-    """A vehicle and the clients that it hears.
-
-    Attributes:
-        system: The vehicle's system id.
-        plant: The plant.
-        client: The first ground station.
-        rotors: The last command to the plant.
-    """
+    """A vehicle and its clients; `client` is the first ground station, `rotors` the last command."""
 
     system = SYSTEM
 
     def __init__(self, files: Files | None = None) -> None:
-        """Stand on the ground; the vehicle writes to `files`."""
         self._vehicle = load_vehicle(_PROFILE.simulation.vehicle)
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=DEFAULT_ORIGIN, files=files)
         self.client = Client()
@@ -60,28 +52,24 @@ class BareFlight(Stepped, Steered):
 
     @property
     def copter(self) -> Copter:
-        """The vehicle that ground stations fly."""
         return self._flight.autopilot.stages
 
     @property
     def time_us(self) -> int:
-        """Simulated time, µs."""
         return self.plant.world.time_us
 
     @property
     def position(self) -> Vector:
-        """Of the plant, m, ENU."""
         x, y, z = self.plant.world.state[6:9]
         return (x, y, z)
 
     def add(self, client: Client) -> Client:
-        """Connect another client."""
         self._clients.append(client)
         self.copter.stations.hub.open(client.link, client.address)
         return client
 
     def restart(self) -> None:
-        """Start the autopilot again, wherever the vehicle is."""
+        """Restart the autopilot, wherever the vehicle is."""
         self._flight = Flight(self.plant, self._new_autopilot(), Direct())
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
@@ -90,11 +78,9 @@ class BareFlight(Stepped, Steered):
         return copter_autopilot(_PROFILE, self._vehicle, self._settings, lambda: 0.0, strict=True)
 
     def reset_world(self, start: Start) -> None:
-        """Reset the plant to `start` at this time."""
         self.plant.world = starting_world(start, self._vehicle)._replace(time_us=self.time_us)
 
     def step(self) -> None:
-        """Fly one frame."""
         sample = self._flight.step([received for client in self._clients for received in client.take_sent()])
         self.rotors = sample.command
         for link, address, datagram in sample.to_stations:
@@ -103,11 +89,10 @@ class BareFlight(Stepped, Steered):
                     client.receive(datagram)
 
     def send(self, name: str, *fields: Any) -> None:
-        """Send a message from the first client."""
         self.client.send(name, *fields)
 
     def command(self, number: int, *params: float) -> int:
-        """Send a COMMAND_LONG and return the MAV_RESULT; parameters that are left out are 0."""
+        """Send a COMMAND_LONG; return the MAV_RESULT. Missing parameters are 0."""
         before = len(self.client.acks)
         values = (*params, *(0.0,) * (7 - len(params)))
         self.send("COMMAND_LONG", SYSTEM, COMPONENT, number, 0, *values)

@@ -1,4 +1,4 @@
-"""MAVLink frames by hand, around any payload: only the ids, sizes and CRC extras are pymavlink's."""
+"""MAVLink frames by hand, around any payload: only ids, sizes and CRC extras are pymavlink's."""
 
 import struct
 
@@ -17,22 +17,17 @@ _CRC_EXTRA_OF_THE_UNKNOWN = 0
 
 
 def frame(message_id: int, payload: bytes, source: Ids, *, sequence: int = 0, flags: int = 0) -> bytes:
-    """Return a MAVLink 2 frame with a right CRC, of any id and any payload up to 255 bytes.
-
-    `flags` are incompatibility flags; the signature that flag 1 promises is not appended.
-    """
+    """Return a MAVLink 2 frame with a right CRC, without the signature that flag 1 promises."""
     header = struct.pack("<BBBBBB", len(payload), flags, 0, sequence, *source) + message_id.to_bytes(3, "little")
     return b"\xfd" + header + payload + _crc(header + payload, message_id)
 
 
 def frame_v1(message_id: int, payload: bytes, source: Ids) -> bytes:
-    """Return a MAVLink 1 frame with a right CRC, of a message whose id is below 256."""
     body = struct.pack("<BBBBB", len(payload), 0, *source, message_id) + payload
     return b"\xfe" + body + _crc(body, message_id)
 
 
 def payload_size(message_id: int) -> int:
-    """Return the length of a message's payload in bytes."""
     return int(common.mavlink_map[message_id].unpacker.size)
 
 

@@ -1,4 +1,4 @@
-"""The campaign against the ground-station side: messages fired at a vehicle in every mode it has."""
+"""The campaign against the ground-station side: messages fired at a vehicle in every mode."""
 
 import gc
 import random
@@ -16,21 +16,18 @@ from tools.fuzz.vehicle import SITUATIONS, BrokenError, Target
 
 MAX_GROWTH_MIB = 4.0
 FEWEST_FOR_MEMORY = 200_000
-"""Messages: after fewer, resident memory shows how the allocator takes it from the system, not what is kept."""
+"""With fewer messages, resident memory shows the allocator's habits instead of leaks."""
 _A_FRAME = 40
 _FRAMES_A_SITUATION = 15
 
 
 class GroundOutcome(NamedTuple):
-    """What a campaign came to.
+    """Outcome of a campaign.
 
     Attributes:
-        sent: Messages, by the state that they met.
-        accepted: How many commands were accepted.
-        kinds: How many different commands those were.
-        flown_s: Simulated time.
+        sent: Messages, by the state of the vehicle.
+        kinds: Number of different commands accepted.
         memory_mib: Resident memory after half of the messages and at the end.
-        failures: What did not hold, in words.
     """
 
     sent: dict[State, int]
@@ -42,7 +39,7 @@ class GroundOutcome(NamedTuple):
 
 
 def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> GroundOutcome:
-    """Fire `quota` messages, the same number in every situation; the vehicle writes to `files`; None: to memory."""
+    """Fire `quota` messages, equally in every situation; the vehicle writes to `files`, or to memory."""
     chance = random.Random(seed)
     target = Target(chance, files)
     sent = 0
@@ -69,10 +66,9 @@ def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> Gro
 
 
 def growth_mib(samples: Sequence[float]) -> float:
-    """Return by how much memory grows over samples at equal intervals, as a leak does: again and again.
+    """Return the growth of memory over samples at equal intervals: five times the median over sixths of them.
 
-    That is the median growth from one sixth of them to the next, five times. A single step, by which the allocator gets
-    its next piece of memory, counts for nothing, whenever it comes.
+    A leak grows again and again; a single step is the allocator's next piece of memory, and does not count.
     """
     sixths = [samples[i * len(samples) // 6 : (i + 1) * len(samples) // 6] for i in range(6)]
     if not all(sixths):
@@ -81,7 +77,7 @@ def growth_mib(samples: Sequence[float]) -> float:
 
 
 def _fire(target: Target, situation: State, chance: random.Random, quota: int) -> int:
-    """Fire up to `quota` messages in a situation, or until that is no longer of use; return how many."""
+    """Fire up to `quota` messages, or until the vehicle is lost; return their number."""
     target.prepare(situation)
     sent = 0
     while sent < quota and not target.lost:

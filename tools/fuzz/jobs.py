@@ -1,4 +1,4 @@
-"""Campaigns of many seeds: each is a job of its own, and lines of one table."""
+"""Fuzzing campaigns by seed: each is a job, and rows of one table."""
 
 import tempfile
 from pathlib import Path
@@ -14,13 +14,7 @@ HEADER = f"{'fired at':<16}{'seed':>6}{'sent':>10}{'MiB before':>12}{'after':>9}
 
 
 class Job(NamedTuple):
-    """A campaign with one seed.
-
-    Attributes:
-        seed: Of all chance.
-        datagrams: Of each kind, to each process, between plant and autopilot; 0: from ground stations instead.
-        messages: From ground stations.
-    """
+    """A campaign with one seed: `datagrams` of each kind to each process, or `messages` from ground stations."""
 
     seed: int
     datagrams: int
@@ -28,21 +22,20 @@ class Job(NamedTuple):
 
 
 class Result(NamedTuple):
-    """Lines of the table, and what did not hold."""
+    """Rows of the table, and failures."""
 
     lines: list[str]
     failures: list[str]
 
 
 def fire(job: Job) -> Result:
-    """Run one campaign; an exception of the vehicle is a failure like others, and the seed flies it again."""
+    """Run one campaign; an exception of the vehicle is a failure, which the seed reproduces."""
     started_s = perf_counter()
     with tempfile.TemporaryDirectory() as name:
         return (_lockstep if job.datagrams else _ground)(job, Path(name), started_s)
 
 
 def _lockstep(job: Job, folder: Path, started_s: float) -> Result:
-    """Fire between plant and autopilot."""
     outcome = campaign(folder, job.datagrams, burst=BURST, seed=job.seed)
     failures = outcome.failures + [f"{outcome.lost} datagrams never arrived"] * (outcome.lost > 0)
     lines = []
@@ -53,7 +46,6 @@ def _lockstep(job: Job, folder: Path, started_s: float) -> Result:
 
 
 def _ground(job: Job, path: Path, started_s: float) -> Result:
-    """Fire from ground stations."""
     folder = Folder(path)
     outcome = ground_campaign(job.messages, seed=job.seed, files=folder)
     folder.close()

@@ -1,4 +1,4 @@
-"""A flight of the thesis's spiral within this process, through both ends of the conversation, with or without fire."""
+"""The thesis's spiral flown in this process, with or without fire on the wire."""
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.track_stages import track_autopilot
@@ -16,23 +16,20 @@ NOW_S = 0.0
 
 
 class HostileWire(InMemory):
-    """A wire on which hostile datagrams lie before and after each good one."""
+    """A wire with `burst` hostile datagrams before and after each good one; fuzzer 0 aims at the plant."""
 
     def __init__(self, burst: int = 0, fuzzers: tuple[Fuzzer, Fuzzer] | None = None) -> None:
-        """Put `burst` datagrams on each side: the first of `fuzzers` makes those to the plant."""
         self._burst, self._fuzzers, self._now_us = burst, fuzzers, 0
         super().__init__(FRAME_US, Feedback.STATE)
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return the plant's datagrams among hostile ones."""
         return self._among(datagrams, 1)
 
     def carried_down(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return the autopilot's datagrams among hostile ones."""
         return self._among(datagrams, 0)
 
     def at(self, now_us: int) -> None:
-        """Take in the time, which hostile datagrams name; at the start of the flight there are none."""
+        """Set the time in hostile datagrams; at 0 they are left out."""
         self._now_us = now_us
 
     def _among(self, datagrams: list[bytes], which: int) -> list[bytes]:
@@ -45,7 +42,6 @@ class HostileWire(InMemory):
 
 
 def fly(frames: int, wire: HostileWire) -> list[State]:
-    """Fly so many frames over `wire`; return the states. The wall clock stands still."""
     profile = load_profile("thesis")
     vehicle = load_vehicle(profile.simulation.vehicle)
     autopilot = track_autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)

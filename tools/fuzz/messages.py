@@ -1,4 +1,4 @@
-"""Messages with right CRCs and any contents, as anybody on a ground-station link may send them to a vehicle."""
+"""Messages with right CRCs and any contents, as anyone on a ground-station link may send them."""
 
 import random
 import struct
@@ -36,14 +36,7 @@ class _Field(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """A message on its way.
-
-    Attributes:
-        name: Its name.
-        source: Who says that it is from them.
-        fields: By name.
-        frame: The bytes.
-    """
+    """A message on its way, with its claimed source."""
 
     name: str
     source: tuple[int, int]
@@ -52,23 +45,16 @@ class Sent(NamedTuple):
 
     @property
     def wants_answer(self) -> bool:
-        """Whether it is a command to the vehicle, which acknowledges every one."""
+        """Whether it is a command to the vehicle, which must acknowledge it."""
         if self.name not in COMMANDS or self.source == VEHICLE:
             return False
         return self.fields["target_system"] in (0, VEHICLE[0]) and self.fields["target_component"] in (0, VEHICLE[1])
 
 
 class Messages:
-    """Makes messages by chance.
-
-    Attributes:
-        chance: Where all chance comes from.
-        parameters: Names that are in use, for requests of parameters.
-        commands: Commands that the vehicle knows.
-    """
+    """Random messages, with `parameters` and `commands` that are in use."""
 
     def __init__(self, chance: random.Random, parameters: Sequence[str], commands: Sequence[int]) -> None:
-        """Take all chance from `chance`."""
         self.chance = chance
         self.parameters = tuple(parameters)
         self.commands = tuple(commands)
@@ -94,11 +80,10 @@ class Messages:
         }
 
     def any(self) -> Sent:
-        """Return a message of the dialect, those that a vehicle listens to more often than others."""
+        """Return any message of the dialect, more often one that a vehicle handles."""
         return self.of(self._pick(_OFTEN) if self.chance.random() < 0.8 else self._pick(self._names))
 
     def of(self, name: str) -> Sent:
-        """Return a message of a name, with any contents."""
         layout = self._layouts[name]
         self._wild = self.chance.random() < 0.6
         fields = {field.name: self._field(field) for field in layout}
@@ -111,11 +96,10 @@ class Messages:
         return self.sent(name, self._pick(SOURCES), fields)
 
     def sent(self, name: str, source: tuple[int, int], fields: dict[str, Any]) -> Sent:
-        """Return a message of a name from a source, with these contents."""
         return Sent(name, source, fields, self._codecs[source].encode(name, *fields.values()))
 
     def _near(self, fields: dict[str, Any], *, in_degrees: bool) -> None:
-        """Often name a place that can be flown to."""
+        """In most cases, replace coordinates by a place within reach."""
         chance = self.chance
         if chance.random() < 0.3:
             return
@@ -193,7 +177,7 @@ class Messages:
 
 
 def _fitting(value: int, kind: str) -> float:
-    """Return a whole number as a field of its kind holds it."""
+    """Wrap a number to the range of its field."""
     if kind in ("float", "double"):
         return float(value)
     bits = _BITS[kind]

@@ -1,4 +1,4 @@
-"""A relay that hides each good datagram in a burst of bad ones, from the address that the good ones come from."""
+"""A relay that hides each good datagram in a burst of bad ones from the same address."""
 
 import random
 import socket
@@ -10,24 +10,19 @@ from tools.fuzz.frames import ACTUATORS, ATTITUDE, AUTOPILOT, PLANT
 from tools.harness.relay import Relay
 
 UNREADABLE = ("malformed", "unknown", "truncated")
-"""What a codec counts by the datagram alone, whatever the receiver waits for."""
+"""Counts of a codec that depend on the datagram alone."""
 
 _RECEIVE_BUFFER = 2**20
 
 
 class FuzzingRelay(Relay):
-    """A relay with an attacker in it.
+    """A relay with an attacker in it; `sent` counts bad datagrams by receiver and kind.
 
-    A burst goes with the first datagram that names a moment, never with one sent again: two bursts at most wait in a
-    receiver's buffer, whatever it makes of them. What the genuine autopilot asks for before a flight is no attack, and
-    a message cut to nothing names time 0, so the first frame and its answer pass undisturbed.
-
-    Attributes:
-        sent: Bad datagrams sent so far, by whom they were for and of which kind.
+    A burst goes with the first datagram of each moment, never with a repeated one: at most two bursts wait in a
+    receiver's buffer. Requests before the flight, the first frame and its answer pass undisturbed.
     """
 
     def __init__(self, plant_url: str, *, burst: int, quota: int, seed: int) -> None:
-        """Relay to the plant; send bursts of `burst`, half random and half hostile, up to `quota` of each each way."""
         super().__init__(plant_url)
         for sock in (self._near, self._far):
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
@@ -43,11 +38,10 @@ class FuzzingRelay(Relay):
         self.sent = {(to, kind): 0 for to in self._fuzzers for kind in ("random", "hostile")}
 
     def unreadable(self, to: str) -> dict[str, int]:
-        """Return what the codec of `to` must have counted if every bad datagram arrived."""
+        """Return the counts that the codec of `to` must have if every bad datagram arrived."""
         return unreadable(self._twins[to].dropped)
 
     def pass_on(self, to: str, datagram: bytes) -> None:
-        """Send it on, somewhere in a burst if it is what the flight goes on with."""
         moment_us = _moment_us(datagram)
         datagrams = []
         if moment_us > self._moments_us[to]:
@@ -70,12 +64,11 @@ class FuzzingRelay(Relay):
 
 
 def unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
-    """Return those counts of a receiver that the datagrams alone decide."""
     return {reason: dropped.get(reason, 0) for reason in UNREADABLE}
 
 
 def _moment_us(datagram: bytes) -> int:
-    """Return the simulated time of a command or a frame of the flight, 0 of anything else."""
+    """Return the simulated time of a command or frame, 0 for anything else."""
     message_id = int.from_bytes(datagram[7:10], "little")
     if message_id == ACTUATORS:
         return int.from_bytes(datagram[10:18], "little")

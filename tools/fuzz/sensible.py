@@ -1,4 +1,4 @@
-"""Which commands a vehicle may accept, said once more and apart from the code that decides it."""
+"""Commands that a vehicle may accept, stated independently of the code that accepts them."""
 
 from collections.abc import Callable, Mapping
 from math import isfinite, isnan, nan, pi
@@ -14,7 +14,7 @@ _WITHOUT_PLACE = mav.MAV_FRAME_MISSION
 
 
 class Asked(NamedTuple):
-    """The parameters of a COMMAND_LONG or COMMAND_INT; x and y in degrees, nan where they are not given."""
+    """Parameters of a COMMAND_LONG or COMMAND_INT; x and y in degrees, nan if missing."""
 
     p1: float
     p2: float
@@ -26,7 +26,6 @@ class Asked(NamedTuple):
 
 
 def asked(fields: Mapping[str, Any]) -> Asked:
-    """Return the parameters of a command's message."""
     p1, p2, p3, p4 = (fields[f"param{number}"] for number in range(1, 5))
     if "x" not in fields:
         return Asked(p1, p2, p3, p4, fields["param5"], fields["param6"], fields["param7"])
@@ -52,7 +51,6 @@ def _speed(value: float) -> bool:
 
 
 def _place(a: Asked) -> bool:
-    """Nowhere, or on earth; a height or none."""
     nowhere = isnan(a.x) and isnan(a.y)
     return (nowhere or is_on_earth(a.x, a.y)) and _nan_or(a.z, lambda z: abs(z) < 20_000.0)
 
@@ -89,7 +87,7 @@ SENSIBLE: Mapping[int, Callable[[Asked], bool]] = {
     mav.MAV_CMD_DO_SET_MISSION_CURRENT: lambda a: _whole(-1, 65535)(a.p1) and _nan_or(a.p2, _one_of(0.0, 1.0)),
     mav.MAV_CMD_DO_SET_STANDARD_MODE: lambda a: _whole(1, 8)(a.p1),
 }
-"""By MAV_CMD: whether a command with such parameters could be meant. What is not here has none that matter."""
+"""By MAV_CMD: whether such parameters make sense. The parameters of other commands do not matter."""
 HARMLESS: tuple[int, ...] = (
     mav.MAV_CMD_NAV_LAND,
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH,

@@ -1,4 +1,4 @@
-"""A vehicle that ground stations fire messages at, and what must hold at every step of its flight."""
+"""A vehicle under fire from ground stations, and the conditions checked at every step."""
 
 import random
 from collections import Counter
@@ -21,7 +21,7 @@ from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
 from tools.harness.client import COMPONENT, SYSTEM, Client
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
-"""Falling: what lies still has landed."""
+"""Falling: a vehicle at rest has landed."""
 _MAX_REFERENCE_M_S = 60.0
 _MAX_DISTANCE_M, _MAX_HOME_DISTANCE_M = 2_000.0, 101_000.0
 _ACK = mav.MAVLINK_MSG_ID_COMMAND_ACK
@@ -40,14 +40,13 @@ SITUATIONS: tuple[State, ...] = (
 
 
 class BrokenError(AssertionError):
-    """Something did not hold."""
+    """A condition is violated."""
 
 
 class Shooter(Client):
-    """Receives nothing but acknowledgements: decoding all requested telemetry would take too long."""
+    """A client that decodes acknowledgements only: all requested telemetry would take too long."""
 
     def receive(self, datagram: bytes) -> None:
-        """Decode the COMMAND_ACKs of a datagram of whole frames."""
         at = 0
         while at < len(datagram):
             assert datagram[at] == MARKER, "the vehicle sends MAVLink 2 alone, but for what it forwards"
@@ -58,17 +57,9 @@ class Shooter(Client):
 
 
 class Target:
-    """One vehicle under fire from three places.
-
-    Attributes:
-        flight: The vehicle.
-        messages: Makes what is fired.
-        sent: How many, by the mode that they met and whether it was armed.
-        accepted: How many commands were, by number.
-    """
+    """One vehicle under fire from three places; `sent` counts by its state, `accepted` by MAV_CMD."""
 
     def __init__(self, chance: random.Random, files: Files | None = None) -> None:
-        """Begin on the ground; all chance comes from `chance`."""
         self.flight = BareFlight(files=files)
         self.messages = Messages(chance, [parameter.name for parameter in self.flight.copter.parameters], COMMANDS)
         self.sent: Counter[State] = Counter()
@@ -77,18 +68,12 @@ class Target:
         self._unanswered: list[list[Sent]] = [[] for _ in _PORTS]
 
     def shoot(self, sent: Sent, place: int) -> None:
-        """Send one message with the next frame, from one of the places."""
         self._shooters[place].send_raw(sent.frame)
         self.sent[self.flight.copter.pilot.state] += 1
         if sent.wants_answer:
             self._unanswered[place].append(sent)
 
     def step(self) -> None:
-        """Fly one frame, and check everything.
-
-        Raises:
-            BrokenError: Something did not hold.
-        """
         for client in (*self._shooters, self.flight.client):
             client.forget()
         self.flight.step()
@@ -101,7 +86,7 @@ class Target:
             self.flight.restart()
 
     def _check_answers(self, commands: list[Sent], acks: list[Any]) -> None:
-        """Every command is acknowledged once, to who sent it, and only what can be meant is accepted."""
+        """Check that each command is acknowledged once, to its sender, and accepted only if sensible."""
         requested = [(one.fields["command"], *one.source) for one in commands]
         answered = [(ack.command, ack.target_system, ack.target_component) for ack in acks]
         _must(requested == answered, f"requested {requested}, answered {answered}")
@@ -112,7 +97,7 @@ class Target:
                 _must(sensible is None or sensible(asked(one.fields)), f"accepted {one}")
 
     def prepare(self, state: State) -> None:
-        """Reset a situation: everything as it is after the start but for the mode, and where it flies."""
+        """Reset everything to the start, then set up mode and place."""
         flight, copter = self.flight, self.flight.copter
         copter.parameters.reset()
         copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
@@ -139,7 +124,6 @@ class Target:
         _must(copter.pilot.state == state, f"{copter.pilot.state} instead of {state}")
 
     def _meet(self, mode: Mode) -> None:
-        """Meet what a mode needs."""
         if mode in MANUAL:
             self.flight.stick()
         elif mode is Mode.OFFBOARD:
@@ -161,17 +145,12 @@ class Target:
 
     @property
     def lost(self) -> bool:
-        """Whether the vehicle is so far away that nothing more is to be learnt there."""
         x, y, z = self.flight.position
         return hypot(x, y, z) > _MAX_DISTANCE_M or z < -1.0
 
 
 def check(flight: BareFlight) -> None:
-    """Check what must hold at every step.
-
-    Raises:
-        BrokenError: It does not.
-    """
+    """Raise a `BrokenError` unless the conditions of every step hold."""
     pilot = flight.copter.pilot
     controls = flight.rotors.controls
     _must(all(0.0 <= control <= 1.0 for control in controls), f"rotors commanded to {controls}")

@@ -1,1 +1,1 @@
-"""The golden flights on other computers: hashes to compare with, and what makes one computer into another."""
+"""The golden flights as on other computers: libraries and kernels chosen for other CPUs, hashes compared."""

@@ -13,7 +13,6 @@ from tools.golden.variations import ROOT, Flown, Variation, VariationError, fly,
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Fly as the command line says; return the exit code."""
     args = _arguments(argv)
     try:
         if args.pythons:
@@ -24,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def table(flown: Mapping[str, Flown]) -> str:
-    """Return flights × variations as Markdown: which differ, and how long each variation took."""
+    """Return flights × variations as Markdown: differences, and the duration of each variation."""
     names = list(flown)
     flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
     differing = {name: each.differing() for name, each in flown.items()}

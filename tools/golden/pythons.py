@@ -1,4 +1,4 @@
-"""Every Python that this computer has and that can run the project, each in an environment of its own from the lock."""
+"""Other Python versions on this computer, each in its own environment from the lock."""
 
 import shutil
 import subprocess
@@ -8,12 +8,12 @@ from pathlib import Path
 MIN_MINOR, MAX_MINOR = 11, 19
 """Minor versions of Python 3 to look for."""
 _MADE_FROM = ("requirements.lock", "pyproject.toml")
-"""What an environment is installed from: one that is older is stale."""
+"""Sources of an environment: if it is older, it is stale."""
 _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 
 def environments(root: Path) -> dict[str, Path]:
-    """Return the interpreters of the environments that are set up beside .venv, by version."""
+    """Return the interpreters of the environments beside .venv, by version."""
     found = {}
     for minor in range(MIN_MINOR, MAX_MINOR + 1):
         folder = root / f".venv-3.{minor}"
@@ -23,7 +23,7 @@ def environments(root: Path) -> dict[str, Path]:
 
 
 def other_pythons() -> dict[str, Path]:
-    """Return an interpreter of each version that the computer has, but of the one that runs this."""
+    """Return an interpreter of each version found, except the running one."""
     found = {}
     for minor in range(MIN_MINOR, MAX_MINOR + 1):
         for python in _candidates(minor):
@@ -34,17 +34,13 @@ def other_pythons() -> dict[str, Path]:
 
 
 def is_stale(root: Path, version: str) -> bool:
-    """Return whether the environment of a version is not there, or lock or package have changed since it was made."""
+    """Return whether an environment is missing, or older than lock or package."""
     ready = root / f".venv-{version}" / ".ready"
     return not ready.exists() or ready.stat().st_mtime <= max((root / name).stat().st_mtime for name in _MADE_FROM)
 
 
 def set_up(root: Path, version: str, python: Path) -> None:
-    """Make the environment of a version from the lock, unless there is one that is not stale.
-
-    Raises:
-        subprocess.CalledProcessError: It cannot be made; its output says why.
-    """
+    """Make an environment from the lock, unless it is current."""
     if not is_stale(root, version):
         return
     folder = root / f".venv-{version}"
@@ -59,7 +55,7 @@ def set_up(root: Path, version: str, python: Path) -> None:
 
 
 def _candidates(minor: int) -> list[Path]:
-    """Return where a version may be: in pyenv's folder, the latest first, and on the path."""
+    """Return possible interpreters: pyenv's, latest first, then the path's."""
     kept = Path.home() / ".pyenv" / "versions"
     pyenv = sorted(kept.glob(f"3.{minor}.*"), key=lambda folder: [_number(part) for part in folder.name.split(".")])
     on_path = shutil.which(f"python3.{minor}")
@@ -71,7 +67,7 @@ def _number(part: str) -> int:
 
 
 def _version(python: Path) -> str:
-    """Return which Python it is; nothing where it does not run."""
+    """Return the version of an interpreter; empty if it does not run."""
     try:
         said = subprocess.run([str(python), "-c", _SAYS_VERSION], capture_output=True, text=True, check=False)
     except OSError:

@@ -1,4 +1,4 @@
-"""Other computers, as far as one can pass for them: what libraries choose by the CPU is chosen for them."""
+"""Other computers, simulated: choices that libraries make by the CPU are forced."""
 
 import json
 import os
@@ -27,7 +27,7 @@ _AVX512 = (*_AVX2, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
 
 
 class VariationError(Exception):
-    """The flights of a variation did not come to an end."""
+    """The flights of a variation did not end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,11 +35,9 @@ class Variation:
     """Another computer.
 
     Attributes:
-        name: What it is called.
-        environment: Variables that its processes have beside the usual ones.
-        needs: Flags that the CPU must have, as /proc/cpuinfo names them: what is chosen is executed.
-        lacks: Why it cannot be flown here whatever the CPU is; empty where it can.
-        python: The interpreter.
+        environment: Additional variables of its processes.
+        needs: Required flags of the CPU, as in /proc/cpuinfo.
+        lacks: Why it cannot be flown here on any CPU; empty if it can.
     """
 
     name: str
@@ -49,30 +47,24 @@ class Variation:
     python: Path = Path(sys.executable)
 
     def obstacle(self) -> str:
-        """Return why it cannot be flown on this computer; empty where it can."""
+        """Return why it cannot be flown here; empty if it can."""
         missing = [flag for flag in self.needs if flag not in cpu_flags()]
         return self.lacks or (f"this CPU has no {', '.join(missing)}" if missing else "")
 
 
 class Flown(NamedTuple):
-    """What came of the golden flights under a variation.
-
-    Attributes:
-        hashes: Of each flight; empty where it did not end.
-        took_s: Wall-clock time, start of the process and compilation included.
-    """
+    """Hash of each golden flight, empty if it did not end, and the wall-clock time with start and compilation."""
 
     hashes: dict[str, str]
     took_s: float
 
     def differing(self) -> dict[str, tuple[str, str]]:
-        """Return of each flight that is not the golden one the expected and the found hash."""
+        """Return the expected and the found hash of each flight that differs."""
         golden: dict[str, str] = json.loads(HASHES.read_text(encoding="utf-8"))
         return {name: (golden[name], found) for name, found in self.hashes.items() if found != golden[name]}
 
 
 def variations() -> list[Variation]:
-    """Return all variations, the computer as it is first."""
     return [
         Variation(name="as-it-is"),
         *(_openblas(core, needs) for core, needs in _OPENBLAS_CORES.items()),
@@ -98,7 +90,7 @@ def _openblas(core: str, needs: Sequence[str]) -> Variation:
 
 
 def _numpy_without_simd() -> Variation:
-    """Return that of a numpy that uses only what every x86 CPU has; what this CPU lacks must not be named."""
+    """Disable the CPU features that numpy found here: others must not be named."""
     found: list[str] = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Variation(
         name="numpy-without-simd",
@@ -108,7 +100,7 @@ def _numpy_without_simd() -> Variation:
 
 
 def _numba(cpu: str, needs: Sequence[str]) -> Variation:
-    """Return that of kernels compiled for a CPU and, without its features said, for no more than it has."""
+    """Compile kernels for a CPU; empty features restrict them to its own."""
     kept = Path(sys.prefix) / "golden-kernels" / cpu
     environment = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kept)}
     lacks = "" if platform.machine() in ("x86_64", "AMD64") else "not an x86 CPU"
@@ -124,7 +116,6 @@ def _python(version: str, python: Path) -> Variation:
 
 @cache
 def cpu_flags() -> frozenset[str]:
-    """Return what the CPU can, as /proc/cpuinfo names it; nothing where there is no such file."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -133,11 +124,7 @@ def cpu_flags() -> frozenset[str]:
 
 
 def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> Flown:
-    """Fly the golden flights, or `only` those of these names, in a process of their own, with their logs in `out`.
-
-    Raises:
-        VariationError: The process ended before the flights did.
-    """
+    """Fly the golden flights, or `only` some, in a process; raise `VariationError` if it ends early."""
     command = [str(variation.python), "-m", "colibri", "verify", "--golden", str(HASHES), "--link", link]
     command += ["--out", str(out), "--quiet", *(f"--only={name}" for name in only)]
     began_s = perf_counter()
@@ -153,7 +140,7 @@ def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[st
 
 
 def _environment(variation: Variation) -> dict[str, str]:
-    """Return the variables of a variation's process: ours, but for those that any variation sets."""
+    """Return a variation's variables, and ours except for those set by any variation."""
     varied = {"OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "GLIBC_TUNABLES", *ONE_THREAD}
     varied |= {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
     usual = {name: value for name, value in os.environ.items() if name not in varied}

@@ -1,4 +1,4 @@
-"""Observes a vehicle on a link of its own: clients are judged by this, not by their own output."""
+"""Observes a vehicle on a separate link: tests judge clients by this, not by their own output."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -30,18 +30,7 @@ _NEEDED = {"HEARTBEAT", "ATTITUDE_QUATERNION", "EXTENDED_SYS_STATE"}
 
 
 class Sight(NamedTuple):
-    """The vehicle at an instant.
-
-    Attributes:
-        time_s: Simulated time.
-        position_enu_m: From the origin.
-        velocity_enu_m_s: Of it.
-        euler_rad: Roll, pitch, yaw; FLU to ENU.
-        rate_flu_rad_s: Body rates.
-        mode: The flight mode.
-        armed: Whether the rotors may turn.
-        landed: MAV_LANDED_STATE.
-    """
+    """The vehicle at an instant."""
 
     time_s: float
     position_enu_m: Vector
@@ -54,26 +43,22 @@ class Sight(NamedTuple):
 
     @property
     def height_m(self) -> float:
-        """Above the origin."""
         return self.position_enu_m[2]
 
     @property
     def flying(self) -> bool:
-        """Whether it is off the ground."""
         return self.landed not in (ON_GROUND, mav.MAV_LANDED_STATE_UNDEFINED)
 
 
 class Observer(OnPort):
-    """Records what a vehicle sends to a port of this computer; its methods are the vocabulary of tests.
+    """Records the messages of a vehicle to a port of this computer.
 
     Attributes:
         sights: About 20 in a simulated second.
-        texts: The STATUSTEXT lines.
-        counts: How many messages of each name have come, from any component.
+        counts: Messages by name, from any component.
     """
 
     def __init__(self) -> None:
-        """Listen on any free port."""
         super().__init__(self)
         own = mav.MAV_COMP_ID_MISSIONPLANNER
         self._client = Client(_SYSTEM_ID, own, heartbeat_every_us=None, all_components=True)
@@ -86,24 +71,21 @@ class Observer(OnPort):
 
     @property
     def now(self) -> Sight:
-        """The latest sight."""
         return self.sights[-1]
 
     @property
     def fix(self) -> int:
-        """GPS_FIX_TYPE of the last GPS_RAW_INT."""
         return int(self._latest["GPS_RAW_INT"].fix_type)
 
     def modes(self) -> list[Mode]:
-        """Return the modes of armed heartbeats, each once in a row: one is sent whenever the mode changes."""
+        """Return the modes of armed heartbeats, without repetition: one is sent at every change."""
         return list(self._modes)
 
     def in_mode(self, mode: Mode) -> list[Sight]:
-        """Return what was seen in a mode, in flight."""
         return [sight for sight in self.sights if sight.mode is mode and sight.armed and sight.flying]
 
     def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
-        """Return the first sight from now on that meets `condition`, `what` in words; `within_s` bounds what hangs."""
+        """Return the first sight from now on that meets `condition`; `within_s` only bounds hangs."""
         with self._news:
             seen = len(self.sights) - 1
             give_up_s = monotonic() + within_s
@@ -118,10 +100,7 @@ class Observer(OnPort):
                 self._news.wait(left_s)
 
     def wait_until_disarmed(self) -> Sight:
-        """Return the first sight from now on in which a flight that was seen is over.
-
-        On a busy machine what is seen lags behind what a client has received already.
-        """
+        """Return the first sight after a flight; sights may lag behind a client's messages."""
         return self.wait(lambda sight: not sight.armed and any(it.armed for it in self.sights), "the end of the flight")
 
     @property
@@ -130,10 +109,7 @@ class Observer(OnPort):
         return self._client.vehicle.target
 
     def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
-        """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
-
-        `fields` are those behind target system and component, which are filled in; `within_s` bounds what hangs.
-        """
+        """Send a message with target ids and `fields`; return the first `answer` after it."""
         with self._news:
             before = self.counts[answer]
             self.send(self._client.encode(name, *self._vehicle, *fields))
@@ -141,34 +117,29 @@ class Observer(OnPort):
             return self._latest[answer]
 
     def command(self, number: int, *params: float) -> int | None:
-        """Send a COMMAND_LONG; return its MAV_RESULT."""
         return self._talk(Command(self._vehicle, number, *params)).result
 
     def plan_length(self, mission_type: int = mav.MAV_MISSION_TYPE_MISSION) -> int:
-        """Return how many items of a plan the vehicle has."""
         download = self._talk(Download(self._vehicle, mission_type))
         assert download.accepted
         return len(download.items)
 
     def parameter(self, name: str) -> float:
-        """Return a parameter of the vehicle."""
         held = self._talk(ReadParameter(self._vehicle, name)).held
         assert held is not None, f"no {name}"
         return held.value
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter of the vehicle."""
         assert self._talk(SetParameter(self._vehicle, name, value)).accepted
 
     def _talk(self, conversation: Talk) -> Talk:
-        """Have a conversation with the vehicle until it has ended."""
         with self._news:
             self._client.begin(conversation)
             assert self._news.wait_for(lambda: conversation.result is not None, GIVE_UP_AFTER_S)
         return conversation
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
-        """Read a datagram of the vehicle; return what is due to be sent, at first the requests for message rates."""
+        """Process a datagram; return datagrams to send, at first requests for message rates."""
         now_us = round(now_s * 1e6)
         with self._news:
             for message in self._client.receive(datagram, now_us):

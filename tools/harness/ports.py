@@ -1,4 +1,4 @@
-"""Clients without input or output, each given a UDP port of this computer."""
+"""UDP ports of this computer for clients without input or output."""
 
 import socket
 from select import select
@@ -11,22 +11,15 @@ _BUFFER_BYTES = 4_000_000
 
 
 class Talker(Protocol):
-    """Answers datagrams."""
+    """Answers datagrams of the vehicle."""
 
-    def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
-        """Take in a datagram of the vehicle; return what to send to it."""
+    def receive(self, datagram: bytes, now_s: float) -> list[bytes]: ...
 
 
 class OnPort:
-    """Connects a client to the vehicle that sends to a port, while the block lasts.
-
-    Attributes:
-        url: The link that the vehicle is to serve.
-        sender: The address that the last datagram came from; None before the first.
-    """
+    """Connects a client to the vehicle that serves `url`, within a block; `sender` is the last source."""
 
     def __init__(self, talker: Talker) -> None:
-        """Listen on any free port."""
         self.sender: tuple[str, int] | None = None
         self._talker = talker
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -37,18 +30,15 @@ class OnPort:
         self._thread = Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin."""
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End: from here on the client may be looked at."""
         self._ended.set()
         self._thread.join()
         self._socket.close()
 
     def send(self, datagram: bytes) -> None:
-        """Send a datagram to the address that the last one came from."""
         assert self.sender is not None, "nothing has been received"
         self._socket.sendto(datagram, self.sender)
 

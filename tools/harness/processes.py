@@ -30,11 +30,11 @@ THESIS_PLANT = (
     *("--integrator", "adaptive"),
     *("--start", "y=-1,z=0,psi=90,rotors=3000"),
 )
-"""What `colibri plant` needs to begin as profile `thesis` does."""
+"""Options by which `colibri plant` begins as profile `thesis` does."""
 
 
 def fly(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
-    """Fly through the command line, without figures; return the report, also where the vehicle is to be lost."""
+    """Fly through the command line, without figures; return the report."""
     try:
         code: int | str | None = main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)])
     except SystemExit as ended:
@@ -45,19 +45,17 @@ def fly(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
 
 
 def fly_thesis(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
-    """Fly with profile `thesis`."""
     return fly(out, *options, "--profile", "thesis", lost=lost)
 
 
 def rows(path: Path) -> dict[str, Array]:
-    """Read a flight's CSV as columns."""
     header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
     return dict(zip(header, table.T, strict=True))
 
 
 def topic_rows(log: Path, topic: Topic = TRUTH) -> dict[str, Array]:
-    """Read a topic of a log, or of the log in a flight's folder, as columns; the truth by default."""
+    """Read a topic of a log, or of the log in a flight's folder, as columns."""
     flown = FlightFile(log / FILE if log.is_dir() else log)
     return dict(zip(topic.names, read_series(flown, topic, *topic.names), strict=True))
 
@@ -68,13 +66,12 @@ def reference(track: str) -> dict[str, Array]:
 
 
 def max_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: tuple[str, ...]) -> float:
-    """Return the largest difference in any of `columns` at any row."""
     assert set(columns) <= set(COLUMNS)
     return float(max(np.abs(flown[column] - wanted[column]).max() for column in columns))
 
 
 def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_AFTER_S / 3600.0) -> None:
-    """Wait until `condition()`; a bound for what hangs, never a part of the verdict."""
+    """Wait until `condition()`; the bound is for hangs, never a part of the verdict."""
     give_up_s = monotonic() + 3600.0 * hours
     while not condition():
         assert monotonic() < give_up_s, f"waited in vain for {what}"
@@ -82,14 +79,9 @@ def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_
 
 
 class Process:
-    """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file.
-
-    Attributes:
-        process: The process.
-    """
+    """`colibri plant` or `colibri autopilot` as a user starts it; `folder` takes its JSON status and errors."""
 
     def __init__(self, folder: Path, package: str, *options: str) -> None:
-        """Start it; `folder` takes its output."""
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
         self._errors = self._said.with_suffix(".err")
         with self._said.open("wb") as said, self._errors.open("wb") as errors:
@@ -97,34 +89,28 @@ class Process:
             self.process = subprocess.Popen([*command, *options], stdout=said, stderr=errors, process_group=0)
 
     def events(self, name: str) -> list[dict[str, Any]]:
-        """Return the events of that name said so far."""
         lines = self._said.read_text(encoding="utf-8").split("\n")[:-1]
         return [event for event in map(json.loads, lines) if event["event"] == name]
 
     def wait_for(self, name: str) -> dict[str, Any]:
-        """Wait for an event and return the latest of its name."""
         wait_for(lambda: self.events(name) or self.process.poll() is not None, f"{name} in {self._said.name}")
         events = self.events(name)
         assert events, f"ended without {name}: {self.errors()}"
         return events[-1]
 
     def errors(self) -> str:
-        """Return what it wrote to standard error."""
         return self._errors.read_text(encoding="utf-8")
 
     def kill(self) -> None:
-        """Kill it, and wait until it is gone."""
         self.process.kill()
         self.process.wait()
 
     def wait(self) -> int:
-        """Wait for its end; return the exit code."""
         return self.process.wait(GIVE_UP_AFTER_S)
 
 
 @contextmanager
 def running(*processes: Process) -> Iterator[None]:
-    """Leave no process behind."""
     try:
         yield
     finally:
@@ -133,17 +119,15 @@ def running(*processes: Process) -> Iterator[None]:
 
 
 def start_plant(folder: Path, out: Path, *options: str) -> tuple[Process, str]:
-    """Start the thesis's plant on a free port; return it and the URL to call it."""
+    """Start the thesis's plant on a free port; return it and the URL to call."""
     plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(out), *THESIS_PLANT, *options)
     url: str = plant.wait_for("listening")["url"]
     return plant, url.replace("udpin", "udpout")
 
 
 def start_autopilot(folder: Path, url: str, *options: str) -> Process:
-    """Start an autopilot with profile `thesis` that calls the plant at `url`."""
     return Process(folder, "autopilot", "--plant", url, "--profile", "thesis", *options)
 
 
 def states(out: Path) -> Array:
-    """Return the plant's states at every frame."""
     return np.stack(list(topic_rows(out).values())[:14], axis=1)

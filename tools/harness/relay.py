@@ -1,4 +1,4 @@
-"""A UDP relay between autopilot and plant, which applies the faults of a test to the datagrams."""
+"""A UDP relay between autopilot and plant, which applies a test's faults to the datagrams."""
 
 import random
 import socket
@@ -13,14 +13,9 @@ LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
 
 
 class Relay(ABC):
-    """Stands between an autopilot, which calls `url`, and a plant.
-
-    Attributes:
-        url: What the autopilot is to call.
-    """
+    """Stands between a plant and an autopilot, which calls `url`."""
 
     def __init__(self, plant_url: str) -> None:
-        """Relay to the plant at `plant_url`."""
         _, host, port = plant_url.split(":")
         self._plant = (host, int(port))
         self._near, self._far = _bound_socket(), _bound_socket()
@@ -31,24 +26,21 @@ class Relay(ABC):
 
     @abstractmethod
     def pass_on(self, to: str, datagram: bytes) -> None:
-        """Deal with a datagram for the `plant` or the `autopilot`, by `deliver`."""
+        """Handle a datagram for the `plant` or the `autopilot`, by `deliver`."""
 
     def deliver(self, to: str, datagram: bytes) -> None:
-        """Send a datagram on."""
         if to == "plant":
             self._far.sendto(datagram, self._plant)
         elif self._autopilot:
             self._near.sendto(datagram, self._autopilot)
 
     def __enter__(self) -> Self:
-        """Start relaying."""
         self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop relaying."""
         self._ended.set()
         self._thread.join()
         self._near.close()
@@ -66,21 +58,15 @@ class Relay(ABC):
 
 
 class BadLink(Relay):
-    """A relay as a bad radio link would be, both ways.
-
-    Attributes:
-        counts: What was done to the datagrams.
-    """
+    """A relay like a bad radio link, both ways."""
 
     def __init__(self, plant_url: str, seed: int) -> None:
-        """Relay to the plant at `plant_url`, by chance of `seed`."""
         super().__init__(plant_url)
         self._chance = random.Random(seed)
         self._held: dict[str, bytes] = {}
         self.counts = {"passed": 0, "lost": 0, "duplicated": 0, "reordered": 0}
 
     def pass_on(self, to: str, datagram: bytes) -> None:
-        """Lose it, hold it back behind the next, or send it on once or twice."""
         fate = self._chance.random()
         if fate < LOSS:
             self.counts["lost"] += 1

@@ -1,4 +1,4 @@
-"""`colibri sitl` for a test: started on free ports, watched by an observer, ended."""
+"""`colibri sitl` for tests: started on free ports, watched by an observer, ended."""
 
 import re
 import signal
@@ -19,18 +19,11 @@ _COMPILES_HOURS = 0.05
 
 
 class Vehicle:
-    """A running `colibri sitl`.
-
-    Attributes:
-        process: Its process.
-        seen: What it really does.
-        state: The folder of its parameters, logs and files.
-    """
+    """A running `colibri sitl`; `seen` observes it, `state` has its parameters, logs and files."""
 
     def __init__(
         self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path, printed: Path
     ) -> None:
-        """Wrap what runs; `said` takes its standard error, `printed` its output."""
         self.process = process
         self.seen = seen
         self.state = state
@@ -38,31 +31,26 @@ class Vehicle:
 
     @property
     def ports(self) -> list[int]:
-        """Where it waits for clients, in the order of its links."""
         return [int(port) for port, _ in _WAITS.findall(self.said)]
 
     @property
     def port(self) -> int:
-        """Where it waits for clients: on the first link that does."""
         return self.ports[0]
 
     @property
     def mavsdk_url(self) -> str:
-        """The first link that waits, as MAVSDK is told to call it."""
         return f"udpout://127.0.0.1:{self.port}"
 
     @property
     def said(self) -> str:
-        """What it has written to standard error."""
         return self._said.read_text(encoding="utf-8")
 
     @property
     def printed(self) -> list[str]:
-        """The lines that it has written to standard output."""
         return self._printed.read_text(encoding="utf-8").splitlines()
 
     def end(self) -> int:
-        """Ask it to end, as Ctrl-C does; return its exit code."""
+        """Interrupt it, as Ctrl-C does; return the exit code."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
@@ -75,10 +63,7 @@ class Vehicle:
 
 @contextmanager
 def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0) -> Iterator[Vehicle]:
-    """Run `colibri sitl` while the block lasts; it stands, ready to be armed, when the block begins.
-
-    Its state and output are in `folder`. It serves `links` beside the observer's; by default it waits on any free port.
-    """
+    """Run `colibri sitl` within a block, ready to be armed; its state and output are in `folder`."""
     said, printed, state = folder / "sitl.err", folder / "sitl.out", folder / "state"
     with Observer() as seen, said.open("wb") as errors, printed.open("wb") as output:
         command = [

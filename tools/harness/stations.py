@@ -1,6 +1,6 @@
-"""Ground stations that request a lot and keep account of what they receive; no input or output in them.
+"""Ground stations that request a lot and count the answers, without input or output.
 
-What they send follows from what comes, so that it does not matter how fast the vehicle flies.
+They act on received messages, so that the speed of the vehicle does not matter.
 """
 
 from collections import Counter
@@ -30,13 +30,7 @@ _RADIUS_M, _RATE_RAD_S, _HEIGHT_M = 2.0, 0.5, 3.0
 
 
 class Ack(NamedTuple):
-    """An acknowledgement.
-
-    Attributes:
-        command: MAV_CMD.
-        result: MAV_RESULT.
-        target: System and component that it is for.
-    """
+    """An acknowledgement, with the system and component that it is for."""
 
     command: int
     result: int
@@ -44,17 +38,7 @@ class Ack(NamedTuple):
 
 
 class Station:
-    """A ground station.
-
-    Attributes:
-        identity: System and component that it speaks as.
-        sent: How often each MAV_CMD was sent.
-        counts: How many messages of each name came from the vehicle.
-        acks: How often each acknowledgement came.
-        max_gap_s: The longest time between two heartbeats of the vehicle, by the `now_s` that it is given.
-        time_s: Simulated time of the vehicle.
-        position_ned_m: Where the vehicle is.
-    """
+    """A ground station; `max_gap_s` is the longest time between heartbeats by `now_s`, `time_s` is simulated."""
 
     def __init__(
         self,
@@ -64,10 +48,7 @@ class Station:
         every: int = 25,
         orders: Sequence[tuple[float, ...]] = (),
     ) -> None:
-        """Send a request with every `every` datagrams received: first `orders`, a MAV_CMD and its parameters each.
-
-        After them it sends every request that a ground station may send, over and over.
-        """
+        """Send a request with every `every`-th datagram: first `orders` (MAV_CMD, parameters), then all kinds."""
         self.identity = (system_id, component_id)
         self.sent: Counter[int] = Counter()
         self.counts: Counter[str] = Counter()
@@ -83,7 +64,6 @@ class Station:
         self._outbox: list[bytes] = []
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
-        """Take in a datagram of the vehicle; return what to send to it."""
         self._datagrams += 1
         now_us = round(now_s * 1e6)
         for message in self._client.receive(datagram, now_us):
@@ -108,14 +88,13 @@ class Station:
             self.acks[Ack(fields.command, fields.result, (fields.target_system, fields.target_component))] += 1
 
     def _told(self) -> None:
-        """Do what is to be done with every datagram."""
+        """Act on any datagram."""
 
     def _orders(self, orders: Sequence[tuple[float, ...]]) -> Iterator[Callable[[], None]]:
         for command, *parameters in orders:
             yield partial(self._command, int(command), *parameters)
 
     def _wish(self) -> Iterator[Callable[[], None]]:
-        """Yield the requests of a ground station, of every kind."""
         for name, interval_us in _STREAMED_US.items():
             yield partial(self._command, mav.MAV_CMD_SET_MESSAGE_INTERVAL, _number(name), interval_us)
         for name in _ASKED:
@@ -138,14 +117,9 @@ class Station:
 
 
 class OffboardTask(Station):
-    """A companion computer that takes off and flies the vehicle in a circle, by setpoints.
-
-    Attributes:
-        off_m: The largest distance to the setpoint once the vehicle has caught up.
-    """
+    """A companion that takes off and flies a circle by setpoints; `off_m` is its largest error on the circle."""
 
     def __init__(self, system_id: int) -> None:
-        """Engage mode offboard, arm."""
         super().__init__(system_id, mav.MAV_COMP_ID_ONBOARD_COMPUTER, orders=[OFFBOARD, ARM])
         self.off_m = 0.0
         self._setpoint_s = 0.0

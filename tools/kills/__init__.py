@@ -1,1 +1,1 @@
-"""Processes that die in flight, again and again: what the vehicle does meanwhile, and whether its flight ends."""
+"""Processes killed in flight, again and again: the vehicle's motion meanwhile, and the end of its flight."""

@@ -23,7 +23,6 @@ K = TypeVar("K")
 
 
 def main() -> int:
-    """Kill as often as asked, and print what it came to; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tools.kills", description=__doc__)
     parser.add_argument("--of", choices=("autopilot", "plant"), default="autopilot", help="who dies")
     parser.add_argument("--kills", type=natural, default=200)
@@ -41,7 +40,6 @@ def main() -> int:
 
 
 def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
-    """Return what is wrong with a flight in which autopilots were killed."""
     found = [] if flight.flown else [f"mission {number} did not end"]
     found += [f"mission {number}: {flight.words}"] if flight.words else []
     for kill in flight.kills:
@@ -56,8 +54,6 @@ def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
 
 
 def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    """Kill autopilots; return what to print, and what failed."""
-
     def fly(folder: Path, number: int, maximum: int) -> tuple[list[autopilots.Kill], list[str]]:
         flight = autopilots.fly(folder, feedback, 1000 * seed + number, maximum)
         return flight.kills, failures_of(number, flight)
@@ -79,8 +75,6 @@ def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], l
 
 
 def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    """Kill plants; return what to print, and what failed."""
-
     def fly(folder: Path, number: int, maximum: int) -> tuple[list[plants.Kill], list[str]]:
         killed, words = plants.fly(folder, feedback, 1000 * seed + number, min(_PLANTS_A_FLIGHT, maximum))
         found = [f"autopilot {number}: {words}"] if words else []
@@ -105,7 +99,7 @@ def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[
 def _killed(
     what: str, kills: int, fly: Callable[[Path, int, int], tuple[list[K], list[str]]]
 ) -> tuple[list[K], list[str], int]:
-    """Fly until there are so many kills; return them, what failed, and the number of flights."""
+    """Fly until `kills` processes were killed; return the kills, the failures, and the number of flights."""
     done: list[K] = []
     failures: list[str] = []
     flights = 0

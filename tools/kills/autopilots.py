@@ -1,4 +1,4 @@
-"""Autopilots killed in flight: one mission after another, each with as many kills as it has time for, each judged."""
+"""Autopilots killed in flight: one mission after another, each kill judged."""
 
 import random
 from pathlib import Path
@@ -22,20 +22,7 @@ STANDING = "y=0,z=0,psi=90,rotors=0"
 
 
 class Kill(NamedTuple):
-    """What came of a kill.
-
-    Attributes:
-        time_s: Simulated time of the frame in which it died.
-        phase: Where in the exchange.
-        item: Of the mission, then current.
-        hovered: Whether the vehicle was hovering.
-        still: Whether it was still in the same item at the next kill.
-        tilt_deg: The largest before the next kill.
-        tilt_before_deg: The largest in the second before.
-        lost_m: Height lost within two seconds, of a vehicle that was still there at the next kill.
-        moved_m: How far it moved from its place then.
-        went_on: Whether the autopilot said that it goes on.
-    """
+    """Outcome of a kill."""
 
     time_s: float
     phase: Phase
@@ -50,14 +37,7 @@ class Kill(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """What came of a mission.
-
-    Attributes:
-        kills: In order.
-        flown: Whether the mission ended.
-        duration_s: Simulated.
-        words: What was said on standard error, of which there should be nothing.
-    """
+    """Outcome of a mission; `words` is the standard error."""
 
     kills: list[Kill]
     flown: bool
@@ -66,7 +46,7 @@ class Flight(NamedTuple):
 
 
 def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> Flight:
-    """Fly a mission of so many legs once, the autopilot killed at random instants and started again at once."""
+    """Fly a mission; kill the autopilot at random instants, and start it again at once."""
     folder.mkdir()
     station = Station(mission(legs))
     plant = start_plant(folder, "udpin:127.0.0.1:0", seed, out=folder)
@@ -92,13 +72,11 @@ def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int =
 
 
 def start(folder: Path, url: str, station: Station, feedback: Feedback) -> Process:
-    """Start an autopilot that keeps its flight."""
     options = ("--plant", url, "--gcs", station.url, "--feedback", feedback, "--state", str(folder / "state"))
     return Process(folder, "autopilot", *options)
 
 
 def start_plant(folder: Path, url: str, seed: int, out: Path | None = None) -> Process:
-    """Start a plant whose vehicle stands."""
     kept = () if out is None else ("--out", str(out))
     return Process(folder, "plant", "--start", STANDING, "--seed", str(seed), "--link", url, *kept)
 
@@ -121,14 +99,13 @@ class _Killer:
         self.processes: list[Process] = []
 
     def begin(self) -> None:
-        """Start the first, and have it armed."""
         self._start()
         station = self._station
         self._between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         self._died_us = self._between.time_us - round(_APART_S * 1e6)
 
     def kill(self) -> bool:
-        """Kill the autopilot some time after the last kill; return whether the mission lasted until then."""
+        """Kill the autopilot some time after the last kill; return False if the mission ends before."""
         between, station, chance = self._between, self._station, self._chance
         self._phase = chance.choice(list(Phase))
         due_us = self._died_us + round(1e6 * (_APART_S + chance.uniform(0.0, _SPREAD_S)))
@@ -160,7 +137,7 @@ class _Killer:
 
 
 def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
-    """Return what the vehicle did after each kill."""
+    """Return the vehicle's motion after each kill."""
     t, place = truth["t"], np.stack([truth[axis] for axis in "xyz"], axis=1)
     tilt = tilt_deg(truth)
     speed = np.sqrt(truth["u"] ** 2 + truth["v"] ** 2 + truth["w"] ** 2)

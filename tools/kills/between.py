@@ -1,4 +1,4 @@
-"""Stands between plant and autopilot, and finds at which simulated instant something is to be done."""
+"""A relay between plant and autopilots that acts at chosen simulated instants."""
 
 import random
 import socket
@@ -24,7 +24,7 @@ _ANSWER = 93
 
 
 class Phase(Enum):
-    """Where in the exchange of a frame the process is killed."""
+    """Instant of a kill within the exchange of a frame."""
 
     BEFORE = "before the frame comes"
     DURING = "while the answer is computed"
@@ -33,21 +33,18 @@ class Phase(Enum):
 
 
 class HangsError(Exception):
-    """Something was waited for in vain."""
+    """A wait timed out."""
 
 
 class Between:
-    """Passes datagrams on between a plant and the autopilots that call it one after another.
-
-    Every autopilot has a way of its own to the plant, as it would have without this.
+    """Relays between a plant and the autopilots that call it in turn, each over its own way.
 
     Attributes:
         time_us: Of the newest frame.
-        url: What the next autopilot is to call; another after each `cut`.
+        url: For the next autopilot; another after each `cut`.
     """
 
     def __init__(self, plant: tuple[str, int]) -> None:
-        """Pass on to the plant at `plant`."""
         self._plant = plant
         self.time_us = 0
         self._due: tuple[int, Phase, Callable[[], None]] | None = None
@@ -60,22 +57,17 @@ class Between:
 
     @property
     def waits(self) -> bool:
-        """Whether there is something still to be done."""
         return self._due is not None
 
     def cut(self) -> None:
-        """Let go of the autopilot that called, and wait for the next."""
+        """Drop the autopilot, and wait for the next."""
         self.close()
         self._open()
 
     def fly_until(
         self, station: Station, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
     ) -> None:
-        """Pass on, and have the ground station receive, until `condition()`.
-
-        Raises:
-            HangsError: It does not come about.
-        """
+        """Relay, and serve the ground station, until `condition()`; raise `HangsError` after a bound."""
         give_up_s = monotonic() + give_up_after_s
         while not condition():
             ready, _, _ = select([self._near, self._far, station.socket], [], [], _LOOK_S)
@@ -89,7 +81,6 @@ class Between:
                 raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")
 
     def close(self) -> None:
-        """Let go of everybody."""
         self._near.close()
         self._far.close()
 
@@ -134,7 +125,7 @@ class Between:
             self._is_due(Phase.AFTER)
 
     def _is_due(self, phase: Phase) -> bool:
-        """Do what is due in this phase, if it is; return whether it was."""
+        """Do the planned action if it is due in this phase; return whether it was."""
         if self._due is None or self._due[1] is not phase or self.time_us < self._due[0]:
             return False
         (_, _, do), self._due = self._due, None
@@ -149,7 +140,7 @@ class Between:
 
 
 def _number(datagram: bytes) -> int:
-    """Return which message a datagram begins with."""
+    """Return the message id of a datagram's first frame."""
     return int.from_bytes(datagram[7:_HEAD], "little")
 
 

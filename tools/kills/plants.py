@@ -1,4 +1,4 @@
-"""Plants killed in flight: the autopilot says what it waits for, and flies the next plant as if it had just begun."""
+"""Plants killed in flight: the autopilot reports it, and flies the next plant from the start."""
 
 import random
 from pathlib import Path
@@ -14,14 +14,7 @@ _MAX_DELAY_S = 12.0
 
 
 class Kill(NamedTuple):
-    """What came of a kill.
-
-    Attributes:
-        time_s: Simulated time of the frame in which it died.
-        phase: Where in the exchange.
-        said: What the autopilot said while there was no plant; empty where the next was there before it had to.
-        stood: Whether the vehicle stood disarmed, without a mission, at the next plant's begin.
-    """
+    """Outcome of a kill."""
 
     time_s: float
     phase: Phase
@@ -30,7 +23,7 @@ class Kill(NamedTuple):
 
 
 def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[Kill], str]:
-    """Kill as many plants in mid-mission; return what came of each, and what was said on standard error."""
+    """Kill plants in mid-mission; return the kills, and the standard error."""
     folder.mkdir()
     chance = random.Random(seed)
     station = Station(mission())
@@ -72,7 +65,7 @@ class _Flights:
         self._chance = chance
 
     def kill(self, seed: int) -> Kill:
-        """Fly for a while, kill the plant, start another: at once, or when the autopilot has said what it misses."""
+        """Fly for a while, kill the plant, start another: at once, or after the autopilot's report."""
         between, station, chance = self._between, self._station, self._chance
         between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         phase = chance.choice(list(Phase))

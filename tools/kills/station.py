@@ -1,4 +1,4 @@
-"""A ground station that has a mission flown, and begins every request again until it is done, whoever answers."""
+"""A ground station that has a mission flown, and repeats every request until it succeeds."""
 
 import socket
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ LEGS = len(_PLACES)
 
 
 def mission(legs: int = LEGS) -> list[MissionItem]:
-    """Return a take-off, up to four legs with a hover at the end of each, and a landing where the last ends."""
+    """Return a take-off, up to four legs with a hover at the end of each, and a landing."""
     items = [_item(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0)]
     for east, north in _PLACES[:legs]:
         items.append(_item(mav.MAV_CMD_NAV_WAYPOINT, east, north))
@@ -36,21 +36,13 @@ def mission(legs: int = LEGS) -> list[MissionItem]:
 
 
 HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))
-"""Items of the mission in which the vehicle hovers, once it is there."""
+"""Items of the mission with a hover."""
 
 
 class Station:
-    """Listens on a port of this computer.
-
-    Attributes:
-        url: The link that the vehicle is to serve.
-        mode, armed: As the vehicle says; None before it has.
-        seq: The current item.
-        flown: Whether the mission was begun and is over, the rotors at rest.
-    """
+    """Listens on a port of this computer; `mode` and `armed` are `None` before the first heartbeat."""
 
     def __init__(self, items: Sequence[MissionItem]) -> None:
-        """Have `items` flown."""
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
         self.socket.bind(("127.0.0.1", 0))
@@ -60,7 +52,7 @@ class Station:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Expect another flight, of a vehicle that knows nothing."""
+        """Expect another flight, of a vehicle without the mission."""
         self.mode: Mode | None = None
         self.armed: bool | None = None
         self.seq = 0
@@ -72,11 +64,9 @@ class Station:
 
     @property
     def texts(self) -> list[str]:
-        """What it said, line by line."""
         return self._inbox.texts
 
     def receive(self) -> None:
-        """Take in what has come, and answer it."""
         now_us = round(monotonic() * 1e6)
         while True:
             try:
@@ -89,7 +79,6 @@ class Station:
                 self.socket.sendto(answer, vehicle)
 
     def drain(self) -> None:
-        """Forget what has come and was not read."""
         while True:
             try:
                 self.socket.recv(_MAX_DATAGRAM_BYTES)
@@ -97,7 +86,6 @@ class Station:
                 return
 
     def close(self) -> None:
-        """Listen no more."""
         self.socket.close()
 
     def _take(self, message: Message) -> None:
@@ -111,7 +99,7 @@ class Station:
                 self.seq = fields.seq
 
     def _see(self, mode: Mode | None, armed: bool) -> None:
-        """Begin the next request that is still to be made, at every heartbeat until the rotors are armed."""
+        """Begin the next outstanding request, at every heartbeat until the rotors are armed."""
         self.mode, self.armed = mode, armed
         self.flown = self.flown or (self.has_armed and not armed)
         self.has_armed = self.has_armed or armed

@@ -1,4 +1,4 @@
-"""`python -m tools.pages PAGE FOLDER`: writes into FOLDER what of PAGE comes from the code: tables and pictures."""
+"""`python -m tools.pages PAGE FOLDER`: write the tables and pictures of PAGE that come from the code into FOLDER."""
 
 import sys
 from importlib import import_module
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def main() -> int:
-    """Write as the command line says; 1 if what was flown for the page did not go well."""
+    """Return 1 if the page's flights did not go well."""
     page, folder = sys.argv[1:]
     return 0 if import_module(f"tools.pages.{page}").write(Path(folder)) is not False else 1
 

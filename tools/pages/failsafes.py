@@ -21,7 +21,6 @@ _STATE = {"boxstyle": "round,pad=0.45", "facecolor": "white", "edgecolor": "#223
 
 
 def tables() -> list[str]:
-    """Return the tables of the page: the ranks of actions, and the conditions that lead to them."""
     return ["\n".join(_ranks()), "\n".join(_rows())]
 
 
@@ -59,7 +58,6 @@ def _choices(row: Row) -> str:
 
 
 def draw(path: Path) -> None:
-    """Draw what leads to what as a PNG."""
     figure = Figure(figsize=(13.0, 7.6))
     axes = figure.subplots()
     axes.set_xlim(0.0, 13.0)
@@ -90,7 +88,7 @@ def draw(path: Path) -> None:
 
 
 def _leading_to(action: Action) -> tuple[str, str]:
-    """Return the conditions that lead to an action by default, and those that can."""
+    """Return the conditions that lead to an action by default, and others that can."""
     default = [str(row.condition) for row in TABLE if dict(row.choices)[row.default] is action]
     able = [
         str(row.condition)
@@ -107,7 +105,7 @@ def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], col
 
 
 def _label(axes: Axes, x: float, y: float, default: str, able: str) -> None:
-    """Write onto an arrow what leads along it: by default in bold, above what can."""
+    """Label an arrow: defaults in bold, above the others."""
     heavy, light = (wrap(text, _WIDTH) for text in (default, able))
     for up, line in enumerate(reversed(heavy + light)):
         weight = "bold" if up >= len(light) else "normal"
@@ -115,6 +113,5 @@ def _label(axes: Axes, x: float, y: float, default: str, able: str) -> None:
 
 
 def write(folder: Path) -> None:
-    """Write tables and picture."""
     renew_tables(folder / "failsafes.md", tables())
     draw(folder / "failsafes.png")

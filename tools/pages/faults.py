@@ -1,4 +1,4 @@
-"""Tables of `faults.md`, what can be injected, from the vocabulary's own table."""
+"""Tables of `faults.md`: faults that can be injected."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +8,6 @@ from tools.pages.tables import renew_tables
 
 
 def tables() -> list[str]:
-    """Return the tables of the page: what can be injected into sensors, battery and rotors."""
     return ["\n".join(_rows(part)) for part in (Part.SENSORS, Part.BATTERY, Part.ROTORS)]
 
 
@@ -22,7 +21,7 @@ def _rows(part: Part) -> Iterator[str]:
 
 
 def _numbers(row: Row) -> str:
-    """Return what the numbers are; the axes of a vector, which are alike, in one."""
+    """Return the numbers of a row; the axes of a vector, which are alike, as one."""
     if len(row.values) == len("xyz"):
         name = row.values[0].name.removesuffix(" x")
         return _number(row.values[0], f"{name} x, y, z", ", ".join(f"{value.usual:g}" for value in row.values))
@@ -35,5 +34,4 @@ def _number(value: Value, name: str, usual: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the tables."""
     renew_tables(folder / "faults.md", tables())

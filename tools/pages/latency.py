@@ -1,4 +1,4 @@
-"""`latency.md` and `latency.png`: flights over ever slower links, the delay compensated and not."""
+"""`latency.md` and `latency.png`: flights over ever slower links, with and without compensation."""
 
 from collections.abc import Sequence
 from math import pi
@@ -22,7 +22,7 @@ ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
 LOST_M = 5.0
 _WRONG_MS = 5.0
 _SETTLED = 3.0
-"""As many times its error without delay is still flown well, and what is within so much."""
+"""Factor on the error without delay that is still flown well, and an error that always is."""
 _WELL_M = 1e-3
 
 _HEAD = """# Latency between plant and autopilot
@@ -65,15 +65,7 @@ so the same again bit for bit.
 
 
 class Case(NamedTuple):
-    """A flight of the sweep.
-
-    Attributes:
-        name: What it is called.
-        track: The track, with its options.
-        start: Keys and values as in `colibri.plant.physics.start.Start`.
-        duration_s: Simulated.
-        judged_from_s: The error is taken from here on.
-    """
+    """A flight of the sweep; `start` as in `colibri.plant.physics.start.Start`."""
 
     name: str
     track: str
@@ -89,13 +81,7 @@ LEMNISCATE = Case("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
 
 
 class Merit(NamedTuple):
-    """How a flight went.
-
-    Attributes:
-        rms_m: Error, RMS, from when it is judged.
-        overshoot_m: How far past the hover, along x.
-        tilt_deg: The largest.
-    """
+    """Quality of a flight: error from `judged_from_s` on, overshoot past the hover along x, largest tilt."""
 
     rms_m: float
     overshoot_m: float
@@ -103,7 +89,7 @@ class Merit(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """A flight of the sweep: of a law, in a case, over a round trip, with a delay that is told; None: measured."""
+    """A flight of the sweep; `told_ms` is the delay to compensate, `None` to measure it."""
 
     law: str
     case: Case
@@ -112,15 +98,7 @@ class Flight(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Both flights of a law at one round trip and one way to compensate; None where the vehicle was lost.
-
-    Attributes:
-        law: The control law.
-        way: A key of `WAYS`.
-        round_trip_ms: Twice the latency.
-        step: Of the step.
-        lemniscate: Of the lemniscate.
-    """
+    """Both flights of a law at one round trip and way to compensate; `None` if the vehicle was lost."""
 
     law: str
     way: str
@@ -134,13 +112,12 @@ WAYS = ("not", "measured", "- 5", "+ 5")
 
 
 def told_ms(way: str, round_trip_ms: float) -> float | None:
-    """Return the delay that is told; None where it is measured."""
     told = {"not": 0.0, "measured": None, "- 5": round_trip_ms - _WRONG_MS, "+ 5": round_trip_ms + _WRONG_MS}[way]
     return None if told is None else max(told, 0.0)
 
 
 def merit(recording: Recording, case: Case) -> Merit | None:
-    """Return how a flight went; None if the vehicle was lost."""
+    """Judge a flight; `None` if the vehicle was lost."""
     error, t = recording.position_error_m, recording["t"]
     upright = np.cos(recording["phi"]) * np.cos(recording["theta"])
     judged = t >= case.judged_from_s
@@ -154,7 +131,6 @@ def merit(recording: Recording, case: Case) -> Merit | None:
 
 
 def fly(flight: Flight) -> Merit | None:
-    """Fly in simulated time; return how it went."""
     law, case, round_trip_ms, told = flight
     spec = FlightSpec.of(
         case.track,
@@ -174,7 +150,6 @@ def fly(flight: Flight) -> Merit | None:
 
 
 def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
-    """Fly both cases by each law and way at each round trip."""
     points = [(law, way, ms) for law in LAWS for way in WAYS for ms in round_trips_ms]
     flights = [Flight(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
     merits = in_order(fly, flights, "latency", quiet=False)
@@ -184,7 +159,6 @@ def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
 
 
 def page(points: Sequence[Point]) -> str:
-    """Return the page."""
     headings = ("round trip (ms)", *(f"{name}: {way}" for name in ("step", "lemniscate") for way in WAYS))
     text = _HEAD
     for law in LAWS:
@@ -200,7 +174,7 @@ def _row(points: Sequence[Point], law: str, ms: float) -> tuple[str, ...]:
 
 
 def _margins(points: Sequence[Point], law: str) -> str:
-    """Say for each way how far it is flown well, and how far at all: up to the first round trip that is not."""
+    """Return for each way the round trips before the first failure."""
     lines = []
     for way, said in zip(WAYS, ("Not compensated", "Measured", "Told 5 ms less", "Told 5 ms more"), strict=True):
         those = [point for point in points if point.law == law and point.way == way]
@@ -217,7 +191,7 @@ def _is_kept(point: Point) -> bool:
 
 
 def _is_well(point: Point, points: Sequence[Point]) -> bool:
-    """Whether the errors are within three times those without delay, or a millimetre."""
+    """Whether the errors are within three times the errors without delay, or a millimetre."""
     first = next(it for it in points if (it.law, it.way, it.round_trip_ms) == (point.law, "not", 0))
     if point.step is None or point.lemniscate is None or first.step is None or first.lemniscate is None:
         return False
@@ -239,7 +213,6 @@ _FLOOR_M = 1e-7
 
 
 def draw(points: Sequence[Point], path: Path) -> None:
-    """Draw errors over the round trip: a column a law, a row a case."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 6.0), layout="constrained")
@@ -267,7 +240,6 @@ def draw(points: Sequence[Point], path: Path) -> None:
 
 
 def write(folder: Path) -> None:
-    """Fly; write page and picture."""
     points = sweep(ROUND_TRIPS_MS)
     (folder / "latency.md").write_text(page(points), encoding="utf-8")
     draw(points, folder / "latency.png")

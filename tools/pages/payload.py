@@ -21,13 +21,7 @@ _COLOURS = {"mass learned": "#0072B2", "mass not learned": "#D55E00"}
 
 
 class Laden(NamedTuple):
-    """A flight with the payload.
-
-    Attributes:
-        t: Times, s, (n,).
-        height_error_m: Then, (n,).
-        told: Times, s, and the mass that the vehicle told then, kg, (m, 2).
-    """
+    """A flight with the payload: times, s, height errors, (n,), and times and reported masses, kg, (m, 2)."""
 
     t: Array
     height_error_m: Array
@@ -35,7 +29,7 @@ class Laden(NamedTuple):
 
 
 def fly(track: str | None, *, learns: bool, seconds: tuple[float, float, float]) -> Laden:
-    """Fly a track, None for hover; `seconds` are of the pick-up, of the drop and of the end."""
+    """Fly a track, `None` for hover; `seconds` are of the pick-up, of the drop and of the end."""
     picked_up_s, dropped_s, end_s = seconds
     params = {} if learns else {"WHL_MASS_RATE": 0.0}
     with Flights(Setting(airborne=HEIGHT_M, track=track, params=params), None) as flights:
@@ -51,7 +45,6 @@ def fly(track: str | None, *, learns: bool, seconds: tuple[float, float, float])
 
 
 def draw(flights: dict[str, dict[str, Laden]]) -> Figure:
-    """Draw the error of height of flights, by track and by whether the mass is learned, and the mass told."""
     figure = Figure(figsize=(8.6, 7.2), dpi=150)
     figure.subplots_adjust(top=0.88, bottom=0.08, left=0.1, right=0.97, hspace=0.14)
     *heights, masses = figure.subplots(len(flights) + 1, 1, sharex=True)
@@ -81,7 +74,6 @@ def _dress(axes: Axes, quantity: str) -> None:
 
 
 def write(folder: Path) -> None:
-    """Fly; write the picture."""
     seconds = (PICKED_UP_S, DROPPED_S, END_S)
     flights = {
         name: {label: fly(track, learns=label == "mass learned", seconds=seconds) for label in _COLOURS}

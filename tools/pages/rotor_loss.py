@@ -1,4 +1,4 @@
-"""Table and figure of `rotor-loss.md`: losses of a rotor, flown."""
+"""Table and figure of `rotor-loss.md`: flights that lose a rotor."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
 
 
 def table(flown: Mapping[Case, Sequence[Flown]]) -> str:
-    """Return the table of the page: how many flights were well; of each measure the median and the worst."""
+    """Return the number of good flights, and median and worst of each measure."""
     headings = ("50 flights each", "well", *(name for name, _, _ in _MEASURES))
     rows = [(case.name, f"{sum(one.well for one in of)} of {len(of)}", *_cells(of)) for case, of in flown.items()]
     return markdown(headings, rows, names=1)
@@ -101,7 +101,7 @@ def _cells(flown: Sequence[Flown]) -> list[str]:
 
 
 def write(folder: Path) -> bool:
-    """Fly; write table and figure; return whether every flight was well, those of the last case aside."""
+    """Return whether every flight was well, except in the last case."""
     flown = fly_all(CASES, SEEDS)
     renew_tables(folder / "rotor-loss.md", [table(flown)])
     title = f"A rotor lost at {HEIGHT_M:.0f} m, {len(SEEDS)} seeds: {_DRAWN.name}"

@@ -1,4 +1,4 @@
-"""Flights in which a rotor is lost: what a vehicle does then, by seeds, all in memory."""
+"""Flights that lose a rotor, by seed, all in memory."""
 
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -30,7 +30,7 @@ UPRIGHT_DEG, NEAR_M, SOFT_M_S = 20.0, 5.0, 2.0
 SETTLED_S = 1.0
 """So long after the loss the vehicle is to be upright for good."""
 COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
-"""Of a path: s since the loss, m from where that was (z above ground), m/s, degrees, rad/s, parts of the largest."""
+"""Of a path: s since the loss, m from its place (z above ground), m/s, degrees, rad/s, parts of the largest."""
 _T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)
 _BLADES_LEFT = 0.001
 _BEFORE_S, _AFTER_S, _MAX_DURATION_S = 1.0, 1.5, 40.0
@@ -40,15 +40,7 @@ _FULL_TURN_DEG = 360.0
 
 
 class Case(NamedTuple):
-    """What the flights of a row have in common.
-
-    Attributes:
-        name: What is different.
-        feedback: What is flown by.
-        runs_down: Whether the rotor runs down as its motor stops; else its thrust is gone at once.
-        wind_m_s: Mean wind; each seed has it from elsewhere.
-        turbulence: How strong; None for none.
-    """
+    """Settings of the flights in a row; the wind's direction varies by seed."""
 
     name: str
     feedback: Feedback
@@ -58,14 +50,7 @@ class Case(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """One flight.
-
-    Attributes:
-        seed: Of everything random; the rotor is seed mod 4.
-        noticed_s: From the loss until it was known which rotor; nan if it never was.
-        path: `COLUMNS`, one row a frame, from a little before the loss until the vehicle rests, (n, 11).
-        rights: Whether the right rotor was named.
-    """
+    """One flight; `path` has `COLUMNS`, one row a frame, until the vehicle rests, (n, 11)."""
 
     seed: int
     noticed_s: float
@@ -82,59 +67,49 @@ class Flown(NamedTuple):
 
     @property
     def peak_deg(self) -> float:
-        """Largest tilt of the thrust from the vertical."""
         return float(self.lost[:, _TILT].max())
 
     @property
     def upright_s(self) -> float:
-        """From the loss until the tilt is within its limit for good."""
         beyond = np.flatnonzero(self.lost[:, _TILT] > UPRIGHT_DEG)
         return float(self.lost[beyond[-1], _T]) if beyond.size else 0.0
 
     @property
     def settled_deg(self) -> float:
-        """Largest tilt from a second after the loss on."""
         return float(self.lost[self.lost[:, _T] > SETTLED_S, _TILT].max())
 
     @property
     def max_distance_m(self) -> float:
-        """Largest horizontal distance from where the rotor was lost."""
         return float(np.hypot(self.lost[:, _X], self.lost[:, _Y]).max())
 
     @property
     def landed_m(self) -> float:
-        """The same at touch-down."""
         return float(np.hypot(self.lost[-1, _X], self.lost[-1, _Y]))
 
     @property
     def touched_m_s(self) -> float:
-        """Speed of the descent at touch-down."""
         return float(-self.lost[-1, _VZ])
 
     @property
     def spin_rad_s(self) -> float:
-        """Fastest turn about the body's z axis."""
         return float(np.abs(self.lost[:, _SPIN]).max())
 
     @property
     def rest_deg(self) -> float:
-        """Tilt in the end."""
         return float(self.path[-1, _TILT])
 
     @property
     def well(self) -> bool:
-        """Whether all that must hold does."""
         upright = self.settled_deg <= UPRIGHT_DEG and self.rest_deg <= UPRIGHT_DEG
         return self.rights and upright and self.landed_m <= NEAR_M and self.touched_m_s <= SOFT_M_S
 
 
 def _knock(path: Array) -> float:
-    """Return the change of the vertical speed from one row to the next, m/s, that only the ground makes."""
+    """Return the change of vertical speed between rows, m/s, that only the ground causes."""
     return float(9.81 * (path[1, _T] - path[0, _T]))
 
 
 def fly(case: Case, seed: int) -> Flown:
-    """Fly to the height, lose a rotor, and see what comes of it."""
     profile = load_profile("flight")
     vehicle = load_vehicle(profile.simulation.vehicle)
     wind = Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0)
@@ -150,7 +125,6 @@ def fly(case: Case, seed: int) -> Flown:
 
 
 def fly_all(cases: Iterable[Case], seeds: Iterable[int]) -> dict[Case, list[Flown]]:
-    """Fly each case by each seed, two at a time."""
     numbers = list(seeds)
     with ProcessPoolExecutor(_WORKERS) as pool:
         return {case: list(pool.map(fly, [case] * len(numbers), numbers)) for case in cases}
@@ -163,7 +137,6 @@ def _fault(case: Case, rotor: int) -> Fault:
 
 
 def _take_off(flight: Flight[Copter]) -> None:
-    """Climb to the height, and stay for a moment."""
     copter, plant = flight.autopilot.stages, flight.plant
     while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
         flight.step()
@@ -177,7 +150,6 @@ def _take_off(flight: Flight[Copter]) -> None:
 
 
 def _lose(flight: Flight[Copter], seed: int, fault: Fault) -> Flown:
-    """Lose a rotor; fly until the vehicle rests."""
     copter, plant = flight.autopilot.stages, flight.plant
     lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
     rows: list[tuple[float, ...]] = []

@@ -1,4 +1,4 @@
-"""The tables of a page that is written by hand otherwise."""
+"""Tables of pages that are otherwise written by hand."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -9,12 +9,11 @@ _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def renew_tables(path: Path, tables: Sequence[str]) -> None:
-    """Write `tables` into the page at `path`."""
     path.write_text(with_tables(path.read_text(encoding="utf-8"), tables), encoding="utf-8")
 
 
 def with_tables(page: str, tables: Iterable[str]) -> str:
-    """Return a page with `tables` in it: each, in order, takes the place of the next that has the same headings."""
+    """Replace tables of a page, each the next one with the same headings."""
     ahead = list(tables)
 
     def newest(found: re.Match[str]) -> str:
@@ -29,5 +28,5 @@ def with_tables(page: str, tables: Iterable[str]) -> str:
 
 
 def code(text: str) -> str:
-    """Return what shows a text as code in a cell of a table: by GitHub and by the site, also where it has bars."""
+    """Return a table cell with a text as code, for GitHub and the site, also with bars."""
     return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"

@@ -1,4 +1,4 @@
-"""`weather.png` and `.svg`: what the air does at each strength of turbulence."""
+"""`weather.png` and `.svg`: the air at each strength of turbulence."""
 
 from math import pi
 from pathlib import Path
@@ -26,7 +26,7 @@ _COLORS = {"light": "#E69F00", "moderate": "#0072B2", "severe": "#D55E00"}
 
 
 def blow(weather: Weather, duration_s: float) -> tuple[Array, Array]:
-    """Return times, s, (n,), and the air's velocity, ENU, m/s, (n, 3), where a vehicle stands at 10 feet."""
+    """Return times, s, (n,), and velocities of the air, ENU, m/s, (n, 3), at a standing vehicle at 10 feet."""
     air = Air(weather)
     velocity, eddies = air.begin(_HEIGHT_M)
     velocities = [velocity]
@@ -38,7 +38,6 @@ def blow(weather: Weather, duration_s: float) -> tuple[Array, Array]:
 
 
 def draw() -> Figure:
-    """Draw the air over time, and its spectra beside Dryden's."""
     figure = Figure(figsize=(8.6, 7.6), dpi=150)
     times = figure.add_gridspec(2, 1, top=0.89, bottom=0.5, left=0.09, right=0.97, hspace=0.12)
     spectra = figure.add_gridspec(1, 2, top=0.42, bottom=0.07, left=0.09, right=0.97, wspace=0.22)
@@ -84,5 +83,4 @@ def _dryden(intensity: Intensity, axis: int, hz: Array) -> Array:
 
 
 def write(folder: Path) -> None:
-    """Draw into `folder`."""
     write_figure(draw(), folder / "weather")

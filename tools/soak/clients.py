@@ -27,14 +27,7 @@ _VEHICLE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.tom
 
 
 class Look(NamedTuple):
-    """What the processes take at an instant.
-
-    Attributes:
-        wall_s: Since the soak began.
-        sim_s: Simulated time.
-        resident_bytes: Of each process, by name.
-        cpu_s: Of each process so far.
-    """
+    """Use of resources at an instant; `cpu_s` is the total of each process."""
 
     wall_s: float
     sim_s: float
@@ -43,12 +36,11 @@ class Look(NamedTuple):
 
 
 def crew() -> tuple[Station, Station, OffboardTask]:
-    """Return two ground stations and a companion."""
     return Station(255), Station(254), OffboardTask(245)
 
 
 def faults(crew: Iterable[Station]) -> list[str]:
-    """Return what clients have to complain of."""
+    """Return the clients' complaints."""
     found = []
     for client in crew:
         name = f"{client.identity[0]}/{client.identity[1]}"
@@ -64,14 +56,13 @@ def faults(crew: Iterable[Station]) -> list[str]:
 
 
 def without_battery(folder: Path) -> Path:
-    """Write the Hummingbird's file without its battery, which would last 9 minutes; return it."""
+    """Write the Hummingbird's file without its battery, which would last 9 minutes."""
     path = folder / "tireless.toml"
     path.write_text(_VEHICLE.read_text(encoding="utf-8").partition("[battery]")[0], encoding="utf-8")
     return path
 
 
 def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
-    """Fly by the wall clock; return figures, and what was wrong."""
     clients = crew()
     with TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
@@ -120,7 +111,6 @@ def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> d
 
 
 def main() -> int:
-    """Soak for so many minutes; print the figures; return 1 if something was wrong."""
     parser = argparse.ArgumentParser(prog="python -m tools.soak.clients", description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--out", type=Path, help="write all figures as JSON there")

@@ -17,11 +17,10 @@ _BUSY = "while True: sum(range(10_000))"
 
 
 class DiffersError(Exception):
-    """Two runs are not the same."""
+    """Two runs differ."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the suite so often; return 1 at the first difference."""
     args = _arguments(argv)
     links = LINKS if args.link == "both" else (args.link,)
     first: dict[str, str] = {}
@@ -46,23 +45,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read(kept: Path) -> dict[str, str]:
-    """Return outcome and hash of each test of a run."""
     return dict(line.split(" ", 1) for line in kept.read_text(encoding="utf-8").splitlines())
 
 
 def compare(first: dict[str, str], again: dict[str, str]) -> None:
-    """See that two runs are the same.
-
-    Raises:
-        DiffersError: They are not; it names the first test.
-    """
+    """Raise a `DiffersError` for the first test that differs."""
     for test in sorted(first.keys() | again.keys()):
         if first.get(test) != again.get(test):
             raise DiffersError(f"{test}: {first.get(test, 'not run')} at first, {again.get(test, 'not run')} now")
 
 
 def _run(link: str, kept: Path, only: str) -> str:
-    """Write outcome and hash of each test, and return the summary."""
+    """Write outcome and hash of each test; return the summary."""
     hashes = kept.with_suffix(".part")
     command = [sys.executable, "-m", "pytest", "-q", "-m", "scenarios", "tests/scenarios/", "-n", str(WORKERS)]
     command += ["--dist", "worksteal", "--sitl-link", link, "--sitl-hashes", str(hashes)]
@@ -77,7 +71,6 @@ def _run(link: str, kept: Path, only: str) -> str:
 
 @contextmanager
 def kept_in(folder: Path | None) -> Iterator[Path]:
-    """Give a folder for what comes of each run, which lasts as long as the block if none is named."""
     if folder is None:
         with TemporaryDirectory() as own:
             yield Path(own)
@@ -88,7 +81,6 @@ def kept_in(folder: Path | None) -> Iterator[Path]:
 
 @contextmanager
 def busy(processes: int) -> Iterator[None]:
-    """Keep so many cores busy with something else."""
     load = [subprocess.Popen([sys.executable, "-c", _BUSY]) for _ in range(processes)]
     try:
         yield

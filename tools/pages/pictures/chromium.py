@@ -1,4 +1,4 @@
-"""A headless Chromium of the system, driven by Playwright: it draws WebGL without a GPU, slowly."""
+"""A headless Chromium, driven by Playwright: it draws WebGL without a GPU, slowly."""
 
 import shutil
 from collections.abc import Iterator
@@ -24,15 +24,9 @@ _KNOWN_WARNINGS = ("THREE.Clock",)
 
 
 class Tab:
-    """A tab of the browser.
-
-    Attributes:
-        page: Playwright's.
-        complaints: What the console, a script or a request to another computer brought.
-    """
+    """A browser tab; `complaints` collects errors and requests to other computers."""
 
     def __init__(self, page: Page, url: str) -> None:
-        """Open a page, and keep what goes wrong."""
         self.page = page
         self.complaints: list[str] = []
         page.set_default_timeout(WITHIN_MS)
@@ -52,7 +46,6 @@ class Tab:
 
 @contextmanager
 def chromium() -> Iterator[Page]:
-    """Yield an empty tab of a new browser."""
     path = next(filter(None, map(shutil.which, NAMES)), None)
     assert path is not None, "no Chromium: apt-get install chromium"
     with sync_playwright() as playwright:

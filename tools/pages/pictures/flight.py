@@ -25,7 +25,7 @@ _GROUND, _AIR, _TRACK, _BODY, _THRUST = "#7d8a99", "#D55E00", "#b6c2cf", "#22334
 
 
 def draw(path: Path, *, frames_a_second: int = FRAMES_A_SECOND, width_in: float = 6.4) -> None:
-    """Fly the lemniscate and draw a lap of it as a GIF: vehicle, thrust, trail, and its shadow on the ground."""
+    """Fly the lemniscate and draw a lap: vehicle, thrust, trail, and shadow on the ground."""
     flight = fly("lemniscate", duration=FROM_S + LAP_S)
     table = flight.samples
     figure = Figure(figsize=(width_in, 0.56 * width_in), dpi=100)
@@ -59,7 +59,6 @@ def _arms(axes: Any) -> list[Any]:
 
 
 def _set_the_scene(axes: Any, table: Table) -> None:
-    """Draw what does not move: the track, and its shadow."""
     lap = table[table["t"] >= FROM_S]
     axes.plot(lap["x_ref"], lap["y_ref"], lap["z_ref"], color=_TRACK, lw=1.0)
     axes.plot(lap["x_ref"], lap["y_ref"], np.zeros(len(lap)), color="#e3e8ee", lw=1.0)
@@ -73,7 +72,7 @@ def _set_the_scene(axes: Any, table: Table) -> None:
 
 
 def _lines_at(table: Table, first: int, last: int) -> list[Array]:
-    """Return shadow, trail, thrust and the two arms, each its points in ENU, (n, 3), m."""
+    """Return shadow, trail, thrust and both arms, each as points in ENU, (n, 3), m."""
     trail = np.column_stack([table[axis][first : last + 1] for axis in "xyz"])
     row = table[last]
     turn = np.array(rotation_matrix(quaternion_from_euler(row["phi"], row["theta"], row["psi"])))
@@ -85,5 +84,4 @@ def _lines_at(table: Table, first: int, last: int) -> list[Array]:
 
 
 def write(folder: Path) -> None:
-    """Write the picture."""
     draw(folder / "lemniscate.gif")

@@ -1,4 +1,4 @@
-"""`house.png`: packages and their rooms, from the import contracts: what is drawn above may import what is below."""
+"""`house.png`: packages and their layers, from the import contracts; upper ones may import lower ones."""
 
 import re
 import tomllib
@@ -25,7 +25,7 @@ _ALONE = ("autopilot", "plant", "mavlink", "common")
 
 
 def layers() -> dict[str, list[list[str]]]:
-    """Return of each package its rooms, those that import first, in layers; rooms of a layer do not know each other."""
+    """Return the layers of each package, the importing ones first."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     found: dict[str, list[list[str]]] = {}
     for contract in project["tool"]["importlinter"]["contracts"]:
@@ -44,12 +44,11 @@ def _is_room(package: str, room: str, leave: set[str]) -> bool:
 
 
 def description() -> str:
-    """Return what is drawn as text, which the picture keeps: so it is seen when it is no longer current."""
+    """Return the drawing as text, which the picture keeps to show whether it is current."""
     return "; ".join(f"{package}: {' > '.join(' '.join(row) for row in rows)}" for package, rows in layers().items())
 
 
 def draw(path: Path) -> None:
-    """Draw the house."""
     figure = Figure(figsize=(12.0, 6.4), dpi=100)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
@@ -77,7 +76,7 @@ def _height(rows: list[list[str]]) -> float:
 
 
 def _package(axes: Axes, left: float, top: float, package: str, rows: list[list[str]]) -> float:
-    """Draw a package with its layers from `top` down; return where it ends."""
+    """Draw a package with its layers from `top` down; return its lower edge."""
     colour, what = PACKAGES[package]
     height = _height(rows)
     frame: dict[str, Any] = {"boxstyle": "round,pad=0,rounding_size=0.12", "edgecolor": _FRAME}
@@ -96,5 +95,4 @@ def _package(axes: Axes, left: float, top: float, package: str, rows: list[list[
 
 
 def write(folder: Path) -> None:
-    """Write the picture."""
     draw(folder / "house.png")

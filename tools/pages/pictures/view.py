@@ -1,4 +1,4 @@
-"""`view-*.png`: the page of `colibri view` as Chromium shows it, of flights in memory, live and recorded."""
+"""`view-*.png`: the page of `colibri view` in Chromium, of flights live and recorded."""
 
 import subprocess
 import sys
@@ -33,7 +33,7 @@ from tools.pages.pictures.watched import Watched
 
 FRAME_S, PLOTTED_AGAIN = 0.1, 8
 DRAWN_AFTER_MS = 15000
-"""Without a GPU a picture takes a second, and what is sent last has to be in it."""
+"""Without a GPU a picture takes a second, and the last data must be in it."""
 COLOURS = 160
 KNOWN_AFTER_S, ON_ITS_WAY_S, PATIENCE_S, NEAR_M = 10.0, 3.0, 60.0, 0.5
 PLACES_M = ((0.0, 0.0, 4.0), (8.0, 0.0, 4.0), (8.0, 6.0, 5.0), (0.0, 6.0, 5.0))
@@ -41,7 +41,6 @@ TOKEN = Token("docs")
 
 
 def write(folder: Path) -> None:
-    """Fly, and write the pictures."""
     recorded(folder / "view-recorded.png")
     compared(folder / "view-two.png")
     live(folder / "view-live.png")
@@ -50,7 +49,6 @@ def write(folder: Path) -> None:
 
 
 def recorded(path: Path) -> None:
-    """Show a flight on sensors in wind, with its horizon."""
     flight = fly("lemniscate:lap=5", duration=15.0, feedback="sensors", wind="5@270", turbulence="light", link="memory")
     with ExitStack() as held:
         folder = held.enter_context(TemporaryDirectory())
@@ -60,7 +58,7 @@ def recorded(path: Path) -> None:
 
 
 def compared(path: Path) -> None:
-    """Show two control laws on one track that is too fast for one of them."""
+    """Show two control laws on a track that is too fast for one of them."""
     begun = partial(fly, "lemniscate:lap=5", duration=6.0, wind="8@270", turbulence="moderate", link="memory")
     both = [begun(), begun(controller="geometric-se3")]
     with ExitStack() as held:
@@ -73,7 +71,7 @@ def compared(path: Path) -> None:
 
 
 def live(path: Path) -> None:
-    """Show a vehicle on sensors that goes where it was told to, with its commands unlocked."""
+    """Show a vehicle on its way to a target, with its commands unlocked."""
     with begun(feedback="sensors", wind="4@300") as sitl:
         vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
         sitl.run(3.0)
@@ -85,7 +83,7 @@ def live(path: Path) -> None:
 
 
 def mission(path: Path) -> None:
-    """Show a mission inside a fence, with a zone to keep out of and a rally point."""
+    """Show a mission inside a fence, with an exclusion zone and a rally point."""
     with begun(wind="3@200") as sitl:
         vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
         corners = [(-6.0, -6.0), (12.0, -6.0), (12.0, 10.0), (-6.0, 10.0)]
@@ -101,13 +99,12 @@ def mission(path: Path) -> None:
 
 @contextmanager
 def begun(**setting: str) -> Iterator[Sitl]:
-    """Yield a vehicle that stands at home."""
     with Flights(setting_of([setting]), None) as flights:
         yield flights.begin()
 
 
 def real(path: Path) -> None:
-    """Show a vehicle of `colibri sitl` on sensors over UDP, as any that speaks as PX4 does, and as the page orders."""
+    """Show a vehicle of `colibri sitl` over UDP, flown by the page's orders."""
     vehicle = LiveVehicle("udpin:127.0.0.1:0")
     with TemporaryDirectory() as folder, closing(vehicle):
         link = ["--gcs", vehicle.url.replace("udpin", "udpout"), "--plant-port", "0", "--state", folder]
@@ -122,7 +119,6 @@ def real(path: Path) -> None:
 
 
 def fly_by_orders(vehicle: LiveVehicle) -> None:
-    """Arm, take off and go round a square, as buttons do."""
     wait(lambda: vehicle.at(perf_counter()).mode == "Hold")
     sleep(KNOWN_AFTER_S)
     vehicle.order(lambda observer: observer.arm(True))
@@ -135,19 +131,16 @@ def fly_by_orders(vehicle: LiveVehicle) -> None:
 
 
 def is_near(vehicle: LiveVehicle, place: Vector) -> bool:
-    """Return whether a vehicle is at a place, ENU."""
     return dist(vehicle.at(perf_counter()).position_enu_m, place) < NEAR_M
 
 
 def on_its_way(vehicle: LiveVehicle) -> float:
-    """Have it go on; return the time when it has got somewhere."""
     vehicle.order(partial(Observer.go_to, place_enu_m=PLACES_M[1]))
     sleep(ON_ITS_WAY_S)
     return perf_counter()
 
 
 def wait(until: Callable[[], object]) -> None:
-    """Wait until something is so."""
     give_up_s = perf_counter() + PATIENCE_S
     while not until():
         assert perf_counter() < give_up_s, "the vehicle does not do as it is told"
@@ -155,7 +148,7 @@ def wait(until: Callable[[], object]) -> None:
 
 
 def keep(path: Path, sources: Sequence[Source], time_s: float | Callable[[], float], *, commands: bool = False) -> None:
-    """Write what the page shows at a time, which may be asked for once a browser is there."""
+    """Write a picture of the page at a time, evaluated once the browser is open."""
     page = Page(sources, serve(0, "Colibri"))
     if commands:
         page.offer_commands(TOKEN, lambda: CHOICES[PX4])

@@ -1,4 +1,4 @@
-"""A flight in simulated time, in the eyes of `colibri view`: as its observer, and as a live vehicle of its page."""
+"""A flight in simulated time as a live vehicle of `colibri view`."""
 
 from colibri.mavlink.wire.dialect import Message
 from colibri.sitl.ground_station import Station
@@ -8,23 +8,20 @@ from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings
 
 
 class Watching(Station):
-    """A station of a flight in simulated time that is an `Observer`."""
+    """A station of a simulated flight that feeds an `Observer`."""
 
     observer: Observer
 
     def add(self, message: Message) -> None:
-        """Hand it to the observer."""
         self.observer.receive(message.frame, self._flight.time_us / 1e6)
 
     def departing(self, now_us: int) -> list[bytes]:
-        """Send what the observer has to say."""
         for datagram in self.observer.poll(now_us / 1e6):
             self.send_raw(datagram)
         return super().departing(now_us)
 
 
 def watched(sitl: Sitl) -> Observer:
-    """Return an observer of a flight, from now on."""
     station = sitl.client(SYSTEM, COMPONENT, beats=False)
     station.__class__ = Watching
     assert isinstance(station, Watching)
@@ -39,24 +36,19 @@ class Watched:
     is_live = True
 
     def __init__(self, sitl: Sitl, name: str) -> None:
-        """Watch it from now on."""
         self.name = name
         self._observer = watched(sitl)
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """See `Source`."""
         return 0.0, 0.0
 
     @property
     def surroundings(self) -> Surroundings:
-        """See `Source`."""
         return self._observer.surroundings
 
     def at(self, time_s: float) -> Snapshot:
-        """See `Source`."""
         return self._observer.telemetry.snapshot(time_s)
 
     def charts(self) -> tuple[Chart, ...]:
-        """See `Source`."""
         return self._observer.telemetry.charts()

@@ -1,4 +1,4 @@
-"""`cli.md`: every command and option, from the parsers themselves."""
+"""`cli.md`: every command and option, from the parsers."""
 
 from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
 from collections.abc import Iterator
@@ -29,14 +29,13 @@ Exit codes: 0 it went well; 1 something failed, and one line says what; 2 bad in
 
 
 class _Listener(HelpFormatter):
-    """Takes down the arguments that a parser has, in place of formatting them."""
+    """Records the arguments of a parser, without formatting them."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog)
         self.heard: list[Action] = []
 
     def add_argument(self, action: Action) -> None:
-        """Take it down."""
         self.heard.append(action)
 
 
@@ -49,7 +48,6 @@ def arguments_of(parser: ArgumentParser) -> list[Action]:
 
 
 def parsers() -> dict[str, ArgumentParser]:
-    """Return the parser of each command by its name, the two processes last."""
     whole = parser_of(*COMMANDS)
     (commands,) = [action.choices for action in arguments_of(whole) if isinstance(action.choices, dict)]
     found = {name: commands[name] for name in COMMANDS}
@@ -57,7 +55,6 @@ def parsers() -> dict[str, ArgumentParser]:
 
 
 def page() -> str:
-    """Return the page."""
     known = parsers()
     lines = [_HEAD]
     for group, commands in GROUPS.items():
@@ -101,5 +98,4 @@ def _help(action: Action, parser: ArgumentParser) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the page."""
     (folder / "cli.md").write_text(page(), encoding="utf-8")

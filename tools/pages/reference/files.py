@@ -77,7 +77,6 @@ _REPORT: dict[str, str] = {
 
 
 def tables() -> list[str]:
-    """Return the tables of the page, in their order."""
     assert ("t", *chain.from_iterable(each.names.split() for each in _FLIGHT)) == COLUMNS
     logs = {"flight.csv": _FLIGHT, **{topic.name: topic.columns for topic in FLIGHT_TOPICS}}
     return [
@@ -103,7 +102,7 @@ def _codes(codes: Mapping[Any, int]) -> str:
 
 
 def report_keys() -> list[str]:
-    """Return the keys of a report, in their order, from the function that makes it."""
+    """Return the keys of a report, from the source of the function that makes it."""
     returned = next(node for node in ast.walk(ast.parse(getsource(report))) if isinstance(node, ast.Return))
     assert isinstance(returned.value, ast.Dict)
     keys: list[str] = []
@@ -120,5 +119,4 @@ def _keys() -> Iterator[str]:
 
 
 def write(folder: Path) -> None:
-    """Write the tables."""
     renew_tables(folder / "files.md", tables())

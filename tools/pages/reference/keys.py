@@ -1,4 +1,4 @@
-"""`profile-keys.md` and `vehicle-keys.md`: every key of the two kinds of files, from the structures that read them."""
+"""`profile-keys.md` and `vehicle-keys.md`: every key of both kinds of files, from the structures that read them."""
 
 import ast
 import re
@@ -63,7 +63,6 @@ _BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to"}
 
 
 def pages() -> dict[str, str]:
-    """Return the pages by their names."""
     profiles = _said("flight", profile_names(), profile_text)
     vehicles = _said("hummingbird", vehicle_names(), vehicle_text)
     sections = [_PROFILES, *_sections(ProfileTables, "", profiles)]
@@ -76,7 +75,7 @@ def pages() -> dict[str, str]:
 
 
 def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[str, tuple[str, str, str]]:
-    """Return of each dotted key its value, its comment, and the name of its file: `first`, or the first that has it."""
+    """Return value, comment and file of each dotted key: from `first`, or the first file that has it."""
     found: dict[str, tuple[str, str, str]] = {}
     for name in sorted(names, key=lambda name: name != first):
         table = key = ""
@@ -96,7 +95,6 @@ def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[s
 
 
 def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> Iterator[str]:
-    """Yield the section of a table, then those of the tables in it."""
     info = msgspec.inspect.type_info(kind)
     assert isinstance(info, StructType)
     yield f"## {_heading(above)}\n"
@@ -135,13 +133,11 @@ def _first_line(kind: Any) -> str:
 
 
 def _table_of(kind: Type) -> Any:
-    """Return the structure that a key holds; None where it holds none."""
     parts = kind.types if isinstance(kind, UnionType) else (kind,)
     return next((part.cls for part in parts if isinstance(part, StructType)), None)
 
 
 def _what(kind: Type) -> str:
-    """Return in words which values are right."""
     match kind:
         case Metadata():
             return _what(kind.type)
@@ -166,7 +162,7 @@ def _what(kind: Type) -> str:
 
 
 def _notes(kind: Any) -> dict[str, str]:
-    """Return the docstring below each field of a structure and of those it derives from."""
+    """Return the docstring below each field of a structure and its bases."""
     notes: dict[str, str] = {}
     for part in reversed(kind.__mro__):
         if not part.__module__.startswith("colibri."):
@@ -189,6 +185,5 @@ def _cell(text: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the pages."""
     for name, page in pages().items():
         (folder / name).write_text(page, encoding="utf-8")

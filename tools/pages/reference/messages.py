@@ -1,4 +1,4 @@
-"""`messages.md`: what the vehicle streams, takes and obeys, from its tables and from the classes of its services."""
+"""`messages.md`: messages and commands of the vehicle, from its tables and services."""
 
 import ast
 import pkgutil
@@ -42,7 +42,6 @@ _HANDLERS = (commands, motion_commands, stations, streaming_service, standard_mo
 
 
 def page() -> str:
-    """Return the page."""
     return "\n".join(
         [
             _HEAD,
@@ -80,7 +79,7 @@ def _taken() -> Iterator[str]:
 
 
 def taken() -> dict[str, str]:
-    """Return who takes each message that a vehicle takes: the first sentence of the service."""
+    """Return the messages that a vehicle takes, with the first sentence of their service."""
     found: dict[str, str] = {}
     for module in _modules(mavlink_package):
         for _, kind in getmembers(module, isclass):
@@ -99,7 +98,6 @@ def _modules(package: ModuleType) -> Iterator[ModuleType]:
 
 
 def obeyed() -> set[str]:
-    """Return the names of the commands for which there is a handler."""
     found: set[str] = set()
     for module in _HANDLERS:
         tree = ast.parse(getsource(module))
@@ -122,5 +120,4 @@ def _cell(text: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the page."""
     (folder / "messages.md").write_text(page(), encoding="utf-8")

@@ -23,7 +23,6 @@ _ENTRY = re.compile(r"^    (\*{0,2}\w+)(?: \(.*?\))?: (.*)$")
 
 
 def page() -> str:
-    """Return the page."""
     lines = [_HEAD]
     shown: set[int] = set()
     for face in FACES:
@@ -51,7 +50,7 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
 
 
 def _options(kind: type) -> Iterator[str]:
-    """Yield the options of a specification that are keywords."""
+    """Yield the keyword options of a specification."""
     if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
         yield "| option | |\n|---|---|"
         for name, field in fields_of(kind).items():
@@ -61,7 +60,7 @@ def _options(kind: type) -> Iterator[str]:
 
 
 def _members(kind: type) -> Iterator[str]:
-    """Yield what of a class of ours is public and says what it is: methods and properties, its own and inherited."""
+    """Yield the documented public methods and properties of our classes, inherited ones included."""
     rows = []
     for name, member in inspect.getmembers(kind):
         owner = next((base for base in kind.__mro__ if name in vars(base)), kind)
@@ -81,7 +80,7 @@ def _members(kind: type) -> Iterator[str]:
 
 
 def _signature(name: str, function: Any) -> str:
-    """Return how it is called: names and defaults; types are in the docstrings where they matter."""
+    """Return names and defaults of the arguments; types are in the docstrings where they matter."""
     parts, star = [], False
     for parameter in inspect.signature(function).parameters.values():
         if parameter.name == "self":
@@ -106,7 +105,7 @@ def _sentence(doc: str) -> str:
 
 
 def _text(doc: str) -> str:
-    """Return a docstring as Markdown: its sections as lists."""
+    """Return a docstring as Markdown, its sections as lists."""
     lines: list[str] = []
     in_section = False
     for line in doc.splitlines():
@@ -129,5 +128,4 @@ def _cell(text: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the page."""
     (folder / "python-api.md").write_text(page(), encoding="utf-8")
