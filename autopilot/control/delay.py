@@ -9,7 +9,6 @@ give equal flights.
 """
 
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,13 +27,6 @@ _WORTH_US = 1_000  # a smaller change of the measured delay is ignored: referenc
 _CONTINUES_US = 100_000  # after a longer gap the rotors restart at their commands and the disturbance at zero
 _DISTURBANCE_RAD_S = 10.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 60.0, 60.0, 60.0])  # m/s², rad/s²
-
-
-class _Known(NamedTuple):
-    """The last state that was known: its time, and `motion`'s x."""
-
-    time_us: int
-    x: Array
 
 
 class DelayCompensation:
@@ -73,7 +65,7 @@ class DelayCompensation:
     def begin(self, controls: FourRotors, *, rests: bool = False) -> None:
         """Start with the rotors turning at `controls`; a vehicle at rest stays until they lift it."""
         self._sent = deque([ActuatorCommand(0, controls, armed=any(controls))])
-        self._known: _Known | None = None
+        self._known: tuple[int, Array] | None = None  # time, µs, and x of the previous frame
         self._rests = rests
         self._disturbance = np.zeros(6)
 
@@ -93,16 +85,13 @@ class DelayCompensation:
         battery = self._vehicle.battery
         voltage_v = 1.0 if battery is None else open_voltage_v(battery, charge_ah)
         x = self._now(frame, voltage_v)
-        self._known = _Known(frame.time_us, x)
-        self._rests = standing or (self._rests and motion.thrust_n(x[motion.ROTORS], self._model) < self._weight_n)
+        self._known = (frame.time_us, x)
+        weight_n = self._vehicle.body.mass_kg * self._vehicle.gravity_m_s2
+        self._rests = standing or (self._rests and motion.thrust_n(x[motion.ROTORS], self._model) < weight_n)
         if self._rests:
             self._disturbance = np.zeros(6)
             return frame
         return _frame(frame.time_us + self.delay_us, self._carried(x, frame.time_us, self.delay_us, voltage_v))
-
-    @property
-    def _weight_n(self) -> float:
-        return self._vehicle.body.mass_kg * self._vehicle.gravity_m_s2
 
     def _choose(self) -> None:
         delay_us = self._median_us if self._declared_s is None else round(self._declared_s * 1e6)
@@ -120,11 +109,11 @@ class DelayCompensation:
                 *self._speeds(self._acting(now_us)[0]),
             )
         )
-        if known is None or not 0 < now_us - known.time_us <= _CONTINUES_US:
+        if known is None or not 0 < now_us - known[0] <= _CONTINUES_US:
             self._disturbance = np.zeros(6)
             return x
-        passed_us = now_us - known.time_us
-        expected = self._carried(known.x, known.time_us, passed_us, voltage_v)
+        passed_us = now_us - known[0]
+        expected = self._carried(known[1], known[0], passed_us, voltage_v)
         x[motion.ROTORS] = expected[motion.ROTORS]
         missed = (x - expected)[[3, 4, 5, 10, 11, 12]] / (passed_us * 1e-6)
         part = 1.0 - exp(-_DISTURBANCE_RAD_S * passed_us * 1e-6)

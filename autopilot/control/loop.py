@@ -62,15 +62,15 @@ class ControlLoop:
     def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
         """Build the control law as `build_controller` does, with its errors."""
         self._name = profile.controller
-        self._controller = build_controller(profile, vehicle, clock, law)
-        if isinstance(self._controller, CompiledController):
-            self._controller.warm_up()
+        self.controller = build_controller(profile, vehicle, clock, law)
+        if isinstance(self.controller, CompiledController):
+            self.controller.warm_up()
         self.vehicle = vehicle
-        self.preview = self._controller.preview
-        self.takes_attitude = isinstance(self._controller, AttitudeController)
-        self.plan_columns = self._controller.plan_columns if isinstance(self._controller, PlanController) else None
-        self._take_in(self._controller)
-        self.control_interval_us = self._controller.control_interval_us
+        self.preview = self.controller.preview
+        self.takes_attitude = isinstance(self.controller, AttitudeController)
+        self.plan_columns = self.controller.plan_columns if isinstance(self.controller, PlanController) else None
+        self._take_in(self.controller)
+        self.control_interval_us = self.controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
         self._waited_us = 0
@@ -84,7 +84,7 @@ class ControlLoop:
 
         The estimated charge is kept, or with `afresh` set to the battery's last report.
         """
-        before, self._memory = self._memory, self._controller.initial(rotor_speed)
+        before, self._memory = self._memory, self.controller.initial(rotor_speed)
         if self._charged is not None:
             charge_ah = self._reported_ah if afresh or before is None else self._charged.charge_ah(before)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
@@ -141,7 +141,7 @@ class ControlLoop:
 
     def resume(self, record: LoopRecord, *, seamless: bool) -> None:
         """Resume from a record: `seamless`, or as `begin_in_flight` does."""
-        first = self._controller.initial(self.vehicle.hover_speed)
+        first = self.controller.initial(self.vehicle.hover_speed)
         kept = of_bytes(type(first), record.memory)
         self._memory = first if kept is None else kept
         if seamless and kept is not None:
@@ -170,7 +170,7 @@ class ControlLoop:
         try:
             if self._waiting is not None and pace is not Pace.CLOCK:
                 return self._decide_on_path(self._waiting, time_us, state, references, pace)
-            return self._take(time_us, self._controller.step(self._memory, time_us, state, references))
+            return self._take(time_us, self.controller.step(self._memory, time_us, state, references))
         except DecisionError:
             raise
         except (Exception, SystemExit) as error:
@@ -192,9 +192,9 @@ class ControlLoop:
         Raises:
             DecisionError: The control law raised, or decided outside the rotors' limits.
         """
-        assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
+        assert isinstance(self.controller, AttitudeController), "decided only where attitudes are taken"
         try:
-            return self._take(time_us, self._controller.step_attitude(self._memory, time_us, state, demand))
+            return self._take(time_us, self.controller.step_attitude(self._memory, time_us, state, demand))
         except DecisionError:
             raise
         except (Exception, SystemExit) as error:
@@ -205,12 +205,8 @@ class ControlLoop:
         self._take_in(controller)
         self.vehicle = vehicle
 
-    @property
-    def controller(self) -> Controller[Any]:
-        return self._controller
-
     def _take_in(self, controller: Controller[Any]) -> None:
-        self._controller = controller
+        self.controller = controller
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
         on_path = controller if isinstance(controller, PathController) else None

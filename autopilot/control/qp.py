@@ -4,16 +4,13 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from functools import cache, lru_cache
 from math import nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.types import Array
-
-if TYPE_CHECKING:
-    from scipy.sparse import csc_matrix
 
 IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
 
@@ -69,7 +66,9 @@ class QpSolver:
 
         self._residual = residual
         options = _options(name, tolerance, max_iterations)
-        self._optimum = _solver(name, options)
+        self._optimum: Callable[[Qp], _Optimum] = (
+            _Daqp(options) if name == _DAQP else _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)
+        )
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
@@ -92,12 +91,6 @@ class _Optimum(NamedTuple):
     z: Array | None
     z_box: Array | None
     iterations: float
-
-
-def _solver(name: str, options: dict[str, Any]) -> Callable[[Qp], _Optimum]:
-    if name == _DAQP:
-        return _Daqp(options)
-    return _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)
 
 
 class _Daqp:
@@ -235,16 +228,16 @@ def box(n: int) -> Array:
     return np.vstack([np.eye(n), -np.eye(n)])
 
 
-def _filled(role: str, matrix: Array) -> "csc_matrix":
+def _filled(role: str, matrix: Array) -> Any:
     """Return a matrix as CSC. Its pattern is cached: building one takes five times Clarabel's solution."""
     filled = matrix.T != 0.0
     sparse = _pattern(role, matrix.shape, filled.tobytes())
-    np.asarray(sparse.data)[:] = matrix.T[filled]
+    sparse.data[:] = matrix.T[filled]
     return sparse
 
 
 @lru_cache(maxsize=_PATTERNS)
-def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> "csc_matrix":
+def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> Any:
     from scipy.sparse import csc_matrix
 
     del role  # two matrices of one pattern are two matrices

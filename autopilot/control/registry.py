@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import EntryPoints, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from sys import modules
@@ -58,12 +58,17 @@ def load_controller(name: str) -> Factory:
     Raises:
         ControllerError: The name is unknown, or its package cannot be loaded.
     """
+    entry = _entry(name)
+    try:
+        factory: Factory = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
+    return factory
+
+
+def _entry(name: str) -> EntryPoint:
     for entry in registered().select(name=name):
-        try:
-            factory: Factory = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
-        return factory
+        return entry
     raise ControllerError(unknown("controller", name, controller_names()))
 
 
@@ -77,11 +82,10 @@ class Origin(NamedTuple):
 
 @cache
 def origin_of(name: str) -> Origin:
-    for entry in registered().select(name=name):
-        package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
-        spec = find_spec(entry.module)
-        return Origin(entry.value, package, _sha256(spec.origin if spec else None))
-    raise ControllerError(unknown("controller", name, controller_names()))
+    entry = _entry(name)
+    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
+    spec = find_spec(entry.module)
+    return Origin(entry.value, package, _sha256(spec.origin if spec else None))
 
 
 def origin_of_factory(law: Factory) -> Origin:

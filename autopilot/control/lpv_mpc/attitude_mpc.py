@@ -113,15 +113,11 @@ class AttitudeMpc:
         plan, diagnostics = self._solve(now, target)
         if plan is None or plan.angle_slack <= _KEPT:
             return plan, diagnostics
-        less_thrust = target._replace(thrust_n=np.minimum(target.thrust_n, self._middle_thrust_n(now)))
+        middle_n = 0.5 * (self.problem.min_squared + square(now.max_speed)) / float(self.problem.from_thrust.max())
+        less_thrust = target._replace(thrust_n=np.minimum(target.thrust_n, middle_n))  # room for moments of either sign
         second, how = self._solve(now, less_thrust)
         how = how._replace(solve_time_s=diagnostics.solve_time_s + how.solve_time_s)
         return (second, how) if second is not None else (plan, diagnostics)
-
-    def _middle_thrust_n(self, now: InitialState) -> float:
-        """Return the thrust, N, that leaves most room for moments of either sign."""
-        middle = 0.5 * (self.problem.min_squared + square(now.max_speed))
-        return middle / float(self.problem.from_thrust.max())
 
     def _solve(self, now: InitialState, target: Target) -> tuple[Plan | None, Diagnostics]:
         qp = self.condense(now, target)

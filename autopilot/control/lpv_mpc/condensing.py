@@ -104,14 +104,6 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 
 
 @compiled
-def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array) -> None:
-    """Bound the first increments, but let them cancel all of u."""
-    for i in range(INPUTS):
-        lower[i] = min(-max_increment[i], -u[i])
-        upper[i] = max(max_increment[i], -u[i])
-
-
-@compiled
 def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
     """Fill the rows of the rotor limits from row 0 on; return their number.
 
@@ -252,7 +244,9 @@ def condense(
 ) -> None:
     """Fill a QP in place, except the slacks' part of H, f and the bounds."""
     problem = packed[0]
-    limit_first_move(u, problem.max_increment, qp.lower, qp.upper)
+    for i in range(INPUTS):  # the first increments may always cancel u
+        qp.lower[i] = min(-problem.max_increment[i], -u[i])
+        qp.upper[i] = max(problem.max_increment[i], -u[i])
     quadratic_cost(responses, target, u, problem, qp.H, qp.f)
     row = limit_rotors(problem, target.thrust_n, u, max_squared, qp.G, qp.h)
     limit_motion(responses, schedule, problem, row, qp.G, qp.h)

@@ -66,15 +66,11 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
     Gamma = np.zeros((horizon * p, horizon * m))
     for column in range(horizon):
         Gamma[column * p :, column * m : (column + 1) * m] = markov[: (horizon - column) * p]
-    weighted = Gamma.T * _along(horizon, weights)
+    weighted = Gamma.T * np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])
     H = matmul(weighted, Gamma)
     H.flat[:: horizon * m + 1] += np.concatenate([weights.increment] * horizon)
     free = matvec(Phi, x)
     return CondensedQp(0.5 * (H + H.T), matvec(weighted, free - reference.ravel()), free, Gamma)
-
-
-def _along(horizon: int, weights: Weights) -> Array:
-    return np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])
 
 
 class Solution(NamedTuple):

@@ -84,20 +84,18 @@ class BatteryModel:
         return before + part * (after - before)
 
     def _balanced(self, battery: Battery, point: int) -> float:
-        """Return the balance at a charge step; cached, since all of them would delay the start."""
-        if point not in self._max_speeds:
-            self._max_speeds[point] = self._balance(battery, self._step_ah * point)
-        return self._max_speeds[point]
-
-    def _balance(self, battery: Battery, charge_ah: float) -> float:
-        """Find the speed, in parts of the largest, at equal parts of the voltage."""
+        """Return the common speed at a charge step, equal in parts to the voltage; found at first use."""
+        if point in self._max_speeds:
+            return self._max_speeds[point]
+        open_v = open_voltage_v(battery, self._step_ah * point)
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
             power_w = 4.0 * self._full_power_w * speed * speed * speed
-            voltage_v = loaded_voltage_v(open_voltage_v(battery, charge_ah), power_w, battery.resistance_ohm)
+            voltage_v = loaded_voltage_v(open_v, power_w, battery.resistance_ohm)
             enough = voltage_v >= speed * battery.full_voltage_v
             low, high = (speed, high) if enough else (low, speed)
+        self._max_speeds[point] = low
         return low
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.autopilot.control.vehicle_model.battery import loaded_voltage_v
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
@@ -153,8 +154,8 @@ def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> floa
     power_w = 0.0
     for i in range(4):
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
-    root = sqrt(max(0.0, open_voltage_v * open_voltage_v - 4.0 * model.resistance_ohm * power_w))
-    return model.top_speed * (0.5 * (open_voltage_v + root) / model.full_voltage_v)
+    voltage_v = loaded_voltage_v(open_voltage_v, power_w, model.resistance_ohm)
+    return model.top_speed * (voltage_v / model.full_voltage_v)
 
 
 @compiled

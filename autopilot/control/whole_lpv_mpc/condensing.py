@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.autopilot.control.qp import Qp
 from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import rate_between
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
@@ -83,15 +84,14 @@ def cost(
     target: Target,
     corrections: Array,
     problem: Problem,
-    H: Array,
-    f: Array,
+    qp: Qp,
 ) -> None:
     """Fill H and f; `corrections` are the last one flown, then the nominal ones, (b + 1, 4)."""
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
+    H, f, row = qp.H, qp.f, np.empty(moved)
     H[:, :] = 0.0
     f[:] = 0.0
-    row = np.empty(moved)
     for step in problem.counted:
         used = inputs * _blocks(problem.starts, step)
         _add_motion(motion, responses, step, target, problem.weights, used, row, H, f)

@@ -89,15 +89,15 @@ def begin(
         open_v: Voltage of the battery without load.
         max_n: Largest thrust.
     """
-    it = now[0]
-    put(rigid, it.rigid)
+    start = now[0]
+    put(rigid, start.rigid)
     for i in range(ROTORS):
-        it.squared[i] = speeds[i] * speeds[i]
+        start.squared[i] = speeds[i] * speeds[i]
     for i in range(3):
-        it.disturbance.acceleration[i], it.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
-    it.limits[:, 0] = least
-    fill_limits(expected, open_v, battery, it.limits[:, 1])
-    it.force.max_n = max_n
+        start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
+    start.limits[:, 0] = least
+    fill_limits(expected, open_v, battery, start.limits[:, 1])
+    start.force.max_n = max_n
 
 
 @compiled
@@ -126,9 +126,9 @@ def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Pa
     `last` are commands of the previous plan from now on, (n, 4), or (0, 4) without one; `now`, `target`, `vehicle`,
     `kind` the packed `Now`, `Target`, `Model` and `Kind`.
     """
-    it = kind[0]
-    _expect(now[0], target[0], last, vehicle, it)
-    _price_errors(target[0], it)
+    work = kind[0].work
+    _expect(now[0], target[0], last, vehicle, kind[0])
+    cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
 
 
 @compiled
@@ -136,17 +136,11 @@ def condense_on_path(
     now: Packed, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
 ) -> None:
     """Fill the QP with free speed along the path; see `condense`."""
-    it = kind[0]
-    _expect(now[0], target[0], last, vehicle, it)
-    fill_slides(path, effects, it.work.responses)
-    _price_errors(target[0], it)
-    price(path, effects, it.problem.starts, it.qp)
-
-
-@inlined
-def _price_errors(target: Target, kind: Kind) -> None:
-    work, qp = kind.work, kind.qp
-    cost(work.motion, work.speeds, work.responses, target, work.corrections, kind.problem, qp.H, qp.f)
+    work = kind[0].work
+    _expect(now[0], target[0], last, vehicle, kind[0])
+    fill_slides(path, effects, work.responses)
+    cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
+    price(path, effects, kind[0].problem.starts, kind[0].qp)
 
 
 @inlined
@@ -261,8 +255,8 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
 @compiled
 def is_beyond(kind: Packed, z: Array) -> bool:
     """Whether the plan by z, (n,), exceeds a soft limit at a checked step."""
-    it = kind[0]
-    return exceeds(it.work.motion, it.work.responses, z, it.problem)
+    work = kind[0].work
+    return exceeds(work.motion, work.responses, z, kind[0].problem)
 
 
 @compiled
@@ -294,13 +288,12 @@ def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) 
 @compiled
 def limit(kind: Packed) -> None:
     """Copy the QP without soft limits, and add them."""
-    it = kind[0]
-    free, qp = it.qp, it.limited
+    work, free, qp = kind[0].work, kind[0].qp, kind[0].limited
     moved = free.f.shape[0]
     for k in range(moved):
         put(free.H[k], qp.H[k, :moved])
         qp.f[k], qp.lower[k], qp.upper[k] = free.f[k], free.lower[k], free.upper[k]
-    limit_motion(it.work.motion, it.work.responses, it.problem, qp.G, qp.h)
+    limit_motion(work.motion, work.responses, kind[0].problem, qp.G, qp.h)
 
 
 @compiled
