@@ -1,11 +1,7 @@
 """Delay compensation: the vehicle's state at the time a new command takes effect.
 
-The vehicle model carries the state ahead, with the commands already sent and the observed disturbance: the measured
-minus the predicted rates of change. References are taken at the same time, so a control law may assume that its
-commands act at once.
-
-The delay is declared, or the median of the delays that the plant reported. Only simulated time counts: equal frames
-give equal flights.
+The vehicle model carries the state ahead with the commands already sent and the observed disturbance, measured minus
+predicted change. The delay is declared, or the median of the plant's reports; only simulated time counts.
 """
 
 from collections import deque
@@ -30,14 +26,10 @@ _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 60.0, 60.0, 60.0])  # m/s², rad/s²
 
 
 class DelayCompensation:
-    """Compensates the delay of one vehicle's commands.
-
-    Attributes:
-        delay_us: Compensated time from a frame to the effect of its command.
-    """
+    """Compensates the delay of one vehicle's commands."""
 
     def __init__(self, vehicle: Vehicle, declared_s: float | None = None) -> None:
-        """Compensate the declared delay, or with None the measured one; loads compiled code."""
+        """Compensate the declared delay, or with None the measured one."""
         self._measured: deque[int] = deque(maxlen=_MEDIAN_OF)
         self._median_us = self.delay_us = 0
         self._declared_s: float | None = None
@@ -98,7 +90,7 @@ class DelayCompensation:
         self.delay_us = min(max(delay_us, 0), MAX_DELAY_US)
 
     def _now(self, frame: StateFrame, voltage_v: float) -> Array:
-        """Return x at a frame, rotors as the acting commands turn them; update the disturbance."""
+        """Return x at a frame; update the disturbance."""
         now_us, known = frame.time_us, self._known
         x = np.array(
             (
@@ -128,7 +120,7 @@ class DelayCompensation:
         return motion.carry(x, durations_s, speeds, self._disturbance, voltage_v, self._model)
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[ActuatorCommand]:
-        """Return the command acting at a time, then those that take effect before another."""
+        """Return the command acting at a time, then those taking effect before another."""
         acting = [self._sent[0]]
         for it in self._sent:
             acts_us = it.time_us + self.delay_us

@@ -1,10 +1,8 @@
 """A geometric tracking controller on SE(3), as a baseline for the LPV-MPC.
 
 T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; equation numbers
-in brackets. Frames are ENU and FLU with thrust along +z, so gravity and thrust change sign.
-
-Position, attitude and yaw are critically damped loops, each well below the next faster: gains are ω² and 2ω times the
-mass, or times the inertia.
+in brackets. Frames are ENU and FLU with thrust along +z, so gravity and thrust change sign. All loops are critically
+damped: gains are ω² and 2ω times mass or inertia.
 """
 
 from collections.abc import Mapping
@@ -90,7 +88,7 @@ class GeometricController:
         return None, Decision(speeds, (phi, theta, psi))
 
     def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
-        """Return the demanded specific force, m/s², [15], and its derivative along the motion, m/s³."""
+        """Return the demanded specific force, m/s², [15], and its derivative, m/s³."""
         gravity = np.array([0.0, 0.0, self._gravity_m_s2])
         position_error = np.array(state.position_enu_m) - references.position_enu_m[0]
         velocity_error = np.array(state.velocity_enu_m_s) - references.velocity_enu_m_s[0]
@@ -116,10 +114,7 @@ class GeometricController:
 
 
 def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
-    """Return the attitude with its z axis along `force` and heading `yaw_rad`, and its body rates.
-
-    `force` is a specific force, m/s², ENU, (3,); `force_rate` its derivative, m/s³.
-    """
+    """Return the attitude with body z along `force`, m/s², ENU, (3,), and heading `yaw_rad`, and its body rates."""
     heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
     z, z_rate = _unit(force, force_rate)
@@ -130,7 +125,7 @@ def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_ra
 
 
 def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]:
-    """Return phi, theta, psi, rad, of a rotation matrix, psi within half a turn of `near_yaw_rad`."""
+    """Return phi, theta, psi, rad, with psi within half a turn of `near_yaw_rad`."""
     phi = atan2(rotation[2, 1], rotation[2, 2])
     theta = asin(min(max(-rotation[2, 0], -1.0), 1.0))
     psi = atan2(rotation[1, 0], rotation[0, 0])

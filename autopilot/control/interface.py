@@ -1,8 +1,8 @@
 """The interface of a control law.
 
 A package registers its law, a class, under the entry point group `colibri.controllers`. At each control sample the law
-takes the vehicle's state and the references ahead, and returns the rotor speeds to hold until the next. It has no state
-of its own: its memory is an argument and a result, so equal inputs give equal flights.
+maps its memory, the vehicle's state and the references ahead to rotor speeds and a new memory. It has no other state,
+so equal inputs give equal flights.
 """
 
 from collections.abc import Callable
@@ -38,8 +38,7 @@ class Horizon(NamedTuple):
         position_enu_m, velocity_enu_m_s: (n, 3) each, ENU.
         acceleration_enu_m_s2, jerk_enu_m_s3, snap_enu_m_s4: (n, 3) each, ENU; zero if planned by differences.
         yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
-        yaw_rate_rad_s: (n,), rad/s; zero if planned by differences, or where a standing vehicle holds its yaw.
-        yaw_acceleration_rad_s2: (n,), rad/s²; zero in the same cases.
+        yaw_rate_rad_s, yaw_acceleration_rad_s2: (n,); zero if planned by differences, or at a held yaw.
     """
 
     position_enu_m: Array
@@ -134,15 +133,15 @@ class Diagnostics(NamedTuple):
 
     Attributes:
         qp_status: Result of the QP; None without one.
-        fallback: Source of the decision if the QP was not solved, else None.
+        fallback: Source of the decision if the QP was not solved.
         solve_time_s: Duration of the QP's solution, s.
         cost: The QP's objective at its solution.
         active: Active constraints at the solution.
         slack: Largest violation of a soft limit, in parts of the limit.
-        predicted: Outputs predicted over the horizon, (N, p); order and units are documented by the control law.
-        planned_squared: Squared rotor speeds commanded at each step, in parts of the largest, (N, 4).
-        mass_kg: Estimated mass; nan if the control law estimates none.
-        path_lag_s: Lag of path time behind the clock; nan if the law flies by the clock.
+        predicted: Outputs over the horizon, (N, p); order and units by the control law.
+        planned_squared: Squared rotor speeds at each step, in parts of the largest, (N, 4).
+        mass_kg: Estimated mass; nan without an estimate.
+        path_lag_s: Lag of path time behind the clock; nan by the clock.
         qp_iterations: Iterations of the QP solver, 0 if none was needed; nan without a QP or a count.
     """
 
@@ -190,7 +189,6 @@ class Controller(Protocol[Memory]):
         """Decide the rotor speeds to hold until the next control sample.
 
         Args:
-            memory: Returned by the previous step.
             time_us: Simulated time, µs, a multiple of the control interval.
             state: The vehicle at the time the decision takes effect: now, unless a delay is compensated.
             references: By `preview`, from that time on; shared, so read only.
@@ -201,7 +199,7 @@ class Controller(Protocol[Memory]):
 class AttitudeController(Controller[Memory], Protocol[Memory]):
     """A control law that can also track an attitude; required by the modes that demand one.
 
-    `step` and `step_attitude` share their memory: a flight may switch between them at any sample.
+    Both steps share their memory: a flight may switch between them at any sample.
     """
 
     def step_attitude(
@@ -212,13 +210,12 @@ class AttitudeController(Controller[Memory], Protocol[Memory]):
 
 @runtime_checkable
 class ChargeController(Controller[Memory], Protocol[Memory]):
-    """A control law that estimates the charge taken from the battery; optional.
+    """A control law that estimates the charge taken from the battery, Ah; optional.
 
-    The estimate survives a restart in flight, and is corrected by the battery's own reports.
+    The estimate survives a restart in flight, and is corrected by the battery's reports.
     """
 
-    def charge_ah(self, memory: Memory) -> float:
-        """Return the estimated charge taken from the battery, Ah."""
+    def charge_ah(self, memory: Memory) -> float: ...
 
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory: ...
 
@@ -227,7 +224,7 @@ class ChargeController(Controller[Memory], Protocol[Memory]):
 class MassController(Controller[Memory], Protocol[Memory]):
     """A control law that estimates the vehicle's mass in flight; optional.
 
-    The estimate survives a restart in flight. Each take-off starts with the nominal mass: a payload may have been left.
+    The estimate survives a restart in flight; each take-off starts with the nominal mass, without the payload.
     """
 
     def mass_kg(self, memory: Memory) -> float: ...
@@ -247,8 +244,6 @@ class Pace(Enum):
 class PathController(Controller[Memory], Protocol[Memory]):
     """A control law that can choose its speed along the references; optional.
 
-    `step_on_path` takes references by path time, which lags behind the clock; `step` flies by the clock.
-
     Attributes:
         min_path_speed: Least speed, in parts of the references' own; with 1 the law always flies by the clock.
     """
@@ -258,10 +253,10 @@ class PathController(Controller[Memory], Protocol[Memory]):
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[Memory, Decision]:
-        """Decide as `step` does, and choose the speed along the references."""
+        """Decide as `step` does for references by path time, and choose the speed along them."""
 
     def path_speed(self, memory: Memory) -> float:
-        """Return the speed along the references, in parts of their own; 1 by the clock."""
+        """Return the speed in parts of the references' own; 1 by the clock."""
 
     def lag_us(self, memory: Memory) -> int:
         """Return the lag of path time behind the clock, µs, at least 0."""
@@ -273,8 +268,7 @@ class PathController(Controller[Memory], Protocol[Memory]):
 class PlanController(Controller[Memory], Protocol[Memory]):
     """A control law that plans attitudes and thrusts over its horizon; optional.
 
-    Ground stations show its plan: diagnostics then hold `predicted`, a row per control sample from now on, with the
-    attitude in these columns, and `planned_squared`.
+    Its diagnostics hold `planned_squared`, and `predicted` from now on at control samples, shown by ground stations.
     """
 
     plan_columns: PlanColumns

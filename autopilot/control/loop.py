@@ -1,4 +1,4 @@
-"""The control loop: the state from frames, one control law, and the rotor command between its samples."""
+"""The control loop: the state from frames, one control law, and its rotor commands."""
 
 from typing import Any, NamedTuple
 
@@ -51,16 +51,9 @@ class LoopRecord(NamedTuple):
 
 
 class ControlLoop:
-    """One control law flying one vehicle.
-
-    Attributes:
-        frame_interval_us: Requested time between frames: it divides the control interval.
-        plan_columns: Columns of the attitude in the law's plan, if it publishes one.
-        controls: Rotor speeds commanded now, in parts of the largest.
-    """
+    """One control law flying one vehicle."""
 
     def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
-        """Build the control law as `build_controller` does, with its errors."""
         self._name = profile.controller
         self.controller = build_controller(profile, vehicle, clock, law)
         if isinstance(self.controller, CompiledController):
@@ -71,18 +64,18 @@ class ControlLoop:
         self.plan_columns = self.controller.plan_columns if isinstance(self.controller, PlanController) else None
         self._take_in(self.controller)
         self.control_interval_us = self.controller.control_interval_us
-        self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
+        self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)  # divides the control interval
         self._memory: Any = None
         self._waited_us = 0
         self._reported_ah = 0.0
         self._is_plain = True
         self._yaw_rad = 0.0
-        self.controls = (0.0, 0.0, 0.0, 0.0)
+        self.controls = (0.0, 0.0, 0.0, 0.0)  # rotor speeds now, in parts of the largest
 
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
         """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
 
-        The estimated charge is kept, or with `afresh` set to the battery's last report.
+        The estimated charge is kept, or with `afresh` reset to the battery's report.
         """
         before, self._memory = self._memory, self.controller.initial(rotor_speed)
         if self._charged is not None:
@@ -92,7 +85,7 @@ class ControlLoop:
         self._command(np.full(4, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
-        """Restart in flight with rotors at hover speed; keep the estimated charge and mass, and the lag."""
+        """Restart at hover speed; keep the estimated charge and mass, and the lag."""
         before = self._memory
         self.begin(self.vehicle.hover_speed, yaw_rad, afresh=False)
         if before is None:
@@ -118,7 +111,6 @@ class ControlLoop:
 
     @property
     def lag_us(self) -> int:
-        """Lag of path time behind the clock, µs."""
         return 0 if self._waiting is None or self._memory is None else self._waiting.lag_us(self._memory)
 
     @property
@@ -153,7 +145,7 @@ class ControlLoop:
         return time_us % self.control_interval_us == 0
 
     def observe(self, frame: StateFrame) -> VehicleState:
-        """Return the state of a frame, its yaw unwrapped near that of the previous frame."""
+        """Return the state of a frame, yaw unwrapped near the previous one."""
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
@@ -162,10 +154,8 @@ class ControlLoop:
     def decide(self, time_us: int, state: VehicleState, references: Horizon, pace: Pace = Pace.CLOCK) -> Decision:
         """Decide the rotor speeds to hold until the next control sample.
 
-        A law without a path speed flies by the clock at any pace.
-
         Raises:
-            DecisionError: The control law raised, or decided outside the rotors' limits.
+            DecisionError: The control law raised, or exceeded the rotors' limits.
         """
         try:
             if self._waiting is not None and pace is not Pace.CLOCK:
@@ -187,11 +177,7 @@ class ControlLoop:
         return decision
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
-        """Decide the rotor speeds that follow an attitude demand; requires `takes_attitude`.
-
-        Raises:
-            DecisionError: The control law raised, or decided outside the rotors' limits.
-        """
+        """Decide, as `decide` does, for an attitude demand; requires `takes_attitude`."""
         assert isinstance(self.controller, AttitudeController), "decided only where attitudes are taken"
         try:
             return self._take(time_us, self.controller.step_attitude(self._memory, time_us, state, demand))
@@ -201,7 +187,7 @@ class ControlLoop:
             raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
-        """Switch to a law of the same kind and interval with other settings; its memory is kept."""
+        """Switch to a law of the same kind and interval; its memory is kept."""
         self._take_in(controller)
         self.vehicle = vehicle
 
@@ -228,7 +214,7 @@ class ControlLoop:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    """Return the longest interval of whole milliseconds, up to the profile's, that divides the control interval."""
+    """Return the longest interval up to the profile's, whole ms, that divides the control interval."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us

@@ -46,10 +46,7 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A profile, with its name.
-
-    A file's profile is called as its `name` key or its file; names of built-in profiles stay reserved for them.
-    """
+    """A profile: a file is named by its `name` key or its path, never as a built-in one."""
 
     file: str = ""  # its path; empty for a built-in profile
 
@@ -65,7 +62,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def replace(self, key: str, value: Any) -> "Profile":
         """Return the profile with another value at a dotted key; a star marks its name.
 
-        `controllers.NAME` may be new: the settings of your own control law, which checks them when it is built.
+        `controllers.NAME` may be new: the settings of your own control law, checked when it is built.
 
         Raises:
             ProfileError: The key is unknown, or the value invalid.
@@ -114,7 +111,6 @@ def load_profile(given: str | Profile) -> Profile:
 
 
 def profile_text(name: str) -> str:
-    """Return the file of a built-in profile."""
     return named_text("profile", _FOLDER, name, ProfileError)
 
 

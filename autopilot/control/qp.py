@@ -57,10 +57,9 @@ class QpResult(NamedTuple):
 
 
 class QpSolver:
-    """One QP solver at a tolerance."""
+    """One QP solver at a tolerance; raises a SolverError if unavailable."""
 
     def __init__(self, name: str, tolerance: float, max_iterations: int = MAX_ITERATIONS) -> None:
-        """Load solver `name`, or raise a SolverError."""
         check_solver(name)
         from colibri.autopilot.control.qp_residual import residual  # compiled: who only reads a result does without
 
@@ -85,7 +84,7 @@ class QpSolver:
 
 
 class _Optimum(NamedTuple):
-    """A solution with the multipliers of rows and of bounds, and the iterations it took."""
+    """A solution with its multipliers of rows and bounds, and iterations."""
 
     x: Array | None
     z: Array | None
@@ -114,7 +113,7 @@ class _Daqp:
 
 
 class _Clarabel:
-    """Clarabel by its own interface: the detour by qpsolvers takes longer than Clarabel itself."""
+    """Clarabel by its own interface: the detour by qpsolvers takes longer than Clarabel."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         import clarabel
@@ -168,7 +167,7 @@ class _Qpsolvers:
         return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
     def _quietly(self, qp: Qp) -> Any:
-        """Solve without the sparse solvers' warnings about matrix conversions."""
+        """Solve without the solvers' warnings of matrix conversions."""
         with catch_warnings():
             simplefilter("ignore")
             return self._solution(qp, _filled("P", qp.H), _filled("G", qp.G))
@@ -189,7 +188,7 @@ def _or_none(vector: Array) -> Array | None:
 
 
 def why_none(qp: Qp) -> QpStatus:
-    """Return the status of a QP without solution: infeasible by a linear program, or else out of time."""
+    """Return the status of an unsolved QP: infeasible by a linear program, or out of time."""
     from scipy.optimize import linprog
 
     if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
@@ -229,7 +228,7 @@ def box(n: int) -> Array:
 
 
 def _filled(role: str, matrix: Array) -> Any:
-    """Return a matrix as CSC. Its pattern is cached: building one takes five times Clarabel's solution."""
+    """Return a matrix as CSC; a new pattern takes five times Clarabel's solution, so it is cached."""
     filled = matrix.T != 0.0
     sparse = _pattern(role, matrix.shape, filled.tobytes())
     sparse.data[:] = matrix.T[filled]
@@ -253,7 +252,7 @@ def _known_solvers() -> frozenset[str]:
 
 
 def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:
-    """Return tolerance and iteration limit by the names each solver gives them; quadprog has neither option."""
+    """Return tolerance and iteration limit by the solver's names."""
     absolute_and_relative = {"eps_abs": tolerance, "eps_rel": tolerance}
     options: dict[str, dict[str, Any]] = {
         "clarabel": {

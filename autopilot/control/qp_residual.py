@@ -13,8 +13,6 @@ def residual(
     """Return the largest violation of a constraint, or of stationarity in parts of f; inf if not finite.
 
     Args:
-        H, f, G, h, lower, upper: As in `Qp`.
-        x: The solution, (n,).
         z: Multipliers of G x <= h, (m,), or (0,) if unknown: then only feasibility counts.
         z_box: Multipliers of the bounds, (n,), negative at a lower bound; or (0,).
     """

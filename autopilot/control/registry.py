@@ -48,7 +48,7 @@ def controller_names() -> list[str]:
 
 @cache
 def registered() -> EntryPoints:
-    """Return the entry points of all control laws; cached, since it reads a file of every package."""
+    """Return the entry points of all laws; cached, since this reads a file of every package."""
     return entry_points(group=GROUP)
 
 
@@ -89,7 +89,6 @@ def origin_of(name: str) -> Origin:
 
 
 def origin_of_factory(law: Factory) -> Origin:
-    """Return the origin of a control law passed as an object."""
     module = getattr(law, "__module__", "")
     file = getattr(modules.get(module), "__file__", None)
     return Origin(f"{module}:{getattr(law, '__qualname__', type(law).__qualname__)}", "", _sha256(file))
@@ -109,7 +108,6 @@ def check_controller(name: str, controller: object) -> None:
 
 
 def in_words(error: BaseException) -> str:
-    """Return an exception as one line, with its type unless it is an `Error`."""
     words = " ".join(str(error).split())
     if words and isinstance(error, Error):
         return words

@@ -55,12 +55,7 @@ class Plan(NamedTuple):
 
 
 class AttitudeMpc:
-    """LPV-MPC of roll, pitch and yaw, within the limits of the rotors.
-
-    Attributes:
-        from_wrench: U1, N, and U2, U3, U4, N m, to squared speeds in parts of the largest, (4, 4).
-        gain: K of the LQR with the terminal weight as its cost, (3, 12).
-    """
+    """LPV-MPC of roll, pitch and yaw, within the limits of the rotors."""
 
     def __init__(
         self,
@@ -106,8 +101,8 @@ class AttitudeMpc:
     def plan(self, now: InitialState, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; the plan is None if the QP is not solved.
 
-        The thrust limits the moments that rotors can make. If the plan exceeds the tilt limit, a second one gives up
-        thrust for the largest moments. `ahead`: states of the previous plan at the coming samples, (n, 9).
+        Thrust limits the moments of the rotors: beyond the tilt limit a second plan gives up thrust for moments.
+        `ahead`: states of the previous plan at the coming samples, (n, 9).
         """
         self.predict(now, ahead)
         plan, diagnostics = self._solve(now, target)
@@ -130,7 +125,6 @@ class AttitudeMpc:
         return plan, diagnostics._replace(qp_iterations=iterations)
 
     def predict(self, now: InitialState, ahead: Array | None) -> None:
-        """Predict the responses, scheduled along the previous plan if there is one."""
         if ahead is not None and len(ahead) and self._along_plan:
             prediction.schedule_along(now.x, ahead, self._schedule)
         else:
@@ -140,8 +134,7 @@ class AttitudeMpc:
     def condense(self, now: InitialState, target: Target) -> Qp:
         """Condense the prediction to a QP, in arrays that the next call overwrites.
 
-        The first move may always cancel the last moments, even after a large fallback: thrust alone keeps the hard
-        limits, so the QP is feasible.
+        The first move may always cancel the last moments: thrust alone keeps the hard limits, so the QP is feasible.
         """
         max_squared = square(now.max_speed)
         condensing.condense(self._responses, self._schedule, target, now.u, self._packed, max_squared, self._qp)
@@ -173,7 +166,7 @@ class AttitudeMpc:
 
 
 def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weight: Array) -> tuple[Array, Array]:
-    """Return cost S (12, 12) and gain K (3, 12) of the LQR at hover on state and last moments."""
+    """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments."""
     A = _hover_transition(body, interval_s)
     B = A[:, STATES:]
     C = np.zeros((INPUTS, STATES + INPUTS))
@@ -198,7 +191,7 @@ def _hover_transition(body: Body, interval_s: float) -> Array:
 
 
 def body_of(vehicle: Vehicle) -> Body:
-    """Return the model of `vehicle`, with the slower of its rotors' two lags."""
+    """Return the model, with the slower of the rotors' two lags."""
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
     return Body(*vehicle.body.inertia_kg_m2, lag_1_s)

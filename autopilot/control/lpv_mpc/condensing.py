@@ -3,15 +3,13 @@
     z = [Δu at each move, angle slack, rate slack]
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-The cost is the thesis's [3.13-3.20] with a full terminal weight on state and input. Arguments of the kernels, for b
-moves, n = 3 b + 2 variables and m rows:
+The cost is [3.13-3.20] with a full terminal weight on state and input. With b moves, n = 3 b + 2:
 
     responses     of `prediction.respond`, (N + 1, 9, 1 + 3 b)
     schedule      phi, theta, p, q, r expected at each step, (N, 5)
     u             moments last commanded, N m, (3,)
     thrust_n      U1 commanded at each step, N, (N,)
-    G             (m, n), initially zero
-    max_squared   largest available squared rotor speed; all squared speeds are in parts of the largest
+    max_squared   largest available squared rotor speed, in parts of the largest
 """
 
 from math import sqrt
@@ -61,7 +59,6 @@ class Target(NamedTuple):
 
 @compiled
 def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem, H: Array, f: Array) -> None:
-    """Fill H and f of the increments."""
     steps = responses.shape[0] - 1
     moved = responses.shape[2] - 1
     H[:moved, :moved] = 0.0
@@ -107,8 +104,8 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
     """Fill the rows of the rotor limits from row 0 on; return their number.
 
-    With the thrust given, squared speeds are linear in the moments. Moments are constant between two moves, so one row
-    a side with the tightest step suffices.
+    Given the thrust, squared speeds are linear in the moments, which are constant between two moves: one row a side, at
+    the tightest step, suffices.
     """
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     count = 0
@@ -132,10 +129,10 @@ def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float
 
 @compiled
 def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
-    """Write the normal, (2,), of the tangent to the tilt limit; return its distance, rad.
+    """Write the normal, (2,), of a tangent to the tilt limit; return its distance, rad.
 
-    cos(phi) cos(theta) >= cos(max_tilt) is a convex set within normal . (phi, theta) <= distance. The tangent touches
-    it in the direction of the tilt (`phi`, `theta`), rad; at zero tilt the normal is zero. `max_tilt` < π / 2.
+    cos(phi) cos(theta) >= cos(max_tilt) is convex and within normal . (phi, theta) <= distance. The tangent touches it
+    in the direction of (`phi`, `theta`); without tilt the normal is zero.
     """
     x, y = sin(theta) * cos(phi), sin(phi)
     across = sqrt(x * x + y * y)
@@ -151,10 +148,7 @@ def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> fl
 
 @compiled
 def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int, G: Array, h: Array) -> int:
-    """Fill the soft rows of tilt, angles and rates from row `first` on.
-
-    The tilt limit is its tangent in the expected direction of tilt.
-    """
+    """Fill the soft rows of angles, rates and tilt, by its tangent at the schedule, from row `first` on."""
     states = (ANGLES[0], ANGLES[1], P, Q, R)
     limits = problem.limits
     moved = responses.shape[2] - 1
@@ -215,9 +209,9 @@ def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Ar
 def count_active(
     G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
 ) -> tuple[int, int, int, int]:
-    """Return the numbers of active limits of rotors, increments, angles and rates at z, (n,).
+    """Return the numbers of active limits of rotors, increments, angles and rates at z.
 
-    The first `rotor_rows` rows of G are those of `limit_rotors`, the others those of `limit_motion`.
+    The first `rotor_rows` rows of G are those of `limit_rotors`.
     """
     increments = 0
     for k in range(z.shape[0] - SLACKS):

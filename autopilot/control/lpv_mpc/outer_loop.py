@@ -62,7 +62,7 @@ class OuterLoop:
         """Return the setpoint for references at the samples from now to one past the horizon.
 
         Args:
-            planned_yaw: Yaw of the previous plan from now on, rad, (m,); (0,) without one.
+            planned_yaw: Of the previous plan from now on, rad, (m,); (0,) without one.
             disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, (6,).
             max_speed: Available to all rotors at once, in parts of the largest.
         """
@@ -74,7 +74,6 @@ class OuterLoop:
         return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
 
     def hold(self, motion: Motion, demand: AttitudeDemand, disturbance_n_m: Array, max_speed: float) -> Setpoint:
-        """Return the setpoint of an attitude demand, its thrust within the same limits."""
         out = self._demands()
         aligned = position_loop.hold_attitude(
             motion, (demand.angles, demand.thrust_n), disturbance_n_m, self._packed, self.limits(max_speed), out
@@ -87,7 +86,6 @@ class OuterLoop:
         return Demands(np.empty((n, 3)), np.empty((n, 3)), np.empty(self._steps), end)
 
     def limits(self, max_speed: float) -> ForceLimits:
-        """Return the force limits for an available rotor speed, in parts of the largest."""
         max_n = self._span_n * square(max_speed)
         margin_n = self._thrust_margin * (max_n - self._min_n)
         min_n = self._min_n + margin_n

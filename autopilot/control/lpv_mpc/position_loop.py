@@ -1,13 +1,13 @@
 """The outer loop over a horizon: references and feedback to attitudes and thrusts, as compiled kernels.
 
-Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch at the predicted
-yaw, so that thrust points right while yaw lags. Future errors follow the closed loop. Flatness of a quadrotor:
-Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
+Thrust makes F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; F gives roll and pitch at the predicted yaw, so that
+thrust points right while yaw lags. Future errors follow the closed loop. Flatness: Mellinger and Kumar, ICRA 2011; with
+drag: Faessler et al., RA-L 2018.
 
-Samples are from now to one past the horizon of N steps, n = N + 2. Each kernel fills its last argument:
+Samples are from now to one past the horizon, n = N + 2; the last argument is filled:
 
-    forces       at each sample, N, ENU, (n, 3)
-    angles       phi, theta, psi at each sample, rad, (n, 3)
+    forces       N, ENU, (n, 3)
+    angles       phi, theta, psi, rad, (n, 3)
     references   position, velocity, acceleration, m, ENU, (n, 3) each, and yaw, rad, (n,)
     up           body z axis now, ENU, (3,)
 """
@@ -67,7 +67,7 @@ def wanted_forces(
     limits: ForceLimits,
     forces: Array,
 ) -> None:
-    """Fill the thrust forces at each sample; `disturbance_m_s2` is an acceleration, ENU, (3,)."""
+    """Fill the thrust forces; `disturbance_m_s2` is ENU, (3,)."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
     near = min(1.0, loop.max_error_m / max(norm(e), loop.max_error_m))
@@ -89,7 +89,7 @@ def wanted_forces(
 
 @compiled
 def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Array) -> None:
-    """Fill roll and pitch that point body z along each force at the predicted yaw, and the wanted yaw."""
+    """Fill roll and pitch along each force at the predicted yaw, and the wanted yaw."""
     for n in range(forces.shape[0]):
         c, s = cos(yaw_predicted[n]), sin(yaw_predicted[n])
         x, y, z = forces[n]
@@ -106,7 +106,6 @@ def thrust_commands(
     """Fill the commands, N, (N,), that bring the lagging thrust to its reference at each step's end.
 
     The first reference is the force's component along the present z axis; later ones assume the planned attitude.
-    `follows` is the part of the way to its command that thrust goes in a step.
     """
     for n in range(commands.shape[0]):
         force = forces[n + 1]
@@ -119,10 +118,7 @@ def thrust_commands(
 
 @compiled
 def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interval_s: float, end: Array) -> None:
-    """Fill state and moments at the last but one sample, from the angles around it, (12,).
-
-    Order: phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4.
-    """
+    """Fill phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4 at the last but one sample, (12,)."""
     before, here, after = angles[-3], angles[-2], angles[-1]
     rate = (after - before) / (2.0 * interval_s)
     turn = (after - 2.0 * here + before) / (interval_s * interval_s)
@@ -140,7 +136,7 @@ def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interva
 def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
     """Fill the expected yaw, (n,); return the full turns between it and the wanted yaw, rad.
 
-    It follows the plan, (m,), and beyond its end the rate of the wanted yaw, (n,).
+    It follows the plan, (m,), then the rate of the wanted yaw, (n,).
     """
     ahead[0] = yaw_rad
     for n in range(1, ahead.shape[0]):
@@ -162,8 +158,7 @@ def guide(
 ) -> float:
     """Compute all demands of references; return the cosine of the angle from thrust axis to force.
 
-    `planned_yaw` as in `yaw_ahead`; `disturbances` acceleration, m/s², ENU, and moment, N m, FLU, (6,); `packed` the
-    `Loop`.
+    `disturbances` are acceleration, m/s², ENU, and moment, N m, FLU, (6,); `packed` is the `Loop`.
     """
     loop = packed[0]
     wanted_forces(motion, references, disturbances[:3], loop, limits, out.forces)
@@ -188,7 +183,7 @@ def hold_attitude(
 ) -> float:
     """Compute the demands of angles, (n, 3), and thrusts, N, (n,); return the cosine as in `guide`.
 
-    Only the first force is filled; psi moves to the vehicle's present turn. `packed` is the `Loop`.
+    Only the first force is filled; psi moves to the vehicle's present turn.
     """
     loop = packed[0]
     angles, force, up = out.angles, out.forces[0], motion.up

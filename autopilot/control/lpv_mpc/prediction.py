@@ -1,13 +1,12 @@
 """The attitude over a horizon: an LPV model with exact kinematics and rotor lag, as compiled kernels.
 
 The thesis's model [3.3] equates Euler rates and body rates, which at 40 degrees of tilt couples yaw into pitch. Here
-body rates are states, T(phi, theta) of [2.7] is in the kinematic rows of A, and moments follow their commands as the
-rotors do. State, 9:
+body rates are states, A has T(phi, theta) of [2.7], and moments lag as the rotors do. State, 9:
 
     [phi p theta q psi r M1 M2 M3]        rad, rad/s, N m
 
-Scheduled by phi, theta, p, q, r at each step, along the previous plan: Cisneros, Voss and Werner, "Efficient nonlinear
-model predictive control via quasi-LPV representation", CDC 2016.
+Scheduling along the previous plan: Cisneros, Voss and Werner, "Efficient nonlinear model predictive control via
+quasi-LPV representation", CDC 2016.
 """
 
 from typing import NamedTuple, TypeAlias
@@ -53,7 +52,7 @@ class InitialState(NamedTuple):
 
 @compiled
 def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> None:
-    """Write A(schedule) X, (9, k), for a state in each column of X, (9, k), and one row of the schedule, (5,)."""
+    """Write A(schedule) X, (9, k), for states X, (9, k), and one row of the schedule, (5,)."""
     phi, theta, p, q, r = schedule
     s, c = sin(phi), cos(phi)
     cosine = max(cos(theta), _MIN_COSINE)
@@ -80,10 +79,9 @@ def respond(
 ) -> None:
     """Predict: column 0 without increments, the others for a unit increment of one input at one move.
 
-    Zero-order hold, its exponential by a Taylor series applied to all columns at once.
+    Zero-order hold by a Taylor series of the exponential, applied to all columns at once.
 
     Args:
-        schedule: Of each step, (N, 5).
         starts: Step of each move, ascending from 0, (b,).
         responses: Output, (N + 1, 9, 1 + 3 b); column 1 + 3 j + i is input i at move j.
     """
@@ -126,8 +124,7 @@ def respond(
 def schedule_along(x: Array, ahead: Array, schedule: Array) -> None:
     """Fill `schedule`, (N, 5), with the scheduling states in the middle of each step.
 
-    They are means of neighbouring states: now, `x`, (9,), and at the coming samples of the previous plan, `ahead`, (n,
-    9); the last of these is repeated.
+    These are means of neighbours: `x`, (9,), now, then `ahead`, (n, 9), of the previous plan, the last one repeated.
     """
     steps = schedule.shape[0]
     for step in range(steps):

@@ -1,8 +1,8 @@
 """The recovery: an attitude law for any attitude, and a mixer with priorities.
 
-The law turns the thrust axis the shortest way to its reference (reduced attitude: Chaturvedi, Sanyal and McClamroch,
-IEEE Control Systems 31(3), 2011) and damps the yaw rate. The mixer keeps the tilting moments, shifts the thrust as they
-require, and gives yaw the remainder.
+The law turns the thrust axis the shortest way (reduced attitude: Chaturvedi, Sanyal and McClamroch, IEEE Control
+Systems 31(3), 2011) and damps the yaw rate. The mixer keeps the tilting moments, shifts the thrust as they require, and
+gives yaw the remainder.
 """
 
 from math import sqrt
@@ -37,10 +37,7 @@ class TurnGains(NamedTuple):
 
 @compiled
 def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGains) -> Array:
-    """Return the moment, N m, FLU, (3,), that turns body z to a unit direction, FLU, (3,).
-
-    `rate` is p, q, r, rad/s, (3,), `inertia` Ix, Iy, Iz, kg m², (3,).
-    """
+    """Return the moment, N m, FLU, (3,), that turns body z to a unit direction, FLU, (3,)."""
     across = sqrt(direction[0] * direction[0] + direction[1] * direction[1])
     wanted = np.zeros(3)
     speed = min(gains.angle * atan2(across, direction[2]), gains.max_rate_rad_s)
@@ -68,8 +65,7 @@ def mix_with_priority(
 ) -> Array:
     """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
 
-    `moment_n_m` is U2, U3, U4, N m, (3,). `rotors_from_thrust`, (4,), and `rotors_from_moments`, (4, 3), map U1 and
-    moments to squared speeds in parts of the largest.
+    `moment_n_m` is U2..U4, N m; squared speeds, in parts of the largest, are linear in thrust and moments.
     """
     tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
     yaw = rotors_from_moments[:, 2] * moment_n_m[2]

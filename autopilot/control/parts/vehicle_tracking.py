@@ -51,20 +51,14 @@ class Observed(NamedTuple):
 
 
 class VehicleTracker:
-    """Tracks one vehicle.
-
-    Attributes:
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        allocation: Squared rotor speeds, parts of the largest, to U1, N, and U2..U4, N m, (4, 4).
-        momentum: Angular momentum of each rotor at the largest speed, along body z, N m s, (4,).
-    """
+    """Tracks one vehicle."""
 
     def __init__(self, vehicle: Vehicle, observer: ObserverSettings, mass: MassSettings, interval_s: float) -> None:
         self.vehicle = vehicle
         self.lag = rotor_lag.rotor_lag(vehicle, interval_s)
         self.battery = BatteryModel(vehicle)
-        self.allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
-        self.momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        self.allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)  # squared speeds to U1..U4, N, N m
+        self.momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed  # of each rotor at top speed, N m s
         observing = observer_of(observer, vehicle, interval_s)
         self.inertia = observing.inertia
         self._interval_s = interval_s
@@ -134,8 +128,7 @@ def look(
 ) -> tuple[float, float, float]:
     """Fill `rotation`, `measured` and `estimate` of `Observed`; return its mass, largest speed and current.
 
-    Inputs are fields of `Tracked` and `Observed`; `before` is the previous `measured`, (9,), or (0,) at the start,
-    `open_v` the battery's voltage without load. `Observer`, `MassModel` and `BatteryNumbers` are packed.
+    `before` is the previous `measured`, (9,), or (0,) at the start, `open_v` the battery's voltage without load.
     """
     R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
     for i in range(3):

@@ -1,12 +1,11 @@
 """Detection of a lost rotor from missing thrust and moments.
 
-Newton's and Euler's equations, inverted, give force along z and moments between two control samples. The residual
-against the commanded rotors, their lag included, is -fᵢ aᵢ for a dead rotor i: fᵢ is its expected thrust and aᵢ = (1,
-yᵢ, -xᵢ, κᵢ).
+Inverted equations of motion give force along z and moments between two control samples. The residual against the
+commanded, lagging rotors is -fᵢ aᵢ for a dead rotor i with expected thrust fᵢ and aᵢ = (1, yᵢ, -xᵢ, κᵢ).
 
 For each rotor a CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a
-quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover on four
-rotors. One sample adds a bounded amount: a single jump of the estimate cannot raise the alarm.
+quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. The
+bound on one sample keeps a jump of the estimate from raising the alarm.
 """
 
 from typing import NamedTuple
@@ -82,16 +81,11 @@ class Memory(NamedTuple):
 
 
 class RotorWatch:
-    """Watches the rotors of one vehicle.
-
-    Attributes:
-        lost: The lost rotor, 0..3, permanently; None while all turn.
-        max_evidence: Largest CUSUM so far.
-    """
+    """Watches the rotors of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         self._interval_s = interval_s
-        self.lost: int | None = None
+        self.lost: int | None = None  # 0..3, permanently
         self.max_evidence = 0.0
         self._memory = packed(Memory(np.zeros(4), np.zeros(9), np.zeros(4), np.zeros(4), np.zeros(4)))
         self._kept = opened(self._memory, Memory)
@@ -123,10 +117,7 @@ class RotorWatch:
         self._began = False
 
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
-        """Process a control sample; return the lost rotor.
-
-        `controls` applied since the previous sample, parts of the largest speed.
-        """
+        """Process a control sample; return the lost rotor. `controls` applied since the previous sample."""
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
         self.max_evidence = max(self.max_evidence, most)
@@ -167,8 +158,7 @@ def _take_in(
 ) -> tuple[int, float]:
     """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence.
 
-    `open_v` is the battery's voltage without load; `numbers`, `battery` are packed `Numbers` and `BatteryNumbers`.
-    Unless a sample `counts`, evidence is reset.
+    `open_v` is the battery's voltage without load. Unless a sample `counts`, evidence is reset.
     """
     it, of = memory[0], numbers[0]
     speeds_before, before = it.speeds.copy(), it.motion.copy()
@@ -195,10 +185,7 @@ def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag,
 def _add_evidence(
     memory: Memory, before: Array, speeds_before: Array, of: Signature, interval_s: float
 ) -> tuple[int, float]:
-    """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value.
-
-    `before` and `speeds_before`: motion and speeds a sample ago.
-    """
+    """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value."""
     evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
     thrust_n = np.empty(4)
     h, h_rate = 0.0, 0.0

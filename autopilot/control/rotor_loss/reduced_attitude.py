@@ -2,12 +2,11 @@
 
 The motion is periodic (M. W. Mueller and R. D'Andrea, Stability and control of a quadrocopter despite the complete loss
 of one, two, or three propellers, ICRA 2014): the vehicle turns about an axis fixed in body and earth. The thrust of the
-rotor opposite the lost one tilts this axis by the cone angle from the rotors' axis; its torque keeps the spin within
-the gyroscope's range.
+opposite rotor tilts it by the cone angle, and brakes the spin into the gyroscope's range.
 
-The law is an LQR about the periodic solution, scheduled by the spin (LPV) from zero right after the loss, with rotor
-lag and sampling in the model. Rotors a and b are beside the lost one, o opposite. State: h, the demanded thrust
-direction in body axes (x, y), the rates p and q, and the lagging forces d = f_b - f_a and f_o.
+The law is an LQR about the periodic solution, scheduled by the spin (LPV), with rotor lag and sampling in the model.
+Rotors a and b are beside the lost one, o opposite. State: the demanded thrust direction h in body axes (x, y), rates p
+and q, and the lagging forces d = f_b - f_a and f_o.
 """
 
 from math import copysign, hypot, inf, sqrt
@@ -63,18 +62,14 @@ class Solution(NamedTuple):
 
 
 class ReducedAttitude:
-    """The law for one vehicle that has lost one rotor.
-
-    Attributes:
-        cone_rad: Angle between thrust and spin axis at the final spin.
-    """
+    """The law for one vehicle that has lost one rotor."""
 
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
     ) -> None:
         """Compute the gains without rotor `lost`, 0..3, in some ms, or raise a ThreeRotorsError.
 
-        `follows` is the part of the way to its command that a force goes in a sample; `spin_rad_s` > 0 the final spin.
+        `follows` is the part of the way to its command that a force goes in a sample.
         """
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
@@ -85,7 +80,7 @@ class ReducedAttitude:
         opposite_n = balancing_thrust(vehicle, self.trio, spin_rad_s)
         self._momentum = _momentum(vehicle, self.trio, opposite_n)
         rate = self._steady_rate(spin_rad_s * self.trio.sign) * opposite_n
-        self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _MAX_CONE_RAD)
+        self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _MAX_CONE_RAD)  # at the final spin
         self._gains = self._designed(interval_s, follows, weights)
         if not np.isfinite(self._gains).all():
             raise ThreeRotorsError(f"no law turns it without rotor {lost + 1}")
@@ -146,10 +141,7 @@ class ReducedAttitude:
         return np.array(gains)
 
     def _model(self, spin: float, interval_s: float, follows: float) -> Array:
-        """Return the generator of state and held commands, (8, 8), linearised about the periodic solution.
-
-        h' = -ω × h; Euler's equations with rotors, THESIS [2.8]; first-order lags.
-        """
+        """Return the generator of state and held commands, (8, 8): h' = -ω × h, [2.8] and the lags, linearised."""
         r = spin * self.trio.sign
         (hx, hy), (p, q), _ = self.solution(spin)
         hz = sqrt(1.0 - hx * hx - hy * hy)
@@ -167,7 +159,7 @@ class ReducedAttitude:
 
 
 def trio_without(vehicle: Vehicle, lost: int) -> Trio:
-    """Return the rotors left without `lost`; ThreeRotorsError unless they turn in two pairs."""
+    """Return the rotors left; ThreeRotorsError unless they turn in two pairs."""
     torque = vehicle.allocation()[3]
     same = [i for i in range(4) if torque[i] * torque[lost] > 0.0]
     others = [i for i in range(4) if i not in same]
@@ -181,7 +173,7 @@ def trio_without(vehicle: Vehicle, lost: int) -> Trio:
 def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
     """Return the opposite rotor's thrust, N, that balances drag and rotor torque at a spin.
 
-    All three carry the weight. In-plane drag acts at each hub, which moves at ω × r: a yaw moment of -c Ω r².
+    In-plane drag acts at each hub, which moves at ω × r: a yaw moment of -c Ω r².
     """
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     low, high = 0.0, 0.5 * weight_n

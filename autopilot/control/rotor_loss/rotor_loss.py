@@ -31,12 +31,7 @@ class Permission(Protocol):
 
 
 class RotorLoss:
-    """Watches the rotors of one vehicle, and flies it after the loss of one.
-
-    Attributes:
-        enabled: Whether losses are detected and handled.
-        impossible: Reason why the vehicle cannot land on three rotors; empty if it can.
-    """
+    """Watches the rotors of one vehicle, and flies it after the loss of one."""
 
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
         self._interval_s = interval_us * 1e-6
@@ -47,7 +42,6 @@ class RotorLoss:
 
     @property
     def lost(self) -> int | None:
-        """The lost rotor, 0..3."""
         return self.watch.lost
 
     @property
@@ -67,7 +61,7 @@ class RotorLoss:
         """Simulate the loss of each rotor in hover for two samples with a changed vehicle.
 
         Raises:
-            ThreeRotorsError: The changed vehicle cannot land on three rotors, but the present one can.
+            ThreeRotorsError: It cannot land on three rotors, but the present one can.
         """
         trial = RotorLoss(vehicle, round(self._interval_s * 1e6))
         if trial.impossible and not self.impossible:
@@ -89,11 +83,10 @@ class RotorLoss:
             self.forget()
 
     def begin(self, controls: FourRotors) -> None:
-        """Restart after missed frames, the rotors turning at `controls`."""
         self.watch.begin(controls)
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
-        """Resume after a restart with a lost rotor, the others turning at `speeds`."""
+        """Resume after a restart with a lost rotor."""
         self.watch.lost, self.watch.speeds = lost, speeds
         if flying and not self.impossible:
             self._take_over(lost, state, ground_m)
@@ -109,7 +102,6 @@ class RotorLoss:
 
         Args:
             controls: Applied since the previous sample, parts of the largest speed.
-            airborne: Clear of the ground.
             ground_m: Height of the ground, z of ENU.
         """
         if not self.enabled or self.impossible or self.watch.lost is not None:
@@ -122,7 +114,6 @@ class RotorLoss:
         return True
 
     def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
-        """Return the controls to hold until the next control sample, and their decision."""
         assert self._three is not None, "decided only while three rotors fly"
         decision = self._three.step(state, charge_ah)
         return self._three.controls, decision

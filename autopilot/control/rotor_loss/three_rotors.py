@@ -34,11 +34,7 @@ _STAYS_M_S, _STAYS_S = 0.2, 1.5  # touch-down: slower than this for so long in s
 
 
 class ThreeRotors:
-    """Flies one vehicle without a rotor until touch-down.
-
-    Attributes:
-        controls: Rotor commands, parts of the largest speed.
-    """
+    """Flies one vehicle without a rotor until touch-down."""
 
     def __init__(
         self,
@@ -104,7 +100,7 @@ class ThreeRotors:
         return commands
 
     def _turn(self, commands: Array, up: Array) -> None:
-        """Predict rotor speeds, and the acceleration by their thrust until the next sample."""
+        """Predict rotor speeds, and the acceleration by their thrust."""
         before, self._speeds = self._speeds, follow(self._speeds, commands, self._lag)
         thrust_n = 0.5 * dot(self._full_n, before**2 + self._speeds**2)
         self._explained = thrust_n / self._weight_n * self._gravity * up
@@ -131,7 +127,7 @@ class ThreeRotors:
         return wanted
 
     def _max_tilt_m_s2(self, off_m: float) -> float:
-        """Return the largest horizontal acceleration: small near the place, larger when blown away."""
+        """Return the largest horizontal acceleration, which grows with the position error."""
         tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(off_m - _FAR_M, 0.0)
         return self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG)))
 
@@ -160,8 +156,7 @@ def shared(
 ) -> Array:
     """Return squared rotor speeds, parts of the largest, (4,): thrust direction first, then thrust.
 
-    Demanded are total thrust, `d`, thrust of b minus that of a, and `f_o`, N; `full_n` is each rotor's largest, N,
-    (4,).
+    Demanded are total thrust, `d`, thrust of b minus a, and `f_o`, N; `full_n` is each rotor's largest, (4,).
     """
     minimum, maximum = squared_limits
     min_n = minimum * max(full_n[trio.a], full_n[trio.b])
@@ -176,7 +171,6 @@ def shared(
 
 
 def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
-    """Return the position, m, ENU, (3,), where a constant deceleration stops the vehicle."""
     x, y, z = state.position_enu_m
     vx, vy, _ = state.velocity_enu_m_s
     time_s = hypot(vx, vy) / (2.0 * braking_m_s2)
@@ -190,7 +184,6 @@ def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:
 
 
 def angles_of(direction: Array, psi: float) -> Vector:
-    """Return phi, theta, psi with the body z axis along a direction, ENU, (3,)."""
     x, y, z = direction.tolist()
     forward, left = cos(psi) * x + sin(psi) * y, cos(psi) * y - sin(psi) * x
     return (atan2(-left, hypot(forward, z)), atan2(forward, z), psi)

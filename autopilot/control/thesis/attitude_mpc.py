@@ -50,10 +50,10 @@ class AttitudeMpc:
         reference: Vector,
         horizon: int,
     ) -> Solution:
-        """Return the increments of U2, U3, U4 (N m) until the next step.
+        """Return the increments of U2, U3, U4 (N m) until the next step, up to full moment to full moment.
 
-        Increments are bounded by full moment to full moment. Angles are phi, theta, psi, the reference's constant over
-        the horizon; the momentum is h at the last commanded rotor speeds.
+        The reference, phi, theta, psi, is constant over the horizon; the momentum is h at the last commanded rotor
+        speeds.
         """
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)

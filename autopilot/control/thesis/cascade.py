@@ -32,12 +32,7 @@ class CascadeMemory(NamedTuple):
 
 
 class Cascade:
-    """The control law; its predicted outputs are phi, theta, psi in rad.
-
-    Attributes:
-        control_interval_us: The inner sample.
-        preview: This outer sample and the next.
-    """
+    """The control law; its predicted outputs are phi, theta, psi in rad."""
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(table, CascadeSettings)

@@ -1,4 +1,4 @@
-"""The MPC in input increments, condensed to a QP in the increments alone, THESIS [3.13-3.22]."""
+"""The MPC in input increments, condensed to a QP, THESIS [3.13-3.22]."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ _BINDING = 1e-6  # a bound is active if this part of it or less is left
 
 
 class Weights(NamedTuple):
-    """Diagonals of Q (each predicted error), S (the last one) and R (each increment)."""
+    """Diagonals of Q (each error), S (the last one) and R (each increment)."""
 
     output: Array
     terminal: Array
@@ -21,7 +21,7 @@ class Weights(NamedTuple):
 
 
 class CondensedQp(NamedTuple):
-    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (N · m,)."""
+    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the horizon, (N · m,)."""
 
     H: Array  # (N · m, N · m)
     f: Array  # (N · m,)
@@ -30,10 +30,7 @@ class CondensedQp(NamedTuple):
 
 
 class IncrementModel(NamedTuple):
-    """A model with state x̃ = [x; u₋₁] and the increment of the input as its input.
-
-    Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0].
-    """
+    """State x̃ = [x; u₋₁], input Δu: Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0]."""
 
     A: Array
     B: Array
@@ -43,7 +40,7 @@ class IncrementModel(NamedTuple):
 def augment(transition: Array, C: Array) -> IncrementModel:
     """Return the increment model of a discretised model [[Ad, Bd], [0, I]] and its output C, (p, n).
 
-    The transition is Ã itself, and its last m columns are B̃.
+    The transition is Ã itself; its last m columns are B̃.
     """
     outputs, n = C.shape
     inputs = len(transition) - n
@@ -51,10 +48,10 @@ def augment(transition: Array, C: Array) -> IncrementModel:
 
 
 def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:
-    """Eliminate the states: outputs over the horizon are an affine function of the increments.
+    """Eliminate the states: outputs over the horizon are Y = Phi x + Gamma Δu.
 
-    With Y = Phi x + Gamma Δu: H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in.
-    `x` is the augmented state, `reference` the output at each step, (N, p).
+    H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in. `x` is the augmented state,
+    `reference` the output at each step, (N, p).
     """
     p, m = model.C.shape[0], model.B.shape[1]
     responses = np.empty((horizon + 1, *model.C.shape))

@@ -17,10 +17,10 @@ ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0
 def attitude_model(
     phi_rate: float, theta_rate: float, rotor_momentum_n_m_s: float, *, inertia_kg_m2: tuple[float, float, float]
 ) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point.
+    """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point, THESIS [3.3].
 
-    State [phi phi' theta theta' psi psi'] in rad and rad/s, inputs U2, U3, U4 in N m. The rotors' momentum is h along
-    body z: THESIS's Ω J.
+    State [phi phi' theta theta' psi psi'], inputs U2, U3, U4 in N m. The rotors' momentum is h along body z: THESIS's Ω
+    J.
     """
     ix, iy, iz = inertia_kg_m2
     h = rotor_momentum_n_m_s
@@ -49,8 +49,8 @@ def global_model(
 ) -> tuple[Array, Array]:
     """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
 
-    State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2..U4 in N m.
-    Thrust acts on the position through B alone, at the present tilt; gravity is divided by the last U1 to fit in.
+    State [x x' y y' z z' phi phi' theta theta' psi psi'], ENU, inputs U1 in N, U2..U4 in N m. Thrust acts on the
+    position through B alone, at the present tilt; gravity is divided by the last U1 to fit in.
     """
     phi, theta, psi = euler
     A, B = np.zeros((12, 12)), np.zeros((12, 4))
@@ -65,8 +65,7 @@ def global_model(
 def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> Array:
     """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k], (n + m, n + m).
 
-    Zero-order hold is the exponential of [[A, B], [0, 0]] (Van Loan, 1978); forward Euler its first-order term. The
-    result is also Ã of the increment model.
+    Zero-order hold is the exponential of [[A, B], [0, 0]] (Van Loan, 1978), forward Euler its first-order term.
     """
     n, m = B.shape
     block = np.zeros((n + m, n + m))

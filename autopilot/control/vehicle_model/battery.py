@@ -1,6 +1,6 @@
 """The battery model: charge taken by the rotors, and the rotor speed that the voltage allows.
 
-Frames carry no voltage, so it is predicted: V = V0 - R I, V0 linear in the charge taken, top speed proportional to V.
+V = V0 - R I, V0 linear in the charge taken, top speed proportional to V.
 """
 
 from math import sqrt
@@ -33,11 +33,7 @@ class BatteryNumbers(NamedTuple):
 
 
 class BatteryModel:
-    """The battery of one vehicle; without one, power is unlimited.
-
-    Attributes:
-        numbers: Its `BatteryNumbers`, packed.
-    """
+    """The battery of one vehicle; without one, power is unlimited."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._battery = vehicle.battery
@@ -52,12 +48,10 @@ class BatteryModel:
         self.numbers = packed(numbers)
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
-        """Return the charge taken, Ah, after a time at rotor speeds (4,), parts of the largest."""
         _, current_a = self.terminal(charge_ah, speeds)
         return charged(charge_ah, current_a, duration_s)
 
     def open_voltage_v(self, charge_ah: float) -> float:
-        """Return the voltage without load; 1 without a battery."""
         return 1.0 if self._battery is None else open_voltage_v(self._battery, charge_ah)
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
@@ -110,13 +104,12 @@ def open_voltage_v(battery: Battery, charge_ah: float) -> float:
 
 @compiled
 def loaded_voltage_v(open_v: float, power_w: float, resistance_ohm: float) -> float:
-    """Return the terminal voltage at a power: V² - V0 V + R P = 0, at least half of V0."""
+    """Return V at a power: V² - V0 V + R P = 0, at least half of V0."""
     return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * resistance_ohm * power_w)))
 
 
 @compiled
 def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float]:
-    """Return terminal voltage, V, and current, A, at rotor speeds (4,); `packed` is the `BatteryNumbers`."""
     cubes = 0.0
     for speed in speeds:
         cubes += speed * speed * speed
@@ -127,10 +120,9 @@ def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float
 
 @compiled
 def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
-    """Fill the largest available squared rotor speeds, (N,), while all rotors have the expected power.
+    """Fill the largest available squared rotor speeds, (N,), in parts of the largest.
 
-    `expected` squared speeds, (n, 4), in parts of the largest; the last limit is repeated. `packed` is the
-    `BatteryNumbers`.
+    All rotors take the power of the `expected` squared speeds, (n, 4); the last limit is repeated.
     """
     numbers = packed[0]
     for n in range(limits.shape[0]):

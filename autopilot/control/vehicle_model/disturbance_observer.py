@@ -1,7 +1,7 @@
 """Observer of constant disturbances: acceleration (wind) and moment (a weak rotor).
 
-One Luenberger observer on the velocity and one on the body rates, each with its disturbance as a state and a double
-pole. Inputs are the rotors' actual forces within their limits, which prevents windup.
+Two Luenberger observers, on velocity and body rates, each with its disturbance as a state and a double pole. Their
+inputs are the rotors' forces within limits, which prevents windup.
 """
 
 from typing import NamedTuple
@@ -79,8 +79,7 @@ def observe(
 ) -> Array:
     """Return the new estimate (12,), from the previous one and both measurements, (9,) each.
 
-    Means over the interval: `wrench` U1 (N), U2, U3, U4 (N m), (4,), and `momentum` h of the rotors along body z, N m
-    s. `packed` is the `Observer`.
+    `wrench`, (4,), and `momentum` h of the rotors along body z, N m s, are means over the interval.
     """
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s

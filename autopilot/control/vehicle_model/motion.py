@@ -1,8 +1,7 @@
 """The autopilot's model of the vehicle's equations of motion, x' = f(x), and its integration.
 
-x, 17: position, m, and velocity, m/s, ENU; attitude quaternion, FLU to ENU; body rates, rad/s, FLU; rotor speeds, the
-vehicle's unit. Modelled are rotor lag, drag, rotor momentum and the voltage's limit on rotor speed, but neither wind
-nor ground.
+x, 17: position and velocity, ENU; quaternion, FLU to ENU; body rates, FLU; rotor speeds, the vehicle's unit. Modelled
+are rotor lag, drag, rotor momentum and the voltage's limit on rotor speed, but neither wind nor ground.
 """
 
 from math import ceil, sqrt
@@ -74,7 +73,6 @@ def carry(
         durations_s: Of each command, (n,).
         commands: Rotor speeds, the vehicle's unit, (n, 4).
         disturbance: Acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, (6,).
-        packed: The `MotionModel`.
     """
     x = x.copy()
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
@@ -108,7 +106,6 @@ def thrust_n(speeds: Array, packed: Packed) -> float:
 def _write_derivative(
     change: Array, x: Array, target: Array, disturbance: Array, open_voltage_v: float, model: MotionModel
 ) -> None:
-    """Write x' to `change`, (17,)."""
     top = _top_speed(x[13:], open_voltage_v, model)
     h, h_rate, u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(4):
@@ -160,7 +157,7 @@ def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> floa
 
 @compiled
 def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: MotionModel) -> None:
-    """Set rotors without lag to their commands, within the limit of the battery."""
+    """Set rotors without lag to their commands."""
     if model.lag_up_s > 0.0:
         return
     top = _top_speed(target, open_voltage_v, model)
