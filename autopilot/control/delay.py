@@ -1,7 +1,7 @@
 """Delay compensation: the vehicle's state at the time a new command takes effect.
 
-The vehicle model carries the state ahead with the commands already sent and the observed disturbance, measured minus
-predicted change. The delay is declared, or the median of the plant's reports; only simulated time counts.
+The model carries the state ahead with the commands already sent and the observed disturbance. The delay is declared, or
+the median of the plant's reports in simulated time.
 """
 
 from collections import deque
@@ -55,7 +55,7 @@ class DelayCompensation:
             self._choose()
 
     def begin(self, controls: FourRotors, *, rests: bool = False) -> None:
-        """Start with the rotors turning at `controls`; a vehicle at rest stays until they lift it."""
+        """Start with the rotors at `controls`; a vehicle at rest stays until they lift it."""
         self._sent = deque([ActuatorCommand(0, controls, armed=any(controls))])
         self._known: tuple[int, Array] | None = None  # time, µs, and x of the previous frame
         self._rests = rests
@@ -70,7 +70,6 @@ class DelayCompensation:
             sent.popleft()
 
     def ahead(self, frame: StateFrame, charge_ah: float, *, standing: bool = False) -> StateFrame:
-        """Return the state `delay_us` after a frame. Called once per control sample."""
         if self.delay_us == 0:
             self._known = None
             return frame

@@ -1,8 +1,7 @@
 """A geometric tracking controller on SE(3), as a baseline for the LPV-MPC.
 
 T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; equation numbers
-in brackets. Frames are ENU and FLU with thrust along +z, so gravity and thrust change sign. All loops are critically
-damped: gains are ω² and 2ω times mass or inertia.
+in brackets. In ENU and FLU gravity and thrust change sign. All loops are critically damped.
 """
 
 from collections.abc import Mapping
@@ -35,7 +34,7 @@ class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Target(NamedTuple):
-    """Tracked attitude: rotation R_d (3, 3) and body rates Ω_d, rad/s, (3,)."""
+    """Rotation R_d (3, 3) and body rates Ω_d, rad/s, (3,)."""
 
     rotation: Array
     rate: Array
@@ -114,7 +113,7 @@ class GeometricController:
 
 
 def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
-    """Return the attitude with body z along `force`, m/s², ENU, (3,), and heading `yaw_rad`, and its body rates."""
+    """Return the attitude with body z along `force`, m/s², ENU, (3,), and its body rates."""
     heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
     z, z_rate = _unit(force, force_rate)
@@ -133,7 +132,7 @@ def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]
 
 
 def body_rate_of(phi: float, theta: float, angle_rates: Array) -> Array:
-    """Return p, q, r, rad/s, (3,), of Euler-angle rates (3,): the inverse of THESIS [2.7]."""
+    """Invert THESIS [2.7]: Euler-angle rates to p, q, r."""
     s, c, st, ct = sin(phi), cos(phi), sin(theta), cos(theta)
     return matvec(np.array([[1.0, 0.0, -st], [0.0, c, s * ct], [0.0, -s, c * ct]]), angle_rates)
 

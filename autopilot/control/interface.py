@@ -1,8 +1,8 @@
 """The interface of a control law.
 
 A package registers its law, a class, under the entry point group `colibri.controllers`. At each control sample the law
-maps its memory, the vehicle's state and the references ahead to rotor speeds and a new memory. It has no other state,
-so equal inputs give equal flights.
+maps memory, state and references to rotor speeds and a new memory. Without other state, equal inputs give equal
+flights.
 """
 
 from collections.abc import Callable
@@ -57,7 +57,7 @@ class AttitudeDemand(NamedTuple):
     Attributes:
         angles: phi, theta, psi, rad, psi unwrapped, (n, 3).
         angle_rates_rad_s: Their derivatives, (n, 3).
-        thrust_n: Along the body's z axis, N, (n,).
+        thrust_n: Along the body's z axis, (n,).
     """
 
     angles: Array
@@ -69,10 +69,10 @@ class VehicleState(NamedTuple):
     """The state of the vehicle.
 
     Attributes:
-        position_enu_m, velocity_enu_m_s: m and m/s, ENU.
+        position_enu_m, velocity_enu_m_s: ENU.
         attitude: Unit quaternion wxyz, FLU body to ENU earth.
         euler: phi, theta, psi in rad, psi unwrapped.
-        rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
+        rate_flu_rad_s: Body rates p, q, r, FLU.
         airborne: Clear of the ground: only air and rotors act on the vehicle.
     """
 
@@ -132,17 +132,17 @@ class Diagnostics(NamedTuple):
     """Details of a decision; a control law without a QP leaves the defaults.
 
     Attributes:
-        qp_status: Result of the QP; None without one.
+        qp_status: Result of the QP.
         fallback: Source of the decision if the QP was not solved.
-        solve_time_s: Duration of the QP's solution, s.
-        cost: The QP's objective at its solution.
+        solve_time_s: Duration of the QP's solution.
+        cost: The QP's objective.
         active: Active constraints at the solution.
-        slack: Largest violation of a soft limit, in parts of the limit.
+        slack: Largest violation of a soft limit, in parts of it.
         predicted: Outputs over the horizon, (N, p); order and units by the control law.
         planned_squared: Squared rotor speeds at each step, in parts of the largest, (N, 4).
         mass_kg: Estimated mass; nan without an estimate.
         path_lag_s: Lag of path time behind the clock; nan by the clock.
-        qp_iterations: Iterations of the QP solver, 0 if none was needed; nan without a QP or a count.
+        qp_iterations: Iterations of the QP solver, 0 if none was needed; nan if unknown.
     """
 
     qp_status: QpStatus | None = None
@@ -199,7 +199,7 @@ class Controller(Protocol[Memory]):
 class AttitudeController(Controller[Memory], Protocol[Memory]):
     """A control law that can also track an attitude; required by the modes that demand one.
 
-    Both steps share their memory: a flight may switch between them at any sample.
+    A flight may switch between both steps at any sample.
     """
 
     def step_attitude(
@@ -212,7 +212,7 @@ class AttitudeController(Controller[Memory], Protocol[Memory]):
 class ChargeController(Controller[Memory], Protocol[Memory]):
     """A control law that estimates the charge taken from the battery, Ah; optional.
 
-    The estimate survives a restart in flight, and is corrected by the battery's reports.
+    The estimate survives a restart in flight.
     """
 
     def charge_ah(self, memory: Memory) -> float: ...
@@ -224,7 +224,7 @@ class ChargeController(Controller[Memory], Protocol[Memory]):
 class MassController(Controller[Memory], Protocol[Memory]):
     """A control law that estimates the vehicle's mass in flight; optional.
 
-    The estimate survives a restart in flight; each take-off starts with the nominal mass, without the payload.
+    The estimate survives a restart in flight, but not a landing.
     """
 
     def mass_kg(self, memory: Memory) -> float: ...
@@ -245,7 +245,7 @@ class PathController(Controller[Memory], Protocol[Memory]):
     """A control law that can choose its speed along the references; optional.
 
     Attributes:
-        min_path_speed: Least speed, in parts of the references' own; with 1 the law always flies by the clock.
+        min_path_speed: Least speed, in parts of the references'; 1 stands for the clock.
     """
 
     min_path_speed: float
@@ -253,10 +253,9 @@ class PathController(Controller[Memory], Protocol[Memory]):
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
     ) -> tuple[Memory, Decision]:
-        """Decide as `step` does for references by path time, and choose the speed along them."""
+        """Decide as `step` does for references by path time, and choose the speed."""
 
-    def path_speed(self, memory: Memory) -> float:
-        """Return the speed in parts of the references' own; 1 by the clock."""
+    def path_speed(self, memory: Memory) -> float: ...
 
     def lag_us(self, memory: Memory) -> int:
         """Return the lag of path time behind the clock, µs, at least 0."""
@@ -268,7 +267,7 @@ class PathController(Controller[Memory], Protocol[Memory]):
 class PlanController(Controller[Memory], Protocol[Memory]):
     """A control law that plans attitudes and thrusts over its horizon; optional.
 
-    Its diagnostics hold `planned_squared`, and `predicted` from now on at control samples, shown by ground stations.
+    Its diagnostics hold `predicted` and `planned_squared` from now on at control samples.
     """
 
     plan_columns: PlanColumns

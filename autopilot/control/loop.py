@@ -1,4 +1,4 @@
-"""The control loop: the state from frames, one control law, and its rotor commands."""
+"""The control loop: states from frames, one control law, and its rotor commands."""
 
 from typing import Any, NamedTuple
 
@@ -73,10 +73,7 @@ class ControlLoop:
         self.controls = (0.0, 0.0, 0.0, 0.0)  # rotor speeds now, in parts of the largest
 
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
-        """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
-
-        The estimated charge is kept, or with `afresh` reset to the battery's report.
-        """
+        """Begin at a rotor speed (vehicle's unit) and yaw; `afresh` resets the charge to the battery's report."""
         before, self._memory = self._memory, self.controller.initial(rotor_speed)
         if self._charged is not None:
             charge_ah = self._reported_ah if afresh or before is None else self._charged.charge_ah(before)
@@ -85,7 +82,7 @@ class ControlLoop:
         self._command(np.full(4, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
-        """Restart at hover speed; keep the estimated charge and mass, and the lag."""
+        """Restart at hover speed; keep charge, mass and lag."""
         before = self._memory
         self.begin(self.vehicle.hover_speed, yaw_rad, afresh=False)
         if before is None:
@@ -96,7 +93,7 @@ class ControlLoop:
             self._memory = self._waiting.with_lag(self._memory, self._waiting.lag_us(before))
 
     def know_charge(self, used_ah: float) -> None:
-        """Correct the estimated charge by the battery's own report, Ah."""
+        """Correct the estimated charge by the battery's report, Ah."""
         self._reported_ah = used_ah
         if self._charged is not None and self._memory is not None:
             charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
@@ -104,7 +101,7 @@ class ControlLoop:
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken from the battery, Ah: the law's estimate, else the battery's report."""
+        """Charge taken: the law's estimate, else the battery's report."""
         if self._charged is None or self._memory is None:
             return self._reported_ah
         return self._charged.charge_ah(self._memory)
@@ -132,7 +129,6 @@ class ControlLoop:
         return LoopRecord(self._yaw_rad, self.controls, memory)
 
     def resume(self, record: LoopRecord, *, seamless: bool) -> None:
-        """Resume from a record: `seamless`, or as `begin_in_flight` does."""
         first = self.controller.initial(self.vehicle.hover_speed)
         kept = of_bytes(type(first), record.memory)
         self._memory = first if kept is None else kept
@@ -177,7 +173,6 @@ class ControlLoop:
         return decision
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
-        """Decide, as `decide` does, for an attitude demand; requires `takes_attitude`."""
         assert isinstance(self.controller, AttitudeController), "decided only where attitudes are taken"
         try:
             return self._take(time_us, self.controller.step_attitude(self._memory, time_us, state, demand))
@@ -187,7 +182,7 @@ class ControlLoop:
             raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
-        """Switch to a law of the same kind and interval; its memory is kept."""
+        """Switch to a law of the same kind and interval; keep the memory."""
         self._take_in(controller)
         self.vehicle = vehicle
 
@@ -214,7 +209,7 @@ class ControlLoop:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    """Return the longest interval up to the profile's, whole ms, that divides the control interval."""
+    """Return the longest divisor of the control interval up to the profile's, whole ms."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us
@@ -223,7 +218,7 @@ def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
 
 
 def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> Controller[Any]:
-    """Return the control law of a profile for a vehicle, built by `law` or by the registered factory.
+    """Build the control law of a profile for a vehicle.
 
     Raises:
         ControllerError, ProfileError, SolverError: The law, its table, or its solver cannot be used.

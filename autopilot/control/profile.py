@@ -46,7 +46,7 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A profile: a file is named by its `name` key or its path, never as a built-in one."""
+    """A profile, named by its `name` key or its path, never as a built-in one."""
 
     file: str = ""  # its path; empty for a built-in profile
 
@@ -62,7 +62,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def replace(self, key: str, value: Any) -> "Profile":
         """Return the profile with another value at a dotted key; a star marks its name.
 
-        `controllers.NAME` may be new: the settings of your own control law, checked when it is built.
+        `controllers.NAME` may be new: the settings of your own control law.
 
         Raises:
             ProfileError: The key is unknown, or the value invalid.
@@ -115,12 +115,11 @@ def profile_text(name: str) -> str:
 
 
 def profile_names() -> list[str]:
-    """Return the names of the built-in profiles."""
     return toml_names(_FOLDER)
 
 
 def _check_frames(profile: Profile) -> None:
-    """Raise a ProfileError unless frames divide the control interval of the profile's law."""
+    """Raise a ProfileError unless frames divide the control interval."""
     frame_s = profile.simulation.frame_interval_s
     control_s = profile.table(profile.controller).get("control_interval_s")
     if frame_s is None or not isinstance(control_s, float):

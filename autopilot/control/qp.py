@@ -84,7 +84,7 @@ class QpSolver:
 
 
 class _Optimum(NamedTuple):
-    """A solution with its multipliers of rows and bounds, and iterations."""
+    """Solution, multipliers, iterations."""
 
     x: Array | None
     z: Array | None
@@ -93,7 +93,7 @@ class _Optimum(NamedTuple):
 
 
 class _Daqp:
-    """DAQP by its own interface: qpsolvers' would load every solver, and SciPy."""
+    """DAQP without qpsolvers, which would load every solver, and SciPy."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         import daqp
@@ -113,7 +113,7 @@ class _Daqp:
 
 
 class _Clarabel:
-    """Clarabel by its own interface: the detour by qpsolvers takes longer than Clarabel."""
+    """Clarabel without qpsolvers, whose detour takes longer than Clarabel."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         import clarabel
@@ -167,7 +167,6 @@ class _Qpsolvers:
         return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
     def _quietly(self, qp: Qp) -> Any:
-        """Solve without the solvers' warnings of matrix conversions."""
         with catch_warnings():
             simplefilter("ignore")
             return self._solution(qp, _filled("P", qp.H), _filled("G", qp.G))
@@ -228,7 +227,7 @@ def box(n: int) -> Array:
 
 
 def _filled(role: str, matrix: Array) -> Any:
-    """Return a matrix as CSC; a new pattern takes five times Clarabel's solution, so it is cached."""
+    """Return a matrix as CSC; a new pattern takes five times Clarabel's time, so it is cached."""
     filled = matrix.T != 0.0
     sparse = _pattern(role, matrix.shape, filled.tobytes())
     sparse.data[:] = matrix.T[filled]
@@ -252,7 +251,6 @@ def _known_solvers() -> frozenset[str]:
 
 
 def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:
-    """Return tolerance and iteration limit by the solver's names."""
     absolute_and_relative = {"eps_abs": tolerance, "eps_rel": tolerance}
     options: dict[str, dict[str, Any]] = {
         "clarabel": {

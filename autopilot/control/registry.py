@@ -1,4 +1,4 @@
-"""Control laws by name: entry points, construction, and checks of their decisions."""
+"""Control laws by name: entry points, construction, and checks."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -48,7 +48,7 @@ def controller_names() -> list[str]:
 
 @cache
 def registered() -> EntryPoints:
-    """Return the entry points of all laws; cached, since this reads a file of every package."""
+    """Return the entry points of all laws; cached: this reads a file of every package."""
     return entry_points(group=GROUP)
 
 
@@ -99,7 +99,6 @@ def _sha256(file: str | None) -> str:
 
 
 def check_controller(name: str, controller: object) -> None:
-    """Raise a ControllerError unless the object implements `Controller`."""
     if not isinstance(controller, Controller):
         raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
     interval_us = controller.control_interval_us
@@ -115,7 +114,6 @@ def in_words(error: BaseException) -> str:
 
 
 def check_answer(name: str, answer: object, time_us: int) -> None:
-    """Raise a DecisionError unless a control law returned its memory and a Decision."""
     if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Decision):
         return
     raise DecisionError(
@@ -125,7 +123,7 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
 
 
 def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
-    """Return four rotor speeds within the vehicle's limits, or raise a DecisionError."""
+    """Return four rotor speeds within the limits, or raise a DecisionError."""
     speeds = np.asarray(rotor_speeds).tolist()
     if isinstance(speeds, list) and len(speeds) == 4:
         a, b, c, d = speeds

@@ -1,4 +1,4 @@
-"""The attitude LPV-MPC: predict, condense, solve, and read the plan."""
+"""The attitude LPV-MPC: predict, condense, solve, read the plan."""
 
 from math import radians
 from typing import Annotated, Literal, NamedTuple, TypeAlias
@@ -101,8 +101,8 @@ class AttitudeMpc:
     def plan(self, now: InitialState, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; the plan is None if the QP is not solved.
 
-        Thrust limits the moments of the rotors: beyond the tilt limit a second plan gives up thrust for moments.
-        `ahead`: states of the previous plan at the coming samples, (n, 9).
+        Beyond the tilt limit, a second plan gives up thrust for moments. `ahead`: the previous plan's coming states,
+        (n, 9).
         """
         self.predict(now, ahead)
         plan, diagnostics = self._solve(now, target)
@@ -134,7 +134,7 @@ class AttitudeMpc:
     def condense(self, now: InitialState, target: Target) -> Qp:
         """Condense the prediction to a QP, in arrays that the next call overwrites.
 
-        The first move may always cancel the last moments: thrust alone keeps the hard limits, so the QP is feasible.
+        The first move may always cancel the last moments, which makes the QP feasible.
         """
         max_squared = square(now.max_speed)
         condensing.condense(self._responses, self._schedule, target, now.u, self._packed, max_squared, self._qp)
@@ -157,7 +157,6 @@ class AttitudeMpc:
         return Plan(moments, states, float(z[-condensing.SLACKS + condensing.ANGLE_SLACK])), diagnostics
 
     def lqr(self, now: InitialState, target: Target) -> Array:
-        """Return the moments, N m, (3,), of the unconstrained LQR."""
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()
         wanted[list(prediction.ANGLES)] = target.angles[0]
@@ -166,7 +165,7 @@ class AttitudeMpc:
 
 
 def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weight: Array) -> tuple[Array, Array]:
-    """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments."""
+    """Return S (12, 12) and K (3, 12) of the LQR at hover."""
     A = _hover_transition(body, interval_s)
     B = A[:, STATES:]
     C = np.zeros((INPUTS, STATES + INPUTS))
@@ -177,7 +176,7 @@ def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weig
 
 
 def _hover_transition(body: Body, interval_s: float) -> Array:
-    """Return Ã = [[A, B], [0, I]] of one step at hover, (12, 12)."""
+    """Return Ã = [[A, B], [0, I]] of a step, (12, 12)."""
     A = np.eye(STATES + INPUTS)
     responses = np.zeros((2, STATES, 1 + INPUTS))
     level, at_once = np.zeros((1, len(prediction.SCHEDULE))), np.zeros(1, dtype=np.int64)

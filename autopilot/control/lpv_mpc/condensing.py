@@ -3,13 +3,8 @@
     z = [Δu at each move, angle slack, rate slack]
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-The cost is [3.13-3.20] with a full terminal weight on state and input. With b moves, n = 3 b + 2:
-
-    responses     of `prediction.respond`, (N + 1, 9, 1 + 3 b)
-    schedule      phi, theta, p, q, r expected at each step, (N, 5)
-    u             moments last commanded, N m, (3,)
-    thrust_n      U1 commanded at each step, N, (N,)
-    max_squared   largest available squared rotor speed, in parts of the largest
+The cost is [3.13-3.20] with a full terminal weight on state and input. Arguments: `prediction.respond`'s responses and
+schedule, the moments u last commanded, N m, (3,), and U1 at each step, N, (N,).
 """
 
 from math import sqrt
@@ -35,7 +30,7 @@ _NO_TILT = 1e-9
 
 
 class Problem(NamedTuple):
-    """Weights and limits shared by all QPs."""
+    """Constants of all QPs."""
 
     starts: Integers  # step of each move, (b,)
     checked: Integers  # steps with soft limits, (c,)
@@ -104,8 +99,7 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
     """Fill the rows of the rotor limits from row 0 on; return their number.
 
-    Given the thrust, squared speeds are linear in the moments, which are constant between two moves: one row a side, at
-    the tightest step, suffices.
+    Moments are constant between two moves: one row a side, at the tightest thrust, suffices.
     """
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     count = 0
@@ -131,8 +125,8 @@ def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float
 def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
     """Write the normal, (2,), of a tangent to the tilt limit; return its distance, rad.
 
-    cos(phi) cos(theta) >= cos(max_tilt) is convex and within normal . (phi, theta) <= distance. The tangent touches it
-    in the direction of (`phi`, `theta`); without tilt the normal is zero.
+    cos(phi) cos(theta) >= cos(max_tilt) is convex. The tangent touches it in the direction of (`phi`, `theta`); without
+    tilt the normal is zero.
     """
     x, y = sin(theta) * cos(phi), sin(phi)
     across = sqrt(x * x + y * y)
@@ -148,7 +142,7 @@ def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> fl
 
 @compiled
 def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int, G: Array, h: Array) -> int:
-    """Fill the soft rows of angles, rates and tilt, by its tangent at the schedule, from row `first` on."""
+    """Fill the soft rows of angles, rates and tilt, by its tangent, from row `first` on."""
     states = (ANGLES[0], ANGLES[1], P, Q, R)
     limits = problem.limits
     moved = responses.shape[2] - 1
@@ -178,7 +172,7 @@ def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int
 
 @compiled
 def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
-    """Return predicted states, (N + 1, 9), moments, N m, (N, 3), and squared speeds, (N, 4), of a solution."""
+    """Return predicted states, moments, N m, and squared speeds of a solution."""
     problem = packed[0]
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     steps = responses.shape[0] - 1
@@ -209,10 +203,7 @@ def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Ar
 def count_active(
     G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
 ) -> tuple[int, int, int, int]:
-    """Return the numbers of active limits of rotors, increments, angles and rates at z.
-
-    The first `rotor_rows` rows of G are those of `limit_rotors`.
-    """
+    """Return the numbers of active limits of rotors, increments, angles and rates at z."""
     increments = 0
     for k in range(z.shape[0] - SLACKS):
         if z[k] - lower[k] < binding or upper[k] - z[k] < binding:
@@ -236,7 +227,7 @@ def count_active(
 def condense(
     responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
 ) -> None:
-    """Fill a QP in place, except the slacks' part of H, f and the bounds."""
+    """Fill a QP in place, except the constants of its slacks."""
     problem = packed[0]
     for i in range(INPUTS):  # the first increments may always cancel u
         qp.lower[i] = min(-problem.max_increment[i], -u[i])

@@ -1,4 +1,4 @@
-"""The `lpv-mpc` control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
+"""The `lpv-mpc` control law: position by feedback linearisation, attitude by LPV-MPC."""
 
 from collections.abc import Mapping
 from math import radians

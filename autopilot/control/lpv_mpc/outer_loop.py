@@ -59,13 +59,7 @@ class OuterLoop:
     def track(
         self, motion: Motion, references: Horizon, planned_yaw: Array, disturbances: Array, max_speed: float
     ) -> Setpoint:
-        """Return the setpoint for references at the samples from now to one past the horizon.
-
-        Args:
-            planned_yaw: Of the previous plan from now on, rad, (m,); (0,) without one.
-            disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, (6,).
-            max_speed: Available to all rotors at once, in parts of the largest.
-        """
+        """Return the setpoint for references from now to one sample past the horizon."""
         p, v, a, *_, yaw, _, _ = references
         out = self._demands()
         aligned = position_loop.guide(

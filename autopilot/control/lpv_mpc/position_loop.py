@@ -4,12 +4,7 @@ Thrust makes F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; F gives roll an
 thrust points right while yaw lags. Future errors follow the closed loop. Flatness: Mellinger and Kumar, ICRA 2011; with
 drag: Faessler et al., RA-L 2018.
 
-Samples are from now to one past the horizon, n = N + 2; the last argument is filled:
-
-    forces       N, ENU, (n, 3)
-    angles       phi, theta, psi, rad, (n, 3)
-    references   position, velocity, acceleration, m, ENU, (n, 3) each, and yaw, rad, (n,)
-    up           body z axis now, ENU, (3,)
+Samples are from now to one past the horizon, n = N + 2. The last argument is filled; `packed` is the `Loop`.
 """
 
 from math import floor, pi, sqrt
@@ -61,13 +56,13 @@ class Demands(NamedTuple):
 @compiled
 def wanted_forces(
     motion: Motion,
-    references: tuple[Array, Array, Array, Array],
-    disturbance_m_s2: Array,
+    references: tuple[Array, Array, Array, Array],  # position, velocity, acceleration, ENU, (n, 3), and yaw, (n,)
+    disturbance_m_s2: Array,  # ENU, (3,)
     loop: Loop,
     limits: ForceLimits,
-    forces: Array,
+    forces: Array,  # N, ENU, (n, 3)
 ) -> None:
-    """Fill the thrust forces; `disturbance_m_s2` is ENU, (3,)."""
+    """Fill the thrust forces."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
     near = min(1.0, loop.max_error_m / max(norm(e), loop.max_error_m))
@@ -105,7 +100,7 @@ def thrust_commands(
 ) -> None:
     """Fill the commands, N, (N,), that bring the lagging thrust to its reference at each step's end.
 
-    The first reference is the force's component along the present z axis; later ones assume the planned attitude.
+    The first reference is the force's component along body z; later ones assume the planned attitude.
     """
     for n in range(commands.shape[0]):
         force = forces[n + 1]
@@ -118,7 +113,7 @@ def thrust_commands(
 
 @compiled
 def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interval_s: float, end: Array) -> None:
-    """Fill phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4 at the last but one sample, (12,)."""
+    """Fill phi, p, theta, q, psi, r, M1..M3, U2..U4 at the last but one sample."""
     before, here, after = angles[-3], angles[-2], angles[-1]
     rate = (after - before) / (2.0 * interval_s)
     turn = (after - 2.0 * here + before) / (interval_s * interval_s)
@@ -134,7 +129,7 @@ def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interva
 
 @compiled
 def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
-    """Fill the expected yaw, (n,); return the full turns between it and the wanted yaw, rad.
+    """Fill the expected yaw; return the full turns between it and the wanted yaw, rad.
 
     It follows the plan, (m,), then the rate of the wanted yaw, (n,).
     """
@@ -150,16 +145,13 @@ def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> fl
 def guide(
     motion: Motion,
     references: tuple[Array, Array, Array, Array],
-    planned_yaw: Array,
-    disturbances: Array,
+    planned_yaw: Array,  # (m,)
+    disturbances: Array,  # acceleration, m/s², ENU, and moment, N m, FLU, (6,)
     packed: Packed,
     limits: ForceLimits,
     out: Demands,
 ) -> float:
-    """Compute all demands of references; return the cosine of the angle from thrust axis to force.
-
-    `disturbances` are acceleration, m/s², ENU, and moment, N m, FLU, (6,); `packed` is the `Loop`.
-    """
+    """Compute all demands of references; return the cosine of the angle from thrust axis to force."""
     loop = packed[0]
     wanted_forces(motion, references, disturbances[:3], loop, limits, out.forces)
     ahead = np.empty(out.forces.shape[0])
@@ -175,13 +167,13 @@ def guide(
 @compiled
 def hold_attitude(
     motion: Motion,
-    demanded: tuple[Array, Array],
+    demanded: tuple[Array, Array],  # angles, (n, 3), and thrusts, N, (n,)
     disturbance_n_m: Array,
     packed: Packed,
     limits: ForceLimits,
     out: Demands,
 ) -> float:
-    """Compute the demands of angles, (n, 3), and thrusts, N, (n,); return the cosine as in `guide`.
+    """Compute the demands of an attitude; return the cosine as in `guide`.
 
     Only the first force is filled; psi moves to the vehicle's present turn.
     """

@@ -1,12 +1,11 @@
 """The attitude over a horizon: an LPV model with exact kinematics and rotor lag, as compiled kernels.
 
-The thesis's model [3.3] equates Euler rates and body rates, which at 40 degrees of tilt couples yaw into pitch. Here
-body rates are states, A has T(phi, theta) of [2.7], and moments lag as the rotors do. State, 9:
+The thesis's model [3.3] equates Euler rates and body rates, which couples yaw into pitch at a large tilt. Here body
+rates are states, A has T(phi, theta) of [2.7], and moments lag. State, 9:
 
     [phi p theta q psi r M1 M2 M3]        rad, rad/s, N m
 
-Scheduling along the previous plan: Cisneros, Voss and Werner, "Efficient nonlinear model predictive control via
-quasi-LPV representation", CDC 2016.
+Scheduling along the previous plan: Cisneros, Voss and Werner, CDC 2016.
 """
 
 from typing import NamedTuple, TypeAlias
@@ -52,7 +51,7 @@ class InitialState(NamedTuple):
 
 @compiled
 def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> None:
-    """Write A(schedule) X, (9, k), for states X, (9, k), and one row of the schedule, (5,)."""
+    """Write A(schedule) X, (9, k), for one row of the schedule, (5,)."""
     phi, theta, p, q, r = schedule
     s, c = sin(phi), cos(phi)
     cosine = max(cos(theta), _MIN_COSINE)
@@ -77,13 +76,10 @@ def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> 
 def respond(
     now: InitialState, schedule: Array, body: Body, starts: Integers, interval_s: float, responses: Array
 ) -> None:
-    """Predict: column 0 without increments, the others for a unit increment of one input at one move.
+    """Predict: column 0 without increments, column 1 + 3 j + i with a unit increment of input i at move j.
 
-    Zero-order hold by a Taylor series of the exponential, applied to all columns at once.
-
-    Args:
-        starts: Step of each move, ascending from 0, (b,).
-        responses: Output, (N + 1, 9, 1 + 3 b); column 1 + 3 j + i is input i at move j.
+    Zero-order hold by a Taylor series of the exponential. `starts` are the moves' steps, (b,), `responses` (N + 1, 9, 1
+    + 3 b).
     """
     columns = responses.shape[2]
     commanded = np.zeros((INPUTS, columns))
@@ -122,9 +118,9 @@ def respond(
 
 @compiled
 def schedule_along(x: Array, ahead: Array, schedule: Array) -> None:
-    """Fill `schedule`, (N, 5), with the scheduling states in the middle of each step.
+    """Fill `schedule`, (N, 5), with the states in the middle of each step.
 
-    These are means of neighbours: `x`, (9,), now, then `ahead`, (n, 9), of the previous plan, the last one repeated.
+    These are means of neighbours: `x`, (9,), now, then the previous plan's, `ahead`, (n, 9), the last one repeated.
     """
     steps = schedule.shape[0]
     for step in range(steps):

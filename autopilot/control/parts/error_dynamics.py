@@ -13,7 +13,7 @@ def gains(poles: tuple[float, float]) -> tuple[float, float]:
 
 
 def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
-    """Return the transition of an error and its rate from now to each sample, (samples, 2, 2)."""
+    """Return the transition of error and rate from now to each sample, (samples, 2, 2)."""
     first, second = poles
     t = interval_s * np.arange(samples, dtype=np.float64)
     if first == second:

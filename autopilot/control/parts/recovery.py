@@ -1,8 +1,7 @@
 """The recovery: an attitude law for any attitude, and a mixer with priorities.
 
 The law turns the thrust axis the shortest way (reduced attitude: Chaturvedi, Sanyal and McClamroch, IEEE Control
-Systems 31(3), 2011) and damps the yaw rate. The mixer keeps the tilting moments, shifts the thrust as they require, and
-gives yaw the remainder.
+Systems 31(3), 2011) and damps the yaw rate.
 """
 
 from math import sqrt
@@ -57,16 +56,13 @@ def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGai
 @compiled
 def mix_with_priority(
     thrust_n: float,
-    moment_n_m: Array,
-    rotors_from_thrust: Array,
-    rotors_from_moments: Array,
+    moment_n_m: Array,  # U2, U3, U4
+    rotors_from_thrust: Array,  # to squared speeds, parts of the largest, (4,)
+    rotors_from_moments: Array,  # (4, 3)
     min_squared: float,
     max_squared: float,
 ) -> Array:
-    """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
-
-    `moment_n_m` is U2..U4, N m; squared speeds, in parts of the largest, are linear in thrust and moments.
-    """
+    """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw."""
     tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
     yaw = rotors_from_moments[:, 2] * moment_n_m[2]
     room = max_squared - min_squared

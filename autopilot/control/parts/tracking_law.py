@@ -48,10 +48,7 @@ class TrackingLaw(AttitudeController[Memory]):
         self._turn = TurnGains(fallback.turn_1_s, fallback.rate_1_s, fallback.max_rate_rad_s)
 
     def recovered(self, force: Array, observed: Observed, from_wrench: Array, least: float, most: float) -> Array:
-        """Turn the thrust axis the shortest way to `force`; thrust is the force's component along it.
-
-        Return squared rotor speeds between `least` and `most`, (4,).
-        """
+        """Return squared rotor speeds, (4,), that turn the thrust axis to `force` the shortest way."""
         direction = matvec(observed.rotation.T, force / norm(force))
         moments = turning_moment(direction, observed.rigid[10:], self.tracker.inertia, self._turn)
         thrust_n = max(dot(force, observed.rotation[:, 2].copy()), 0.0)

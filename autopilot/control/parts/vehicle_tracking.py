@@ -96,7 +96,7 @@ class VehicleTracker:
         return Observed(*known, mass_kg, max_speed, current_a)
 
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
-        """Return rotor commands, in the vehicle's unit, for squared speeds (4,), and the next tracker state."""
+        """Return rotor commands, vehicle's unit, and the next tracker state."""
         _, _, measured, estimate, mass_kg, max_speed, current_a = observed
         actuated = np.empty((4, 4))
         top = self.vehicle.rotors.max_speed
@@ -113,11 +113,11 @@ def look(
     speeds: Array,
     wrench: Array,
     mean_wrench: Array,
-    before: Array,
+    before: Array,  # previous `measured`, (9,), or (0,)
     estimate_before: Array,
     mass_kg: float,
     airborne: bool,
-    open_v: float,
+    open_v: float,  # without load
     momentum: Array,
     observer: Packed,
     mass: Packed,
@@ -126,10 +126,7 @@ def look(
     measured: Array,
     estimate: Array,
 ) -> tuple[float, float, float]:
-    """Fill `rotation`, `measured` and `estimate` of `Observed`; return its mass, largest speed and current.
-
-    `before` is the previous `measured`, (9,), or (0,) at the start, `open_v` the battery's voltage without load.
-    """
+    """Fill the arrays of `Observed`; return its mass, largest speed and current."""
     R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
     for i in range(3):
         measured[i], measured[3 + i], measured[6 + i] = rigid[3 + i], rigid[10 + i], R[i][2]

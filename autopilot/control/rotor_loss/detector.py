@@ -1,11 +1,11 @@
 """Detection of a lost rotor from missing thrust and moments.
 
-Inverted equations of motion give force along z and moments between two control samples. The residual against the
-commanded, lagging rotors is -fᵢ aᵢ for a dead rotor i with expected thrust fᵢ and aᵢ = (1, yᵢ, -xᵢ, κᵢ).
+Inverted equations of motion give force along z and moments between two samples. The residual against the commanded,
+lagging rotors is -fᵢ aᵢ for a dead rotor i with expected thrust fᵢ and aᵢ = (1, yᵢ, -xᵢ, κᵢ).
 
 For each rotor a CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a
-quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. The
-bound on one sample keeps a jump of the estimate from raising the alarm.
+quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. A jump
+of the estimate cannot raise the alarm: one sample is bounded.
 """
 
 from typing import NamedTuple
@@ -96,12 +96,10 @@ class RotorWatch:
 
     @property
     def speeds(self) -> Array:
-        """Present rotor speeds, in parts of the largest, (4,)."""
         return self._kept.speeds.copy()
 
     @speeds.setter
     def speeds(self, speeds: Array) -> None:
-        """Present rotor speeds, in parts of the largest, (4,)."""
         self._kept.speeds[:] = speeds
 
     def adopt(self, vehicle: Vehicle) -> None:
@@ -110,14 +108,13 @@ class RotorWatch:
         self._numbers = packed(Numbers(signature_of(vehicle), lag, self._interval_s))
 
     def begin(self, controls: FourRotors) -> None:
-        """Reset, with the rotors at `controls`, parts of the largest."""
         kept = self._kept
         self.speeds = np.array(controls)
         kept.evidence[:] = kept.residual[:] = kept.noise[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
-        """Process a control sample; return the lost rotor. `controls` applied since the previous sample."""
+        """Process a control sample; `controls` applied since the previous one."""
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
         self.max_evidence = max(self.max_evidence, most)
@@ -150,16 +147,13 @@ def _take_in(
     attitude: Quaternion,
     rate_flu_rad_s: Vector,
     controls: FourRotors,
-    open_v: float,
-    counts: bool,
+    open_v: float,  # of the battery without load
+    counts: bool,  # else evidence is reset
     numbers: Packed,
     battery: Packed,
     memory: Packed,
 ) -> tuple[int, float]:
-    """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence.
-
-    `open_v` is the battery's voltage without load. Unless a sample `counts`, evidence is reset.
-    """
+    """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence."""
     it, of = memory[0], numbers[0]
     speeds_before, before = it.speeds.copy(), it.motion.copy()
     put(_followed(speeds_before, controls, open_v, of.lag, battery), it.speeds)

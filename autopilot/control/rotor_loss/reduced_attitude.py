@@ -1,12 +1,11 @@
 """The attitude of a quadrotor on three rotors: yaw is given up, and the spinning thrust axis tracks a direction.
 
-The motion is periodic (M. W. Mueller and R. D'Andrea, Stability and control of a quadrocopter despite the complete loss
-of one, two, or three propellers, ICRA 2014): the vehicle turns about an axis fixed in body and earth. The thrust of the
-opposite rotor tilts it by the cone angle, and brakes the spin into the gyroscope's range.
+The motion is periodic (M. W. Mueller and R. D'Andrea, ICRA 2014): the vehicle turns about an axis fixed in body and
+earth. The thrust of the opposite rotor tilts it by the cone angle, and brakes the spin into the gyroscope's range.
 
-The law is an LQR about the periodic solution, scheduled by the spin (LPV), with rotor lag and sampling in the model.
-Rotors a and b are beside the lost one, o opposite. State: the demanded thrust direction h in body axes (x, y), rates p
-and q, and the lagging forces d = f_b - f_a and f_o.
+The law is an LQR about this motion, scheduled by the spin (LPV), with rotor lag and sampling. Rotors a and b are beside
+the lost one, o opposite. State: the demanded thrust direction h in body axes (x, y), rates p and q, and the lagging
+forces d = f_b - f_a and f_o.
 """
 
 from math import copysign, hypot, inf, sqrt
@@ -32,7 +31,7 @@ _LEAST_MOMENTUM = 1e-12  # N m s: steady rates have a pole where the gyroscopic 
 
 
 class ThreeRotorsError(AutopilotError):
-    """A vehicle that cannot land on three rotors; the message gives the reason."""
+    """A vehicle that cannot land on three rotors, with the reason."""
 
 
 class Weights(NamedTuple):
@@ -67,10 +66,7 @@ class ReducedAttitude:
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
     ) -> None:
-        """Compute the gains without rotor `lost`, 0..3, in some ms, or raise a ThreeRotorsError.
-
-        `follows` is the part of the way to its command that a force goes in a sample.
-        """
+        """Compute the gains in some ms, or raise a ThreeRotorsError."""
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
         a, b, o = (allocation[1:3, rotor] / allocation[0, rotor] for rotor in self.trio[1:4])
@@ -86,10 +82,7 @@ class ReducedAttitude:
             raise ThreeRotorsError(f"no law turns it without rotor {lost + 1}")
 
     def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:
-        """Return the commands of d and f_o, N, without limits.
-
-        `direction` of the mean thrust is a unit vector, FLU; `forces` are d and f_o now, N, (2,).
-        """
+        """Return the commands of d and f_o, N; `direction` is a unit vector, FLU."""
         spin = float(rate[2]) * self.trio.sign
         solution = self.solution(spin)
         h = direction[:2]
@@ -101,7 +94,7 @@ class ReducedAttitude:
         return d, f_o + solution.opposite_n
 
     def solution(self, spin: float) -> Solution:
-        """Return the periodic solution of a spin, rad/s, positive along the rotors' torque."""
+        """Return the solution of a spin, rad/s, positive along the rotors' torque."""
         opened = (spin - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         if opened <= 0.0:
             return Solution(np.zeros(2), np.zeros(2), 0.0)
@@ -116,7 +109,7 @@ class ReducedAttitude:
         return Solution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
 
     def _steady_rate(self, r: float) -> Array:
-        """Return p and q for each N of the opposite rotor, (2,), with p' = q' = 0 at spin r."""
+        """Return p and q for each N of the opposite rotor, with p' = q' = 0 at spin r."""
         ix, iy, iz = self._inertia
         x, y = self._per_opposite
         about_x, about_y = (_off_zero(r * (iz - i) + self._momentum) for i in (ix, iy))
@@ -129,7 +122,6 @@ class ReducedAttitude:
         return gain
 
     def _designed(self, interval_s: float, follows: float, weights: Weights) -> Array:
-        """Return the gains, (spins, 2, 6)."""
         opened = (_SPINS_RAD_S - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         newton = weights.force_part * self._weight_n / 4.0
         Q = np.diag(1.0 / np.array([weights.direction, weights.direction, weights.rate, weights.rate, inf, inf]) ** 2)
@@ -141,7 +133,7 @@ class ReducedAttitude:
         return np.array(gains)
 
     def _model(self, spin: float, interval_s: float, follows: float) -> Array:
-        """Return the generator of state and held commands, (8, 8): h' = -ω × h, [2.8] and the lags, linearised."""
+        """Return the linearised generator of state and commands, (8, 8)."""
         r = spin * self.trio.sign
         (hx, hy), (p, q), _ = self.solution(spin)
         hz = sqrt(1.0 - hx * hx - hy * hy)
@@ -173,7 +165,7 @@ def trio_without(vehicle: Vehicle, lost: int) -> Trio:
 def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
     """Return the opposite rotor's thrust, N, that balances drag and rotor torque at a spin.
 
-    In-plane drag acts at each hub, which moves at ω × r: a yaw moment of -c Ω r².
+    In-plane drag at the hubs, which move at ω × r, makes a yaw moment of -c Ω r².
     """
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     low, high = 0.0, 0.5 * weight_n

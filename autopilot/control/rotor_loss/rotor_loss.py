@@ -53,16 +53,12 @@ class RotorLoss:
         return self._three is not None and self._three.landed
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Change the vehicle's parameters; a landing in progress keeps the old ones."""
+        """Change the vehicle's parameters; a landing keeps the old ones."""
         self._adopt_laws(vehicle)
         self.watch.adopt(vehicle)
 
     def try_out(self, vehicle: Vehicle) -> None:
-        """Simulate the loss of each rotor in hover for two samples with a changed vehicle.
-
-        Raises:
-            ThreeRotorsError: It cannot land on three rotors, but the present one can.
-        """
+        """Raise a ThreeRotorsError if a changed vehicle cannot land, but the present one can."""
         trial = RotorLoss(vehicle, round(self._interval_s * 1e6))
         if trial.impossible and not self.impossible:
             raise ThreeRotorsError(f"no landing on three rotors: {trial.impossible}")
@@ -86,7 +82,6 @@ class RotorLoss:
         self.watch.begin(controls)
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
-        """Resume after a restart with a lost rotor."""
         self.watch.lost, self.watch.speeds = lost, speeds
         if flying and not self.impossible:
             self._take_over(lost, state, ground_m)
@@ -98,12 +93,7 @@ class RotorLoss:
     def look(
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float
     ) -> bool:
-        """Process a control sample; return whether a loss was detected in it.
-
-        Args:
-            controls: Applied since the previous sample, parts of the largest speed.
-            ground_m: Height of the ground, z of ENU.
-        """
+        """Process a control sample; return whether a loss was detected in it."""
         if not self.enabled or self.impossible or self.watch.lost is not None:
             return False
         clear = airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
@@ -119,7 +109,6 @@ class RotorLoss:
         return self._three.controls, decision
 
     def end(self) -> None:
-        """Stop flying on three rotors; the rotor stays lost."""
         self._three = None
 
     def _adopt_laws(self, vehicle: Vehicle) -> None:

@@ -45,7 +45,6 @@ class ThreeRotors:
         state: VehicleState,
         ground_m: float,
     ) -> None:
-        """`speeds` of the rotors now, parts of the largest, (4,); `ground_m` z of ENU."""
         self._vehicle, self._interval_s = vehicle, interval_s
         self._lag = rotor_lag(vehicle, interval_s)
         self.law = law
@@ -127,7 +126,6 @@ class ThreeRotors:
         return wanted
 
     def _max_tilt_m_s2(self, off_m: float) -> float:
-        """Return the largest horizontal acceleration, which grows with the position error."""
         tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(off_m - _FAR_M, 0.0)
         return self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG)))
 
@@ -156,7 +154,7 @@ def shared(
 ) -> Array:
     """Return squared rotor speeds, parts of the largest, (4,): thrust direction first, then thrust.
 
-    Demanded are total thrust, `d`, thrust of b minus a, and `f_o`, N; `full_n` is each rotor's largest, (4,).
+    Demanded are the sum, `d`, thrust of b minus a, and `f_o`, N; `full_n` are the largest, (4,).
     """
     minimum, maximum = squared_limits
     min_n = minimum * max(full_n[trio.a], full_n[trio.b])

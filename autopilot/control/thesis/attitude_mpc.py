@@ -1,4 +1,4 @@
-"""The inner loop: LPV model at the present state, MPC over the horizon, one increment of the moments."""
+"""The inner loop: LPV model at the present state, MPC, one increment of the moments."""
 
 import numpy as np
 
@@ -46,15 +46,11 @@ class AttitudeMpc:
         euler: Vector,
         rate: Vector,
         moment_n_m: Array,
-        rotor_momentum_n_m_s: float,
-        reference: Vector,
+        rotor_momentum_n_m_s: float,  # h at the last commands
+        reference: Vector,  # constant over the horizon
         horizon: int,
     ) -> Solution:
-        """Return the increments of U2, U3, U4 (N m) until the next step, up to full moment to full moment.
-
-        The reference, phi, theta, psi, is constant over the horizon; the momentum is h at the last commanded rotor
-        speeds.
-        """
+        """Return the increments of U2, U3, U4, bounded by full moment to full moment."""
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)
         A, B = attitude_model(phi_rate, theta_rate, rotor_momentum_n_m_s, inertia_kg_m2=self._inertia)

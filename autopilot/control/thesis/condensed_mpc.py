@@ -21,7 +21,7 @@ class Weights(NamedTuple):
 
 
 class CondensedQp(NamedTuple):
-    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the horizon, (N · m,)."""
+    """min ½ Δuᵀ H Δu + fᵀ Δu over the horizon."""
 
     H: Array  # (N · m, N · m)
     f: Array  # (N · m,)
@@ -38,10 +38,7 @@ class IncrementModel(NamedTuple):
 
 
 def augment(transition: Array, C: Array) -> IncrementModel:
-    """Return the increment model of a discretised model [[Ad, Bd], [0, I]] and its output C, (p, n).
-
-    The transition is Ã itself; its last m columns are B̃.
-    """
+    """Return the increment model; the transition [[Ad, Bd], [0, I]] is Ã, and its last m columns are B̃."""
     outputs, n = C.shape
     inputs = len(transition) - n
     return IncrementModel(transition, transition[:, n:], np.hstack([C, np.zeros((outputs, inputs))]))
@@ -50,8 +47,7 @@ def augment(transition: Array, C: Array) -> IncrementModel:
 def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:
     """Eliminate the states: outputs over the horizon are Y = Phi x + Gamma Δu.
 
-    H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in. `x` is the augmented state,
-    `reference` the output at each step, (N, p).
+    H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in; r is `reference`, (N, p).
     """
     p, m = model.C.shape[0], model.B.shape[1]
     responses = np.empty((horizon + 1, *model.C.shape))

@@ -1,8 +1,7 @@
 """The thesis's first strategy, kept because it fails: one LPV-MPC for position and yaw, THESIS [3.1, 3.4].
 
-It never tilts: with phi = theta = 0 the rows of B for x' and y' are zero in the frozen model, and phi and theta are not
-outputs. Height fails too: B[z', U1] = -g/U1 + 1/m is zero at hover, and has the wrong sign below it. Only yaw is
-tracked.
+It never tilts: with phi = theta = 0 the rows of B for x' and y' are zero in the frozen model. Height fails too: B[z',
+U1] = -g/U1 + 1/m is zero at hover, and has the wrong sign below it. Only yaw is tracked.
 """
 
 from collections.abc import Mapping

@@ -17,10 +17,9 @@ ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0
 def attitude_model(
     phi_rate: float, theta_rate: float, rotor_momentum_n_m_s: float, *, inertia_kg_m2: tuple[float, float, float]
 ) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point, THESIS [3.3].
+    """Return A (6, 6) and B (6, 3) at one scheduling point, THESIS [3.3].
 
-    State [phi phi' theta theta' psi psi'], inputs U2, U3, U4 in N m. The rotors' momentum is h along body z: THESIS's Ω
-    J.
+    State [phi phi' theta theta' psi psi'], inputs U2, U3, U4. The momentum is h along body z: THESIS's Ω J.
     """
     ix, iy, iz = inertia_kg_m2
     h = rotor_momentum_n_m_s
@@ -47,10 +46,10 @@ def global_model(
     mass_kg: float,
     gravity_m_s2: float,
 ) -> tuple[Array, Array]:
-    """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
+    """Return A (12, 12) and B (12, 4) of position and attitude, THESIS [3.1, 3.4].
 
-    State [x x' y y' z z' phi phi' theta theta' psi psi'], ENU, inputs U1 in N, U2..U4 in N m. Thrust acts on the
-    position through B alone, at the present tilt; gravity is divided by the last U1 to fit in.
+    State [x x' y y' z z' phi phi' theta theta' psi psi'], ENU, inputs U1..U4. Thrust acts on the position through B
+    alone; gravity is divided by the last U1 to fit in.
     """
     phi, theta, psi = euler
     A, B = np.zeros((12, 12)), np.zeros((12, 4))
@@ -63,7 +62,7 @@ def global_model(
 
 
 def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> Array:
-    """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k], (n + m, n + m).
+    """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k].
 
     Zero-order hold is the exponential of [[A, B], [0, 0]] (Van Loan, 1978), forward Euler its first-order term.
     """

@@ -44,10 +44,7 @@ class PositionController:
         velocity_reference_enu_m_s: Vector,
         yaw_reference_rad: float,
     ) -> AttitudeAndThrust:
-        """Return the tilt and thrust that bring position and velocity to their references.
-
-        Demanded acceleration v = k1 e + k2 e' (erratum 5). The thesis's two cases of phi_ref are one.
-        """
+        """Return tilt and thrust for v = k1 e + k2 e' (erratum 5); the thesis's two cases of phi_ref are one."""
         errors = zip(position_reference_enu_m, position_enu_m, strict=True)
         speed_errors = zip(velocity_reference_enu_m_s, velocity_enu_m_s, strict=True)
         vx, vy, vz = (

@@ -18,14 +18,13 @@ _APART = 0.02  # largest difference from the battery's report, in parts of the c
 
 
 def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
-    """Return the charge taken, Ah: the model's, unless the battery reports a different one."""
     if vehicle.battery is None:
         return model_ah
     return reported_ah if abs(reported_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
 
 
 class BatteryNumbers(NamedTuple):
-    """Battery parameters for kernels; the defaults stand for a vehicle without a battery."""
+    """Battery parameters for kernels; defaults without a battery."""
 
     full_power_w: float = 0.0  # of a rotor at its largest speed
     full_voltage_v: float = 1.0
@@ -55,20 +54,20 @@ class BatteryModel:
         return 1.0 if self._battery is None else open_voltage_v(self._battery, charge_ah)
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
-        """Return terminal voltage, V, and current, A, at rotor speeds (4,), parts of the largest."""
+        """Return voltage and current at rotor speeds (4,), parts of the largest."""
         if self._battery is None:
             return 0.0, 0.0
         at_terminal: tuple[float, float] = terminal(open_voltage_v(self._battery, charge_ah), speeds, self.numbers)
         return at_terminal
 
     def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
-        """Return the available speed of a rotor while all keep the power of `speeds`, (4,)."""
+        """Return the available rotor speed at the power of `speeds`, (4,)."""
         if self._battery is None:
             return 1.0
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
 
     def max_common_speed(self, charge_ah: float) -> float:
-        """Return the speed available to all rotors at once, in parts of the largest."""
+        """Return the speed available to all rotors at once."""
         if self._battery is None:
             return 1.0
         whole, part = divmod(charge_ah / self._step_ah, 1.0)
@@ -78,7 +77,7 @@ class BatteryModel:
         return before + part * (after - before)
 
     def _balanced(self, battery: Battery, point: int) -> float:
-        """Return the common speed at a charge step, equal in parts to the voltage; found at first use."""
+        """Return the common speed at a charge step, equal in parts to the voltage."""
         if point in self._max_speeds:
             return self._max_speeds[point]
         open_v = open_voltage_v(battery, self._step_ah * point)
@@ -120,9 +119,9 @@ def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float
 
 @compiled
 def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
-    """Fill the largest available squared rotor speeds, (N,), in parts of the largest.
+    """Fill the largest squared rotor speeds, (N,), in parts of the largest, at the power of all rotors.
 
-    All rotors take the power of the `expected` squared speeds, (n, 4); the last limit is repeated.
+    `expected` squared speeds, (n, 4), give the power; the last limit is repeated.
     """
     numbers = packed[0]
     for n in range(limits.shape[0]):

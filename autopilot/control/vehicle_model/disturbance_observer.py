@@ -1,7 +1,7 @@
 """Observer of constant disturbances: acceleration (wind) and moment (a weak rotor).
 
-Two Luenberger observers, on velocity and body rates, each with its disturbance as a state and a double pole. Their
-inputs are the rotors' forces within limits, which prevents windup.
+Two Luenberger observers, on velocity and body rates, with double poles. Their inputs are the rotors' forces within
+limits, which prevents windup.
 """
 
 from typing import NamedTuple
@@ -70,17 +70,14 @@ def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
 @compiled
 def observe(
     estimate: Array,
-    before: Array,
-    now: Array,
-    wrench: Array,
-    momentum: float,
+    before: Array,  # measured, (9,)
+    now: Array,  # measured, (9,)
+    wrench: Array,  # mean over the interval, (4,)
+    momentum: float,  # h of the rotors along body z, N m s
     mass_kg: float,
     packed: Packed,
 ) -> Array:
-    """Return the new estimate (12,), from the previous one and both measurements, (9,) each.
-
-    `wrench`, (4,), and `momentum` h of the rotors along body z, N m s, are means over the interval.
-    """
+    """Return the new estimate (12,)."""
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
     thrust_n, moment_n_m = wrench[0], wrench[1:]

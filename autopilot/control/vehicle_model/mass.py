@@ -1,7 +1,7 @@
 """Slow estimate of the vehicle's mass from the disturbance along the thrust.
 
-A wrong mass acts in proportion to the thrust, which an observer of constants cannot follow. The specific thrust κ, in
-parts of the nominal one, integrates the disturbance d along body z, and d loses that part:
+A wrong mass acts in proportion to the thrust. The specific thrust κ, in parts of the nominal one, integrates the
+disturbance d along body z, and d loses that part:
 
     κ' = rate (d z_b) / (T / m_nominal),  d' = -κ' T / m_nominal z_b,  m = m_nominal / κ
 
@@ -55,10 +55,7 @@ def mass_model(settings: MassSettings, vehicle: Vehicle, interval_s: float) -> M
 
 @compiled
 def follow_mass(mass_kg: float, disturbance_m_s2: Array, up: Array, thrust_n: float, packed: Packed) -> float:
-    """Return the next mass, kg; only for an airborne vehicle.
-
-    `disturbance_m_s2`, ENU, (3,), loses the part that the new mass explains. `up` is the body z axis, ENU, (3,).
-    """
+    """Return the next mass in flight; `disturbance_m_s2`, ENU, (3,), loses the part that it explains."""
     model = packed[0]
     before, specific = model.nominal_kg / mass_kg, 1.0
     if model.rate_1_s > 0.0:

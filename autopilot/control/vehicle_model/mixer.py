@@ -36,7 +36,7 @@ class Mixer:
 def exact_inverse(allocation: Array) -> Array:
     """Invert an allocation (4, 4), keeping the symmetry of an airframe to the last bit.
 
-    With orthogonal rows A⁻¹ = Aᵀ (A Aᵀ)⁻¹ only divides; elimination leaves moments of 1e-17 N m, enough to drift.
+    Orthogonal rows need only division; elimination leaves moments of 1e-17 N m, enough to drift.
     """
     scale = np.sqrt((allocation * allocation).sum(axis=1))
     unit = allocation / scale[:, None]

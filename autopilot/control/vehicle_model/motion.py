@@ -1,7 +1,7 @@
-"""The autopilot's model of the vehicle's equations of motion, x' = f(x), and its integration.
+"""The autopilot's model of the vehicle's motion, x' = f(x), and its integration.
 
-x, 17: position and velocity, ENU; quaternion, FLU to ENU; body rates, FLU; rotor speeds, the vehicle's unit. Modelled
-are rotor lag, drag, rotor momentum and the voltage's limit on rotor speed, but neither wind nor ground.
+x, 17: position and velocity, ENU; quaternion, FLU to ENU; body rates, FLU; rotor speeds, the vehicle's unit. Neither
+wind nor ground is modelled.
 """
 
 from math import ceil, sqrt
@@ -67,12 +67,9 @@ def motion_model(vehicle: Vehicle) -> MotionModel:
 def carry(
     x: Array, durations_s: Array, commands: Array, disturbance: Array, open_voltage_v: float, packed: Packed
 ) -> Array:
-    """Return x, (17,), after a series of commands, by the classical Runge-Kutta rule.
+    """Return x after `commands`, rotor speeds in the vehicle's unit, (n, 4), by the classical Runge-Kutta rule.
 
-    Args:
-        durations_s: Of each command, (n,).
-        commands: Rotor speeds, the vehicle's unit, (n, 4).
-        disturbance: Acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, (6,).
+    `disturbance` is acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, (6,).
     """
     x = x.copy()
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
@@ -147,7 +144,7 @@ def _write_derivative(
 
 @compiled
 def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> float:
-    """Return the speed that the battery allows a rotor while all turn at `speeds`, (4,)."""
+    """Return the rotor speed that the voltage allows at `speeds`, (4,)."""
     power_w = 0.0
     for i in range(4):
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]

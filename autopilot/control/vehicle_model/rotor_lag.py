@@ -1,8 +1,7 @@
 """The rotor lag and its inverse, as compiled kernels.
 
 Control laws plan forces with one linear lag, the slower of the rotors' two. Commands then bring each squared speed, the
-force, to its planned value at the next sample in spite of two time constants and the square root. Speeds are in parts
-of the largest, (4,).
+force, to its planned value at the next sample. Speeds are in parts of the largest, (4,).
 """
 
 from math import sqrt
@@ -65,10 +64,7 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float
 
 @compiled
 def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
-    """Write commands, speeds and wrench a sample later, and the mean wrench until then, (4, 4).
-
-    Commands are in the vehicle's unit, with `top` as the largest.
-    """
+    """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, (4, 4)."""
     lag, allocation = packed[0].lag, packed[0].allocation
     commands, after, wrench, mean = out[0], out[1], out[2], out[3]
     put(lead(speeds, squared_commands, lag, max_speed), commands)

@@ -3,10 +3,7 @@
     z = changes of the corrections: of each rotor in each block, then two slacks if limits are soft
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-Arguments of the kernels, for b blocks and n = 4 b variables, or 4 b + 2 with slacks:
-
-    motion, speeds   nominal, (N + 1, 13) and (N + 1, 4), of `model.roll_out`
-    responses        of `deviations.respond`, (N + 1, 12, 4 b)
+With b blocks: nominal motion, (N + 1, 13), and squared speeds, (N + 1, 4), responses, (N + 1, 12, 4 b).
 """
 
 from math import floor, pi, sqrt
@@ -35,7 +32,7 @@ PREDICTED = 16  # position and velocity, ENU; phi, theta, psi; p, q, r; squared 
 
 
 class Weights(NamedTuple):
-    """Weights of the errors at each counted step, and of the corrections."""
+    """Weights of errors and corrections."""
 
     position: float  # 1/m²
     velocity: float  # s²/m²
@@ -62,7 +59,7 @@ class Problem(NamedTuple):
 
 
 class Target(NamedTuple):
-    """The references of the motion, from now to one sample past the horizon, n = N + 2."""
+    """References from now to one sample past the horizon, n = N + 2."""
 
     position: Array  # m, ENU, (n, 3)
     velocity: Array  # m/s, ENU, (n, 3)
@@ -82,11 +79,11 @@ def cost(
     speeds: Array,
     responses: Array,
     target: Target,
-    corrections: Array,
+    corrections: Array,  # the last one flown, then the nominal ones, (b + 1, 4)
     problem: Problem,
     qp: Qp,
 ) -> None:
-    """Fill H and f; `corrections` are the last one flown, then the nominal ones, (b + 1, 4)."""
+    """Fill H and f."""
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
     H, f, row = qp.H, qp.f, np.empty(moved)
@@ -116,7 +113,7 @@ def _blocks(starts: Integers, step: int) -> int:
 def _add_motion(
     motion: Array, responses: Array, n: int, target: Target, weights: Weights, used: int, row: Array, H: Array, f: Array
 ) -> None:
-    """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n, lower triangle.
+    """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n.
 
     One loop over all rows: loading an element of H takes as long as adding one row.
     """
@@ -151,7 +148,6 @@ def _add_demand(
     x: Array, squared: Array, X: Array, step: int, target: Target, problem: Problem, used: int, row: Array, H: Array,
     f: Array,
 ) -> None:  # fmt: skip
-    """Add the errors of a demanded tilt and thrust at a step."""
     weights = problem.weights
     away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])))
     for i in range(2):
@@ -166,7 +162,7 @@ def _add_demand(
 
 @compiled
 def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array) -> None:
-    """Add ½ weight (error + row z)², to the lower triangle of H."""
+    """Add ½ weight (error + row z)² to the lower triangle."""
     for k in range(used):
         weighted = weight * row[k]
         f[k] += error * weighted
@@ -181,7 +177,7 @@ def _nearest(angle: float) -> float:
 
 @compiled
 def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
-    """Return the rotation vector, rad, (3,), from the wanted attitude to R, under 90 degrees."""
+    """Return the rotation vector, rad, from the wanted attitude to R."""
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
     return error
@@ -189,7 +185,7 @@ def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) ->
 
 @inlined
 def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
-    """Add ½ eᵀ S e of the error at the end, in its body axes; four rows in a loop, as in `_add_motion`."""
+    """Add ½ eᵀ S e of the final error in body axes; four rows in a loop, as in `_add_motion`."""
     S = problem.terminal
     steps, moved = target.rates.shape[0], X.shape[1]
     inputs = moved // problem.levels.shape[0]
@@ -231,7 +227,6 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
 
 @compiled
 def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
-    """Add the cost of changes from the previous plan, and from block to block."""
     for block in range(problem.starts.shape[0] - 1):
         weight = problem.weights.first if block == 0 else problem.weights.next
         for rotor in range(ROTORS):
@@ -249,7 +244,7 @@ def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f:
 def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
     """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
 
-    `commands` of the references, (N, 4), within `limits`, (N, 2); `corrections` of each block, (b, 4).
+    `commands` of the references, (N, 4); `limits` (N, 2); `corrections` of each block, (b, 4).
     """
     inputs = lower.shape[0] // corrections.shape[0]
     for block in range(corrections.shape[0]):
@@ -265,7 +260,7 @@ def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, 
 
 @compiled
 def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
-    """Whether the plan by z, (4 b,), exceeds a soft limit at a checked step."""
+    """Whether the plan by z exceeds a soft limit."""
     rates, turned = np.empty(3), np.empty(2)
     for step in problem.checked:
         x, X = motion[step], responses[step]
@@ -287,7 +282,7 @@ def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool
 
 @compiled
 def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h: Array) -> None:
-    """Fill the soft rows of tilt and rates, (7 d, n) and (7 d,), each in parts of its limit."""
+    """Fill the soft rows of tilt and rates, each in parts of its limit."""
     moved = responses.shape[2]
     count = 0
     G[:, :] = 0.0
@@ -313,7 +308,7 @@ def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h:
 def read_plan(
     motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
 ) -> None:
-    """Write the `PREDICTED` states by z, (N + 1, 16), yaw unwrapped from `psi` on."""
+    """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
     inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
     for step in range(motion.shape[0]):
         x, X, state = motion[step], responses[step], states[step]

@@ -1,10 +1,10 @@
 """Deviations of the whole vehicle from its nominal motion, as compiled kernels.
 
-Linear, with the matrices at the middle of each step, and driven by the squared rotor speeds. State, 12:
+State, 12, driven by the squared rotor speeds:
 
     [position, m, ENU; velocity, m/s, ENU; rotation vector, rad, FLU; body rates, rad/s, FLU]
 
-The last index of every array runs over steps or columns of the response, so that loops over it are vectorised.
+The last index of every array runs over steps or columns, so that loops over it are vectorised.
 """
 
 from math import sqrt
@@ -22,7 +22,7 @@ POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
 
 
 class Transition(NamedTuple):
-    """The blocks of the transition of every step, (3, 3, N), or (3, 4, N) from the rotors."""
+    """Blocks of the transition of every step, (3, 3, N), or (3, 4, N) from the rotors."""
 
     drag: Array  # velocity to velocity, without the unit matrix
     velocity_rotation: Array
@@ -55,10 +55,7 @@ def empty_transition(steps: int) -> Transition:
 
 @inlined
 def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
-    """Fill the transitions of a nominal motion, (N + 1, 13), with squared rotor speeds, (N + 1, 4).
-
-    Taylor series to the third power of the step.
-    """
+    """Fill the transitions by a Taylor series to the third power of the step."""
     _differentiate(motion, speeds, model, out)
     V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
     _multiply(V, W, VW)
@@ -126,7 +123,6 @@ def _multiply(A: Array, B: Array, product: Array) -> None:
 
 @inlined
 def _drive(model: Model, out: Transition) -> None:
-    """Fill the effects of the rotors."""
     inertia, allocation, h = model.inertia, model.allocation, model.interval_s
     for i in range(3):
         for rotor in range(ROTORS):
@@ -151,10 +147,8 @@ def respond(
 ) -> None:
     """Write the deviations by a unit change of one rotor's command in one block.
 
-    Args:
-        means: Mean squared speed over each step by a unit change of each block, (b, N).
-        levels: The same at the beginning of each step and after the last, (b, N + 1).
-        responses: Output, (N + 1, 12, 4 b); column 4 j + i is rotor i in block j.
+    `means`, (b, N), and `levels`, (b, N + 1), are the squared speeds by that change over steps and at their ends;
+    column 4 j + i of `responses` is rotor i in block j.
     """
     model = packed[0]
     inputs = responses.shape[2] // means.shape[0]
@@ -207,7 +201,7 @@ def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
 
 @compiled
 def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
-    """Fill T with one level step at a thrust, and X, (2, 12, 12), with the response to each deviation."""
+    """Fill X, (2, 12, 12), with the response to each deviation in a level step."""
     model = packed[0]
     level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
     level[:, 6] = 1.0
@@ -221,7 +215,7 @@ def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
 
 
 def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:
-    """Return A, (16, 16), and B, (16, 4), of deviations and squared speeds in a level step at a thrust."""
+    """Return A, (16, 16), and B, (16, 4), of deviations and squared speeds in level flight."""
     T, X = empty_transition(1), np.empty((2, DEVIATIONS, DEVIATIONS))
     _hover(thrust_n, packed, T, X)
     lag, n = packed[0]["lag"], DEVIATIONS + ROTORS

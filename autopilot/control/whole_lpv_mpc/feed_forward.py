@@ -1,11 +1,10 @@
 """Rotor commands of the references by differential flatness, with drag, as compiled kernels.
 
-Thrust force and yaw give the attitude; successive attitudes the body rates and accelerations, and so the moments; with
-the thrust these give the squared rotor speeds. Commands lead them by the rotor lag. Derivatives beyond acceleration are
-differences between samples, which include drag. Mellinger and Kumar, ICRA 2011; with drag: Faessler, Franchi and
-Scaramuzza, RA-L 2018.
+Thrust force and yaw give the attitude; attitudes the rates and moments; with the thrust these give squared rotor
+speeds; commands lead them by the lag. Derivatives beyond acceleration are differences, which include drag. Mellinger
+and Kumar, ICRA 2011; with drag: Faessler, Franchi and Scaramuzza, RA-L 2018.
 
-Samples are from now to one past the horizon of N steps, n = N + 2. Squared speeds are in parts of the largest.
+Samples are from now to one past the horizon, n = N + 2. Squared speeds are in parts of the largest.
 """
 
 from math import sqrt
@@ -50,19 +49,16 @@ class Flat(NamedTuple):
 @compiled
 def follow(
     now: Packed,
-    position: Array,
+    position: Array,  # ENU, (n, 3) or more rows, as below
     velocity: Array,
     acceleration: Array,
     yaw_rad: Array,
     law: Packed,
     vehicle: Packed,
     out: Packed,
-    force: Array,
+    force: Array,  # N, ENU, (3,)
 ) -> None:
-    """Fill the `Target` of references by the clock, and the force, N, ENU, (3,), to align thrust with now.
-
-    `position`, `velocity`, `acceleration` are ENU, (n, 3), `yaw_rad` (n,), all with at least n rows.
-    """
+    """Fill the `Target` of references by the clock, and the force to align thrust with now."""
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     n = target.yaw_rad.shape[0]
     p, v, a, yaw = before_jump((position[:n], velocity[:n], acceleration[:n], yaw_rad[:n]), law[0].interval_s)
@@ -77,16 +73,16 @@ def follow(
 
 @compiled
 def ask(
-    velocity: Array,
-    acceleration: Array,
-    yaw_rad: Array,
+    velocity: Array,  # ENU, (n, 3)
+    acceleration: Array,  # ENU, (n, 3)
+    yaw_rad: Array,  # (n,)
     disturbance: Disturbance,
     limits: ForceLimits,
     from_wrench: Array,
     packed: Packed,
     out: Flat,
 ) -> None:
-    """Fill `out` from references of velocity and acceleration, ENU, (n, 3), and yaw, rad, (n,)."""
+    """Fill `out` from references."""
     model = packed[0]
     airframe = model.airframe
     for n in range(yaw_rad.shape[0]):
@@ -136,7 +132,7 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
 def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
     """Fill the commands, (N, 4), from one of the squared speeds, (N + 1, 4), to the next, within limits, (N, 2).
 
-    `left` is the part of the way that the lag leaves after a step.
+    `left` is the part of the way left after a step.
     """
     for n in range(commands.shape[0]):
         for rotor in range(ROTORS):
@@ -146,7 +142,7 @@ def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
 
 @compiled
 def point(force: Array, yaw_rad: float, attitude: Array) -> None:
-    """Write the attitude, (3, 3), with its z axis along a force, (3,), and the yaw as Euler angle."""
+    """Write the attitude, (3, 3), with body z along a force, (3,), at a yaw."""
     s, c = sin(yaw_rad), cos(yaw_rad)
     total = norm(force)
     z0, z1, z2 = force[0] / total, force[1] / total, force[2] / total
@@ -160,7 +156,7 @@ def point(force: Array, yaw_rad: float, attitude: Array) -> None:
 
 @compiled
 def rate_between(before: Array, after: Array, interval_s: float, rate: Array) -> None:
-    """Write the body rate, rad/s, FLU, (3,), between two attitudes, (3, 3), under 90° apart."""
+    """Write the body rate, rad/s, FLU, (3,), between two attitudes under 90° apart."""
     squared = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -176,9 +172,9 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
 
 @compiled
 def before_jump(references: tuple[Array, Array, Array, Array], interval_s: float) -> tuple[Array, Array, Array, Array]:
-    """Return references, ENU, (n, 3) each, and yaw, (n,), extrapolated past a jump of the velocity.
+    """Return references extrapolated past a jump of the velocity, as at the end of a track.
 
-    No vehicle follows a jump, as at the end of a track: tracking it would spoil the samples before.
+    No vehicle follows a jump: tracking it would spoil the samples before.
     """
     position, velocity, acceleration, yaw_rad = references
     n = position.shape[0]
@@ -215,7 +211,7 @@ def approach(
 
     Near references stay as given. For farther ones the error decays with the gains, slowed down to the largest
     acceleration; an error above the largest closes at constant speed. The motion of references out of reach counts in
-    proportion: an impossible one must not lead the vehicle astray. `packed` is the `Guidance`.
+    proportion: an impossible one must not lead the vehicle astray.
     """
     law = packed[0]
     away, squared = np.empty(3), 0.0
@@ -255,7 +251,7 @@ def approach(
 
 @compiled
 def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
-    """Return the time scale, at least 1, that keeps the acceleration of a decaying error within its limit."""
+    """Return the time scale, at least 1, that keeps a decaying error within the largest acceleration."""
     half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
     return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
 
@@ -265,10 +261,7 @@ def demanded_force(
     rigid: Array, near: tuple[Array, Array, Array], disturbance: Disturbance, packed: Packed, limits: ForceLimits,
     vehicle: Packed,
 ) -> Array:  # fmt: skip
-    """Return the force, N, ENU, (3,), with the recovery's error dynamics, to align thrust with.
-
-    `near` are references by `approach`; `packed` is the `Guidance`.
-    """
+    """Return the force, N, ENU, (3,), of the recovery's error dynamics about references by `approach`."""
     law, airframe, force = packed[0], vehicle[0].airframe, np.empty(3)
     for i in range(3):
         away, slower = near[0][0, i] - rigid[i], near[1][0, i] - rigid[3 + i]

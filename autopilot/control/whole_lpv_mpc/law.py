@@ -1,4 +1,4 @@
-"""The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks."""
+"""The whole-vehicle LPV-MPC as a control law: references, observers and fallbacks."""
 
 from collections.abc import Mapping
 from math import ceil, nan, radians
@@ -95,11 +95,7 @@ class Inputs(NamedTuple):
 
 
 class WholeLpvMpc(TrackingLaw[Memory]):
-    """The control law; its predicted outputs are `condensing.PREDICTED`.
-
-    Attributes:
-        min_path_speed: Least speed along the references, in parts of their own.
-    """
+    """The control law; its predicted outputs are `condensing.PREDICTED`."""
 
     plan_columns = PlanColumns(6, 7, 8, 11)
 
@@ -220,7 +216,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     def _choose(
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Plan, or fall back; return squared rotor speeds, the plan to continue, its age, and diagnostics."""
+        """Return squared rotor speeds, the plan to continue, its age, and diagnostics."""
         _, target, force, path = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):

@@ -1,7 +1,7 @@
 """The whole vehicle's model and its nominal motion, as compiled kernels.
 
-The nominal motion is a Runge-Kutta rollout of the rigid body from the present state with the expected commands. Squared
-rotor speeds, in parts of the largest, follow their commands as one linear lag.
+The motion is a Runge-Kutta rollout of the rigid body with the expected commands. Squared rotor speeds, in parts of the
+largest, follow their commands as one linear lag.
 """
 
 from math import sqrt
@@ -21,7 +21,7 @@ LEAST_SPEED = 1e-3  # of a rotor as a divisor
 
 
 class Lag(NamedTuple):
-    """Lag of squared rotor speeds s for commands u held over a step h: ds/dt = (u - s) / τ."""
+    """Lag of squared rotor speeds over a step h: ds/dt = (u - s) / τ."""
 
     left: float  # exp(-h / τ), the part of u - s left after a step; 0 without lag
     left_half: float  # after half a step
@@ -65,19 +65,16 @@ def empty_drive(steps: int) -> Drive:
 
 @inlined
 def roll_out(
-    rigid: Array,
-    squared: Array,
-    commands: Array,
+    rigid: Array,  # (13,)
+    squared: Array,  # rotor speeds, (4,)
+    commands: Array,  # (N, 4)
     disturbance: Disturbance,
     packed: Packed,
     drive: Drive,
-    motion: Array,
-    speeds: Array,
+    motion: Array,  # from now on, (N + 1, 13)
+    speeds: Array,  # squared, from now on, (N + 1, 4)
 ) -> None:
-    """Write the nominal motion from `rigid`, (13,), and `squared` rotor speeds, (4,), by commands, (N, 4).
-
-    `motion`, (N + 1, 13), and `speeds`, squared, (N + 1, 4), begin with the present ones.
-    """
+    """Write the nominal motion by commands."""
     model = packed[0]
     lag, h = model.lag, model.interval_s
     put(rigid, motion[0])
@@ -114,7 +111,7 @@ def roll_out(
 
 @inlined
 def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) -> None:
-    """Fill the effects of squared speeds in one part of each step, (N, 4)."""
+    """Fill the effects of squared speeds in one part of each step."""
     allocation, rate_1_s = model.allocation, model.lag.rate_1_s
     for n in range(commands.shape[0]):
         thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The whole-vehicle LPV-MPC: linearise about the previous plan, condense, solve and read the new plan."""
+"""The whole-vehicle LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
 from math import radians
 from typing import Annotated, NamedTuple
@@ -74,7 +74,7 @@ class Corrections(NamedTuple):
 
 
 class _Qps(NamedTuple):
-    """QPs of one kind: the `Kind`, and in its memory the QP without and with soft limits."""
+    """A packed `Kind`, and the two QPs in its memory."""
 
     kind: Packed
     free: Qp
@@ -82,12 +82,7 @@ class _Qps(NamedTuple):
 
 
 class WholeMpc:
-    """LPV-MPC of position, attitude and rotors together.
-
-    Attributes:
-        from_wrench: U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
-        terminal_on_hold: Terminal cost S for a demanded attitude.
-    """
+    """LPV-MPC of position, attitude and rotors together."""
 
     def __init__(
         self,
@@ -102,7 +97,7 @@ class WholeMpc:
         self._solver, self._clock = solver, clock
         numbers = model_of(vehicle, interval_s)
         self.model = packed(numbers)
-        self.from_wrench = exact_inverse(numbers.allocation)
+        self.from_wrench = exact_inverse(numbers.allocation)  # U1..U4, N, N m, to squared speeds, (4, 4)
         starts = np.cumsum((0, *settings.blocks))
         means, levels = lagging(starts, numbers.lag)
         on_hold = Weights(
@@ -149,7 +144,7 @@ class WholeMpc:
         self._none = np.empty((0, ROTORS))
 
     def _terminal(self, weights: Weights, count_every: int, thrust_n: float) -> Array:
-        """Return S, (16, 16): the cost of the LQR in level flight at `thrust_n` after the horizon."""
+        """Return S, (16, 16), of the LQR in level flight after the horizon."""
         A, B = deviations.hover_transition(thrust_n, self.model)
         Q = np.zeros((condensing.STATES, condensing.STATES))
         of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
@@ -169,20 +164,13 @@ class WholeMpc:
         self,
         now: Packed,
         target: Packed,
-        last: Array | None,
-        psi: float,
-        path: PathNow | None = None,
+        last: Array | None,  # the previous plan's commands from now on, (n, 4)
+        psi: float,  # unwrapped
+        path: PathNow | None = None,  # if the speed is free
         *,
-        on_track: bool = True,
+        on_track: bool = True,  # else track attitude and thrust
     ) -> tuple[Plan | None, Diagnostics]:
-        """Plan from `now` towards `target`; the plan is None if the QP is not solved.
-
-        Args:
-            last: Commands of the previous plan from now on, (n, 4).
-            psi: Yaw now, rad, unwrapped.
-            path: Nominal speeds along the path, if they are free.
-            on_track: Track position, or else attitude and thrust.
-        """
+        """Plan from `now` towards `target`; the plan is None if the QP is not solved."""
         qps = self._on_path if path else self._on_clock if on_track else self._on_hold
         last = self._none if last is None else last
         if path is None:
@@ -209,15 +197,14 @@ class WholeMpc:
         return Plan(commands, states, speeds), diagnostics
 
     def warm_up(self) -> None:
-        """Load compiled code of the soft limits, rarely needed in flight; after a first plan."""
+        """Load compiled code of the soft limits, after a first plan."""
         planning.limit(self._on_clock.kind)
         planning.count_active(self._on_clock.kind, np.zeros(len(self._on_clock.free.f)))
 
     def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
         """Return the optimal changes of the corrections.
 
-        An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again
-        with them.
+        An unconstrained minimum within the rotor limits needs no solver; a plan beyond a soft limit is solved again.
         """
         minimum = np.empty(len(free.f))
         is_free = planning.is_free(kind, minimum)
@@ -234,7 +221,7 @@ class WholeMpc:
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:
-    """Return the model of `vehicle`, with the slower of its rotors' two lags."""
+    """Return the model, with the slower of the rotors' two lags."""
     times = vehicle.rotors.lag
     lag = Lag(0.0, 0.0, 0.0, 0.0)
     if times:
@@ -252,10 +239,7 @@ def model_of(vehicle: Vehicle, interval_s: float) -> Model:
 
 
 def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
-    """Return the effect of a unit command in each block: mean squared speeds over steps, and at their ends.
-
-    Shapes (b, N) and (b, N + 1); the mean is above 0 from the block's begin on.
-    """
+    """Return mean squared speeds over steps, (b, N), and at their ends, (b, N + 1), by a unit command in each block."""
     blocks, steps = len(starts) - 1, int(starts[-1])
     means, levels = np.zeros((blocks, steps)), np.zeros((blocks, steps + 1))
     for block in range(blocks):

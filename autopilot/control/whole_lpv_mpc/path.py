@@ -1,10 +1,10 @@
 """The speed along the path as a variable of the plan, as compiled kernels.
 
-Path time θ passes at σ seconds a second. References are functions P of path time; σ is linear within a block:
+Path time θ passes at σ seconds a second, linear within a block. For references P of path time:
 
     p(t) = P(θ(t)),   dp/dt = σ P',   d²p/dt² = σ² P'' + dσ/dt P',   dθ/dt = σ
 
-The σ at the end of each block are variables of the QP beside the rotors' corrections.
+The QP has σ at the end of each block as a variable.
 """
 
 from math import floor
@@ -79,7 +79,7 @@ def speed_effects(starts: Integers, interval_s: float) -> SpeedEffects:
 
 @compiled
 def carry_speeds(last: Array, starts: Integers, lower: float, upper: float, speeds: Array) -> None:
-    """Fill σ at each sample, (N + 2,), from the previous plan's from now on, (n,)."""
+    """Fill σ at each sample, (N + 2,), from the previous plan's, (n,)."""
     speeds[0] = last[0]
     for block in range(starts.shape[0] - 1):
         begin, end = starts[block], starts[block + 1]
@@ -91,22 +91,14 @@ def carry_speeds(last: Array, starts: Integers, lower: float, upper: float, spee
 
 @compiled
 def slide(
-    references: Horizon,
+    references: Horizon,  # `interval_s` apart
     from_s: float,
-    speeds: Array,
+    speeds: Array,  # σ, (n,)
     interval_s: float,
-    out: tuple[Array, Array, Array, Array],
-    slopes: Array,
+    out: tuple[Array, Array, Array, Array],  # position, velocity, acceleration, (n, 3), and yaw, (n,)
+    slopes: Array,  # P', P'', (n, 6)
 ) -> float:
-    """Fill references at the samples' path times, moving at σ; return the last path time, s.
-
-    Args:
-        references: At path times `interval_s` apart.
-        from_s: Path time of the first sample.
-        speeds: σ at each sample, (n,).
-        out: Position, velocity, acceleration, ENU, (n, 3) each, and yaw, (n,).
-        slopes: P' and P'', (n, 6).
-    """
+    """Fill references at path times moving at σ; return the last path time, s."""
     p, v, a, j, s, yaw, yaw_rate, yaw_acceleration = references
     passed = from_s / interval_s
     samples = speeds.shape[0]
@@ -132,7 +124,7 @@ def slide(
 
 @compiled
 def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
-    """Write the effect of each σ on the tracking error, the last column of each block, (N + 1, 12, 5 b)."""
+    """Write the effect of each σ on the tracking error, the last column of each block."""
     inputs = ROTORS + 1
     for step in range(responses.shape[0]):
         for block in range(effects.shares.shape[1]):
@@ -165,7 +157,6 @@ def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> Non
 
 @compiled
 def read_speeds(speeds: Array, shares: Array, z: Array) -> Array:
-    """Return σ at each sample of the plan by z, (N + 2,)."""
     inputs = ROTORS + 1
     planned = speeds.copy()
     for sample in range(shares.shape[0]):

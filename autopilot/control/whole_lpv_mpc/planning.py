@@ -1,6 +1,6 @@
 """From the previous plan to the QP, and from its solution to the next plan, as compiled kernels.
 
-Commands and corrections are squared rotor speeds in parts of the largest; see `condensing`.
+Commands and corrections are squared rotor speeds in parts of the largest.
 """
 
 from math import sqrt
@@ -70,25 +70,16 @@ class Kind(NamedTuple):
 @compiled
 def begin(
     rigid: Array,
-    speeds: Array,
+    speeds: Array,  # of the rotors, parts of the largest, (4,)
     estimate: Array,
-    expected: Array,
-    least: float,
-    open_v: float,
+    expected: Array,  # squared, (n, 4); their power limits the available speeds
+    least: float,  # squared speed at idle
+    open_v: float,  # of the battery without load
     max_n: float,
     battery: Packed,
     now: Packed,
 ) -> None:
-    """Fill the start of a plan, except the other limits of the force.
-
-    Args:
-        rigid, estimate: From `Observed`.
-        speeds: Rotor speeds, parts of the largest, (4,).
-        expected: Squared speeds from now on, (n, 4), whose power limits the available ones.
-        least: Squared speed at idle.
-        open_v: Voltage of the battery without load.
-        max_n: Largest thrust.
-    """
+    """Fill the start of a plan, except the constant limits of the force."""
     start = now[0]
     put(rigid, start.rigid)
     for i in range(ROTORS):
@@ -102,7 +93,7 @@ def begin(
 
 @compiled
 def along(force: Array, measured: Array) -> tuple[float, float]:
-    """Return the component of a force, ENU, (3,), along body z, and its length; `measured` as in `Observed`."""
+    """Return the component of a force, ENU, (3,), along body z, and its length."""
     return dot(force, measured[6:]), norm(force)
 
 
@@ -114,18 +105,14 @@ def limit_first(now: Packed, most: float, steps: int) -> None:
 
 @compiled
 def first_angles(target: Packed) -> tuple[float, float, float]:
-    """Return phi, theta and psi, rad, in any turn, of the `Target` now."""
+    """Return phi, theta, psi, rad, of a `Target` now."""
     R = target[0].attitudes[0]
     return atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), target[0].yaw_rad[0]
 
 
 @compiled
 def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
-    """Fill the QP within the rotor limits.
-
-    `last` are commands of the previous plan from now on, (n, 4), or (0, 4) without one; `now`, `target`, `vehicle`,
-    `kind` the packed `Now`, `Target`, `Model` and `Kind`.
-    """
+    """Fill the QP within the rotor limits; `last`: the previous plan's commands from now on, (n, 4)."""
     work = kind[0].work
     _expect(now[0], target[0], last, vehicle, kind[0])
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
@@ -135,7 +122,7 @@ def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Pa
 def condense_on_path(
     now: Packed, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
 ) -> None:
-    """Fill the QP with free speed along the path; see `condense`."""
+    """Fill the QP with free speed along the path."""
     work = kind[0].work
     _expect(now[0], target[0], last, vehicle, kind[0])
     fill_slides(path, effects, work.responses)
@@ -162,9 +149,9 @@ def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) 
 
 @compiled
 def ease(commands: Array, starts: Integers, limits: Array) -> None:
-    """Limit the variation of the references' commands in each block to half of the rotors' range.
+    """Limit the references' commands in each block to half of the rotors' range.
 
-    A block has one correction: commands at both ends of the range would leave it no room.
+    Commands at both ends of the range would leave no room for the block's one correction.
     """
     for block in range(starts.shape[0] - 1):
         begin, end = starts[block], starts[block + 1]
@@ -184,8 +171,7 @@ def ease(commands: Array, starts: Integers, limits: Array) -> None:
 def carry_over(last: Array, commands: Array, starts: Integers, corrections: Array) -> None:
     """Fill the correction of each block, and before them the first again, (b + 1, 4).
 
-    Each is the mean over its block of the previous plan's commands, (n, 4), the last one repeated, minus `commands`,
-    (N, 4).
+    Each is the block's mean of the previous plan's commands, the last one repeated, minus `commands`.
     """
     for block in range(starts.shape[0] - 1):
         corrections[block + 1] = 0.0
@@ -199,15 +185,15 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 @compiled
 def is_free(kind: Packed, z: Array) -> bool:
-    """Write the `free_minimum` of the QP within rotor limits, (n,); return whether it is the solution."""
+    """Write the `free_minimum` within rotor limits; return whether it is the solution."""
     return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, z)
 
 
 @compiled
 def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
-    """Write the unconstrained minimum, (n,), by Cholesky factors; return whether it is within all bounds.
+    """Write the unconstrained minimum by Cholesky factors; return whether it is within all bounds.
 
-    Speeds along the path stay at their upper bounds, which are optimal while the vehicle is on time.
+    Speeds along the path stay at their upper bounds, optimal while the vehicle is on time.
     """
     n, inputs = z.shape[0], z.shape[0] // blocks
     first_speed = ROTORS if inputs > ROTORS else n
@@ -254,14 +240,13 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
 
 @compiled
 def is_beyond(kind: Packed, z: Array) -> bool:
-    """Whether the plan by z, (n,), exceeds a soft limit at a checked step."""
     work = kind[0].work
     return exceeds(work.motion, work.responses, z, kind[0].problem)
 
 
 @compiled
 def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> int:
-    """Write commands and states of the plan by z, (n,), from yaw `psi`, unwrapped; return its active bounds."""
+    """Write commands and states of the plan by z, from yaw `psi`; return its active bounds."""
     starts, work, qp = kind[0].problem.starts, kind[0].work, kind[0].qp
     corrections = work.corrections[1:].copy()
     inputs = z.shape[0] // corrections.shape[0]
@@ -298,7 +283,7 @@ def limit(kind: Packed) -> None:
 
 @compiled
 def count_active(kind: Packed, z: Array) -> tuple[int, int]:
-    """Return the numbers of active soft limits of tilt and of rates at z, (n,)."""
+    """Return the numbers of active soft limits of tilt and of rates."""
     qp, tilts, rates = kind[0].limited, 0, 0
     for row in range(qp.h.shape[0]):
         left = qp.h[row]

@@ -44,7 +44,6 @@ class TargetBuilder:
         self._near, self._flat = (it.position, it.velocity, it.acceleration), _flat_of(it)
 
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
-        """Return the target of references by the clock; `now` is the packed `Now`."""
         (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
         feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
         return Wanted(self._target, self._record, force)
@@ -53,11 +52,6 @@ class TargetBuilder:
         """Return the target of references at the path times of the previous plan.
 
         Feed-forward is that of the present speed, held; at the end, that of the final speed.
-
-        Args:
-            references: From path time on.
-            last: Speeds of the previous plan from now on, (k,).
-            lag_s: Lag of path time behind the clock.
         """
         n, h, guidance, mpc, path = self._samples, self._guidance.interval_s, self._guidance, self._mpc, self._path
         limits = now.force
@@ -84,14 +78,14 @@ class TargetBuilder:
         return Wanted(target, self._record, force, PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
-        """Return the vehicle's speed along the path, (1,); 1 where the references stand still."""
+        """Return the vehicle's speed along the path, (1,); 1 at a standstill."""
         along, velocity = references.velocity_enu_m_s[0].copy(), now.rigid[3:6].copy()
         squared = dot(along, along)
         speed = dot(velocity, along) / squared if squared > _STILL_M_S * _STILL_M_S else 1.0
         return np.array([min(max(speed, self._path.min_speed), upper)])
 
     def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
-        """Return the target of a demanded attitude and thrust, within the limits of the rotors."""
+        """Return the target of an attitude demand within the limits of the rotors."""
         n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         feed_forward.stand(angles, thrusts_n, limits, flat)
