@@ -89,7 +89,6 @@ class DelayCompensation:
         self.delay_us = min(max(delay_us, 0), MAX_DELAY_US)
 
     def _now(self, frame: StateFrame, voltage_v: float) -> Array:
-        """Return x at a frame; update the disturbance."""
         now_us, known = frame.time_us, self._known
         x = np.array(
             (
@@ -119,7 +118,7 @@ class DelayCompensation:
         return motion.carry(x, durations_s, speeds, self._disturbance, voltage_v, self._model)
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[ActuatorCommand]:
-        """Return the command acting at a time, then those taking effect before another."""
+        """Return the command acting at a time, then those that follow until another."""
         acting = [self._sent[0]]
         for it in self._sent:
             acts_us = it.time_us + self.delay_us

@@ -20,10 +20,10 @@ Memory = TypeVar("Memory")
 
 
 class Preview(NamedTuple):
-    """The references that a control law takes at each control sample.
+    """Demanded references.
 
     Attributes:
-        interval_us: Time between two references, µs; the first is at the start of the present interval.
+        interval_us: Between two references; the first is at the start of the present interval.
         samples: Number of references.
     """
 
@@ -89,7 +89,6 @@ AT_REST = VehicleState(_ZERO, _ZERO, (1.0, 0.0, 0.0, 0.0), _ZERO, _ZERO)  # hove
 
 
 def still_horizon(samples: int) -> Horizon:
-    """Return references that stay at `AT_REST`."""
     vectors, scalars = np.zeros((samples, 3)), np.zeros(samples)
     return Horizon(vectors, vectors, vectors, vectors, vectors, scalars, scalars, scalars)
 
@@ -190,7 +189,7 @@ class Controller(Protocol[Memory]):
 
         Args:
             time_us: Simulated time, µs, a multiple of the control interval.
-            state: The vehicle at the time the decision takes effect: now, unless a delay is compensated.
+            state: At the time the decision takes effect: now, unless a delay is compensated.
             references: By `preview`, from that time on; shared, so read only.
         """
 

@@ -93,7 +93,6 @@ class ControlLoop:
             self._memory = self._waiting.with_lag(self._memory, self._waiting.lag_us(before))
 
     def know_charge(self, used_ah: float) -> None:
-        """Correct the estimated charge by the battery's report, Ah."""
         self._reported_ah = used_ah
         if self._charged is not None and self._memory is not None:
             charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)

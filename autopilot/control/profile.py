@@ -31,7 +31,7 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is in the file of a profile."""
+    """The file of a profile."""
 
     name: str = ""
     controller: str
@@ -119,7 +119,6 @@ def profile_names() -> list[str]:
 
 
 def _check_frames(profile: Profile) -> None:
-    """Raise a ProfileError unless frames divide the control interval."""
     frame_s = profile.simulation.frame_interval_s
     control_s = profile.table(profile.controller).get("control_interval_s")
     if frame_s is None or not isinstance(control_s, float):

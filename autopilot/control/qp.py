@@ -38,7 +38,7 @@ class QpStatus(StrEnum):
 
 
 class Qp(NamedTuple):
-    """min ½ xᵀ H x + fᵀ x subject to G x <= h, lower <= x <= upper."""
+    """min ½ xᵀHx + fᵀx with G x <= h, lower <= x <= upper."""
 
     H: Array  # symmetric, positive definite, (n, n)
     f: Array  # (n,)
@@ -144,7 +144,7 @@ class _Clarabel:
 
 
 class _Qpsolvers:
-    """Any other solver, by qpsolvers."""
+    """Any other solver."""
 
     def __init__(self, name: str, options: dict[str, Any]) -> None:
         import qpsolvers
@@ -207,7 +207,6 @@ def installed_solvers() -> list[str]:
 
 
 def check_solver(name: str) -> None:
-    """Raise a SolverError if the solver is unknown or not installed."""
     if name in (_DAQP, _CLARABEL):  # as numpy is, always
         return
     import qpsolvers

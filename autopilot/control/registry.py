@@ -123,7 +123,6 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
 
 
 def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
-    """Return four rotor speeds within the limits, or raise a DecisionError."""
     speeds = np.asarray(rotor_speeds).tolist()
     if isinstance(speeds, list) and len(speeds) == 4:
         a, b, c, d = speeds

@@ -23,7 +23,7 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 def interval_us(interval_s: float) -> int:
-    """Return an interval in µs; SettingsError unless whole milliseconds, the resolution of MAVLink."""
+    """Return an interval in µs; SettingsError unless whole milliseconds, as in MAVLink."""
     if not (interval_s * 1000.0).is_integer():
         raise SettingsError(f"control_interval_s: must be whole milliseconds, not {interval_s}")
     return round(interval_s * 1e6)

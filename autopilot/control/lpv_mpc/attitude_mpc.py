@@ -55,7 +55,7 @@ class Plan(NamedTuple):
 
 
 class AttitudeMpc:
-    """LPV-MPC of roll, pitch and yaw, within the limits of the rotors."""
+    """LPV-MPC of roll, pitch and yaw."""
 
     def __init__(
         self,
@@ -176,7 +176,6 @@ def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weig
 
 
 def _hover_transition(body: Body, interval_s: float) -> Array:
-    """Return Ã = [[A, B], [0, I]] of a step, (12, 12)."""
     A = np.eye(STATES + INPUTS)
     responses = np.zeros((2, STATES, 1 + INPUTS))
     level, at_once = np.zeros((1, len(prediction.SCHEDULE))), np.zeros(1, dtype=np.int64)
@@ -190,7 +189,6 @@ def _hover_transition(body: Body, interval_s: float) -> Array:
 
 
 def body_of(vehicle: Vehicle) -> Body:
-    """Return the model, with the slower of the rotors' two lags."""
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
     return Body(*vehicle.body.inertia_kg_m2, lag_1_s)

@@ -125,8 +125,8 @@ def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float
 def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
     """Write the normal, (2,), of a tangent to the tilt limit; return its distance, rad.
 
-    cos(phi) cos(theta) >= cos(max_tilt) is convex. The tangent touches it in the direction of (`phi`, `theta`); without
-    tilt the normal is zero.
+    The convex set cos(phi) cos(theta) >= cos(max_tilt) touches it in the direction of (`phi`, `theta`); without tilt
+    the normal is zero.
     """
     x, y = sin(theta) * cos(phi), sin(phi)
     across = sqrt(x * x + y * y)
@@ -172,7 +172,6 @@ def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int
 
 @compiled
 def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
-    """Return predicted states, moments, N m, and squared speeds of a solution."""
     problem = packed[0]
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     steps = responses.shape[0] - 1
@@ -227,7 +226,6 @@ def count_active(
 def condense(
     responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
 ) -> None:
-    """Fill a QP in place, except the constants of its slacks."""
     problem = packed[0]
     for i in range(INPUTS):  # the first increments may always cancel u
         qp.lower[i] = min(-problem.max_increment[i], -u[i])

@@ -39,7 +39,7 @@ _NO_YAW = np.empty(0)
 
 
 class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What flies when no plan can be had: then, so many samples of an LQR, then a descent."""
+    """Fallbacks without a plan: the previous plan, then an LQR, then a descent."""
 
     lqr_samples: Count
     descent_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]

@@ -59,7 +59,6 @@ class OuterLoop:
     def track(
         self, motion: Motion, references: Horizon, planned_yaw: Array, disturbances: Array, max_speed: float
     ) -> Setpoint:
-        """Return the setpoint for references from now to one sample past the horizon."""
         p, v, a, *_, yaw, _, _ = references
         out = self._demands()
         aligned = position_loop.guide(

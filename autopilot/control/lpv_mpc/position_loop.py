@@ -1,8 +1,7 @@
 """The outer loop over a horizon: references and feedback to attitudes and thrusts, as compiled kernels.
 
-Thrust makes F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; F gives roll and pitch at the predicted yaw, so that
-thrust points right while yaw lags. Future errors follow the closed loop. Flatness: Mellinger and Kumar, ICRA 2011; with
-drag: Faessler et al., RA-L 2018.
+Thrust makes F = m (a_ref + k1 e + k2 e' + g - d) plus the drag, and F gives roll and pitch at the predicted yaw. Future
+errors follow the closed loop. Flatness: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
 
 Samples are from now to one past the horizon, n = N + 2. The last argument is filled; `packed` is the `Loop`.
 """
@@ -21,7 +20,7 @@ from colibri.common.types import Array
 
 
 class Loop(NamedTuple):
-    """Constants of the outer loop over N steps."""
+    """Constants of the outer loop."""
 
     k1_s2: float  # on the position error
     k2_s: float  # on its rate
@@ -45,7 +44,7 @@ class Motion(NamedTuple):
 
 
 class Demands(NamedTuple):
-    """Demands over the horizon, filled in place."""
+    """Demands over the horizon."""
 
     forces: Array  # N, ENU, (N + 2, 3)
     angles: Array  # phi, theta, psi, rad, (N + 2, 3)
@@ -62,7 +61,6 @@ def wanted_forces(
     limits: ForceLimits,
     forces: Array,  # N, ENU, (n, 3)
 ) -> None:
-    """Fill the thrust forces."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
     near = min(1.0, loop.max_error_m / max(norm(e), loop.max_error_m))

@@ -18,7 +18,7 @@ _ANTIPARALLEL = 1e-6
 
 
 class RecoverySettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What flies when no plan can be had: the previous plan, so many samples of it, then the recovery."""
+    """Fallbacks without a plan: the previous plan for some samples, then the recovery."""
 
     shifted_samples: Count
     turn_1_s: Positive

@@ -1,8 +1,4 @@
-"""The discrete-time LQR, by structure-preserving doubling of its Riccati equation.
-
-E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Structure-preserving algorithms for periodic discrete-time algebraic
-Riccati equations, International Journal of Control 77(8), 2004.
-"""
+"""The discrete-time LQR, by doubling of its Riccati equation: Chu, Fan, Lin and Wang, Int. J. Control 77(8), 2004."""
 
 import numpy as np
 

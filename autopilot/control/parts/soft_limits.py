@@ -8,7 +8,6 @@ _MAX_SLACK = 100.0
 
 
 def empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:
-    """Return a QP with the constant terms of its slacks filled in."""
     n = moved + slacks
     H, f = np.zeros((n, n)), np.zeros(n)
     H[moved:, moved:] = slack_weight * np.eye(slacks)

@@ -24,7 +24,7 @@ class ForceLimits(NamedTuple):
 
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force in place, its vertical part first: height before position."""
+    """Limit a force in place: height before position."""
     force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
     horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
     left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))

@@ -56,7 +56,7 @@ class TrackingLaw(AttitudeController[Memory]):
         return mix_with_priority(thrust_n, moments, from_thrust, from_moments, least, most)
 
     def warm_up(self) -> None:
-        """Load compiled code: three steps from hover, the last upside down, and one for an attitude."""
+        """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""
         memory, references = self.initial(self.tracker.vehicle.hover_speed), still_horizon(self.preview.samples)
         for attitude in (AT_REST.attitude, AT_REST.attitude, _UPSIDE_DOWN):
             memory, _ = self.step(memory, 0, AT_REST._replace(attitude=attitude), references)

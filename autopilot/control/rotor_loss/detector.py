@@ -1,11 +1,11 @@
 """Detection of a lost rotor from missing thrust and moments.
 
-Inverted equations of motion give force along z and moments between two samples. The residual against the commanded,
-lagging rotors is -fᵢ aᵢ for a dead rotor i with expected thrust fᵢ and aᵢ = (1, yᵢ, -xᵢ, κᵢ).
+Inverted equations of motion give force along z and moments between two samples. Against the commanded, lagging rotors a
+dead rotor i leaves -fᵢ aᵢ, with its expected thrust fᵢ and aᵢ = (1, yᵢ, -xᵢ, κᵢ).
 
-For each rotor a CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a
-quarter, with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. A jump
-of the estimate cannot raise the alarm: one sample is bounded.
+Each rotor's CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a quarter,
+with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. One sample is
+bounded: a jump of the estimate cannot raise the alarm.
 """
 
 from typing import NamedTuple
@@ -114,7 +114,6 @@ class RotorWatch:
         self._began = False
 
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
-        """Process a control sample; `controls` applied since the previous one."""
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
         self.max_evidence = max(self.max_evidence, most)

@@ -1,11 +1,11 @@
-"""The attitude of a quadrotor on three rotors: yaw is given up, and the spinning thrust axis tracks a direction.
+"""The attitude of a quadrotor on three rotors: it spins, and its thrust axis tracks a direction.
 
 The motion is periodic (M. W. Mueller and R. D'Andrea, ICRA 2014): the vehicle turns about an axis fixed in body and
-earth. The thrust of the opposite rotor tilts it by the cone angle, and brakes the spin into the gyroscope's range.
+earth. The opposite rotor's thrust tilts it by the cone angle, and brakes the spin into the gyroscope's range.
 
 The law is an LQR about this motion, scheduled by the spin (LPV), with rotor lag and sampling. Rotors a and b are beside
-the lost one, o opposite. State: the demanded thrust direction h in body axes (x, y), rates p and q, and the lagging
-forces d = f_b - f_a and f_o.
+the lost one, o opposite. State: the demanded thrust direction h in body x and y, rates p and q, and the lagging forces
+d = f_b - f_a and f_o.
 """
 
 from math import copysign, hypot, inf, sqrt
@@ -133,7 +133,6 @@ class ReducedAttitude:
         return np.array(gains)
 
     def _model(self, spin: float, interval_s: float, follows: float) -> Array:
-        """Return the linearised generator of state and commands, (8, 8)."""
         r = spin * self.trio.sign
         (hx, hy), (p, q), _ = self.solution(spin)
         hz = sqrt(1.0 - hx * hx - hy * hy)

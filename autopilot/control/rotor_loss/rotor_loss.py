@@ -31,7 +31,7 @@ class Permission(Protocol):
 
 
 class RotorLoss:
-    """Watches the rotors of one vehicle, and flies it after the loss of one."""
+    """Watches the rotors of one vehicle, and lands it after the loss of one."""
 
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
         self._interval_s = interval_us * 1e-6

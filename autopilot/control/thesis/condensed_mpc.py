@@ -13,7 +13,7 @@ _BINDING = 1e-6  # a bound is active if this part of it or less is left
 
 
 class Weights(NamedTuple):
-    """Diagonals of Q (each error), S (the last one) and R (each increment)."""
+    """Diagonals of Q, S and R."""
 
     output: Array
     terminal: Array

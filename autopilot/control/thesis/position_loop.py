@@ -29,7 +29,7 @@ class AttitudeAndThrust(NamedTuple):
 
 
 class PositionController:
-    """Turns the acceleration of a pole-placed double integrator into tilt and thrust."""
+    """Turns the acceleration of placed poles into tilt and thrust."""
 
     def __init__(self, settings: PositionSettings, vehicle: Vehicle) -> None:
         self._k1, self._k2 = gains(settings.poles)

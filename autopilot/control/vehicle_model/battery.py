@@ -54,14 +54,12 @@ class BatteryModel:
         return 1.0 if self._battery is None else open_voltage_v(self._battery, charge_ah)
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
-        """Return voltage and current at rotor speeds (4,), parts of the largest."""
         if self._battery is None:
             return 0.0, 0.0
         at_terminal: tuple[float, float] = terminal(open_voltage_v(self._battery, charge_ah), speeds, self.numbers)
         return at_terminal
 
     def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
-        """Return the available rotor speed at the power of `speeds`, (4,)."""
         if self._battery is None:
             return 1.0
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v

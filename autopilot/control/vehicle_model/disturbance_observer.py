@@ -62,7 +62,7 @@ def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float)
 
 
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
-    """Return the gains on the observed state and on its disturbance (1/s) for a double pole."""
+    """Return the gains on the state and on its disturbance (1/s) for a double pole."""
     pole = exp(-frequency_rad_s * interval_s)
     return 1.0 - pole * pole, square(1.0 - pole) / interval_s
 
@@ -77,7 +77,6 @@ def observe(
     mass_kg: float,
     packed: Packed,
 ) -> Array:
-    """Return the new estimate (12,)."""
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
     thrust_n, moment_n_m = wrench[0], wrench[1:]

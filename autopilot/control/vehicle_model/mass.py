@@ -21,7 +21,7 @@ _LEAST_THRUST = 0.5  # least thrust counted, in parts of the nominal weight: a s
 
 
 class MassSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The mass that is followed."""
+    """The estimate of the mass."""
 
     rate_1_s: NotNegative
     """0: the nominal mass is kept."""

@@ -18,18 +18,13 @@ class Mixer:
         self._squared_max = square(vehicle.rotors.max_speed)
 
     def rotor_speeds(self, wrench: Array) -> Array:
-        """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m).
-
-        Each speed is clipped to the rotor's limits.
-        """
+        """Return the rotor speeds (4,), in the vehicle's unit, for U1 (N), U2, U3, U4 (N m), clipped to the limits."""
         return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
     def wrench(self, speeds: Array) -> Array:
-        """Return U1..U4 (4,) of rotor speeds (4,)."""
         return matvec(self._allocation, speeds * speeds)
 
     def momentum(self, speeds: Array) -> float:
-        """Return the rotors' angular momentum h along body z, N m s."""
         return dot(self._momentum, speeds)
 
 

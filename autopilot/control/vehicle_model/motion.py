@@ -144,7 +144,6 @@ def _write_derivative(
 
 @compiled
 def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> float:
-    """Return the rotor speed that the voltage allows at `speeds`, (4,)."""
     power_w = 0.0
     for i in range(4):
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
@@ -154,7 +153,6 @@ def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> floa
 
 @compiled
 def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: MotionModel) -> None:
-    """Set rotors without lag to their commands."""
     if model.lag_up_s > 0.0:
         return
     top = _top_speed(target, open_voltage_v, model)

@@ -1,7 +1,7 @@
-"""The rotor lag and its inverse, as compiled kernels.
+"""The rotor lag and its inverse, as compiled kernels; speeds in parts of the largest, (4,).
 
 Control laws plan forces with one linear lag, the slower of the rotors' two. Commands then bring each squared speed, the
-force, to its planned value at the next sample. Speeds are in parts of the largest, (4,).
+force, to its planned value at the next sample.
 """
 
 from math import sqrt
@@ -41,7 +41,6 @@ def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
 
 @compiled
 def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
-    """Return the speeds one control sample later."""
     after = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
         way = commands[i] - speeds[i]

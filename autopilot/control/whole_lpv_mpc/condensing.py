@@ -83,7 +83,6 @@ def cost(
     problem: Problem,
     qp: Qp,
 ) -> None:
-    """Fill H and f."""
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
     H, f, row = qp.H, qp.f, np.empty(moved)
@@ -162,7 +161,6 @@ def _add_demand(
 
 @compiled
 def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array) -> None:
-    """Add ½ weight (error + row z)² to the lower triangle."""
     for k in range(used):
         weighted = weight * row[k]
         f[k] += error * weighted
@@ -177,7 +175,6 @@ def _nearest(angle: float) -> float:
 
 @compiled
 def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
-    """Return the rotation vector, rad, from the wanted attitude to R."""
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
     return error
@@ -260,7 +257,6 @@ def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, 
 
 @compiled
 def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
-    """Whether the plan by z exceeds a soft limit."""
     rates, turned = np.empty(3), np.empty(2)
     for step in problem.checked:
         x, X = motion[step], responses[step]

@@ -55,7 +55,6 @@ def empty_transition(steps: int) -> Transition:
 
 @inlined
 def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
-    """Fill the transitions by a Taylor series to the third power of the step."""
     _differentiate(motion, speeds, model, out)
     V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
     _multiply(V, W, VW)
@@ -176,7 +175,6 @@ def respond(
 
 @inlined
 def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
-    """Write the first columns of X, (N + 1, 12, 4 b), after step n."""
     for i in range(3):
         pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
         pw0, pw1, pw2 = T.position_rate[i, 0, n], T.position_rate[i, 1, n], T.position_rate[i, 2, n]
@@ -201,7 +199,6 @@ def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
 
 @compiled
 def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
-    """Fill X, (2, 12, 12), with the response to each deviation in a level step."""
     model = packed[0]
     level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
     level[:, 6] = 1.0

@@ -82,7 +82,6 @@ def ask(
     packed: Packed,
     out: Flat,
 ) -> None:
-    """Fill `out` from references."""
     model = packed[0]
     airframe = model.airframe
     for n in range(yaw_rad.shape[0]):
@@ -97,7 +96,6 @@ def ask(
 
 @compiled
 def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed) -> None:
-    """Fill rates and squared speeds of attitudes and forces."""
     model = packed[0]
     inertia, h = model.inertia, model.interval_s
     steps = flat.rates.shape[0]
@@ -130,10 +128,7 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
 
 @compiled
 def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
-    """Fill the commands, (N, 4), from one of the squared speeds, (N + 1, 4), to the next, within limits, (N, 2).
-
-    `left` is the part of the way left after a step.
-    """
+    """Fill the commands, (N, 4), within limits, (N, 2), from one of the squared speeds, (N + 1, 4), to the next."""
     for n in range(commands.shape[0]):
         for rotor in range(ROTORS):
             command = squared[n, rotor] + (squared[n + 1, rotor] - squared[n, rotor]) / (1.0 - left)
@@ -251,7 +246,6 @@ def approach(
 
 @compiled
 def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
-    """Return the time scale, at least 1, that keeps a decaying error within the largest acceleration."""
     half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
     return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
 
@@ -274,7 +268,6 @@ def demanded_force(
 
 @compiled
 def stand(angles: Array, thrust_n: Array, limits: ForceLimits, out: Flat) -> None:
-    """Fill attitudes and forces of demanded angles, rad, (n, 3), and thrusts, N, (n,)."""
     for n in range(thrust_n.shape[0]):
         phi, theta, psi = angles[n]
         sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)

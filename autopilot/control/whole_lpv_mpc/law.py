@@ -49,7 +49,7 @@ _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What of the references is followed."""
+    """Tracking of the references."""
 
     poles: tuple[Negative, Negative]
     approach_speed_m_s: Positive
@@ -62,7 +62,7 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What flies when no plan can be had."""
+    """Fallbacks without a plan."""
 
     poles: tuple[Negative, Negative]
 

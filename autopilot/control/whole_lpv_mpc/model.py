@@ -74,7 +74,6 @@ def roll_out(
     motion: Array,  # from now on, (N + 1, 13)
     speeds: Array,  # squared, from now on, (N + 1, 4)
 ) -> None:
-    """Write the nominal motion by commands."""
     model = packed[0]
     lag, h = model.lag, model.interval_s
     put(rigid, motion[0])
@@ -111,7 +110,6 @@ def roll_out(
 
 @inlined
 def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) -> None:
-    """Fill the effects of squared speeds in one part of each step."""
     allocation, rate_1_s = model.allocation, model.lag.rate_1_s
     for n in range(commands.shape[0]):
         thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
@@ -133,7 +131,6 @@ def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) 
 def _write_rates(
     x: Array, drive: Drive, part: int, n: int, disturbance: Disturbance, model: Model, rates: Array
 ) -> None:
-    """Write dx/dt of the rigid body, (13,), in a part of step n."""
     airframe, inertia = model.airframe, model.inertia
     thrust, momentum = drive.thrust[part, n], drive.momentum[part, n]
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]

@@ -25,7 +25,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Of the cost."""
+    """The weights of the cost."""
 
     position: Positive
     velocity: Positive
@@ -239,7 +239,7 @@ def model_of(vehicle: Vehicle, interval_s: float) -> Model:
 
 
 def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
-    """Return mean squared speeds over steps, (b, N), and at their ends, (b, N + 1), by a unit command in each block."""
+    """Return squared speeds by a unit command in each block: step means, (b, N), and ends, (b, N + 1)."""
     blocks, steps = len(starts) - 1, int(starts[-1])
     means, levels = np.zeros((blocks, steps)), np.zeros((blocks, steps + 1))
     for block in range(blocks):

@@ -44,7 +44,7 @@ class SpeedEffects(NamedTuple):
 
 
 class PathLimits(NamedTuple):
-    """Bounds of σ and its cost."""
+    """Bounds and cost of σ."""
 
     lower: float
     upper: float
@@ -138,7 +138,6 @@ def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
 
 @compiled
 def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> None:
-    """Add the cost of each σ to the QP, and fill its bounds."""
     inputs, limits = ROTORS + 1, path.limits
     for block in range(starts.shape[0] - 1):
         here = inputs * block + ROTORS

@@ -105,7 +105,6 @@ def limit_first(now: Packed, most: float, steps: int) -> None:
 
 @compiled
 def first_angles(target: Packed) -> tuple[float, float, float]:
-    """Return phi, theta, psi, rad, of a `Target` now."""
     R = target[0].attitudes[0]
     return atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), target[0].yaw_rad[0]
 
@@ -132,7 +131,6 @@ def condense_on_path(
 
 @inlined
 def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) -> None:
-    """Fill the nominal motion, its responses, and the bounds."""
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
     commands, corrections = work.commands, work.corrections
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)
@@ -185,7 +183,6 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 @compiled
 def is_free(kind: Packed, z: Array) -> bool:
-    """Write the `free_minimum` within rotor limits; return whether it is the solution."""
     return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, z)
 
 
@@ -272,7 +269,6 @@ def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) 
 
 @compiled
 def limit(kind: Packed) -> None:
-    """Copy the QP without soft limits, and add them."""
     work, free, qp = kind[0].work, kind[0].qp, kind[0].limited
     moved = free.f.shape[0]
     for k in range(moved):
@@ -283,7 +279,6 @@ def limit(kind: Packed) -> None:
 
 @compiled
 def count_active(kind: Packed, z: Array) -> tuple[int, int]:
-    """Return the numbers of active soft limits of tilt and of rates."""
     qp, tilts, rates = kind[0].limited, 0, 0
     for row in range(qp.h.shape[0]):
         left = qp.h[row]

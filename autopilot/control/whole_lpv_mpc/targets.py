@@ -85,7 +85,6 @@ class TargetBuilder:
         return np.array([min(max(speed, self._path.min_speed), upper)])
 
     def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
-        """Return the target of an attitude demand within the limits of the rotors."""
         n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         feed_forward.stand(angles, thrusts_n, limits, flat)
