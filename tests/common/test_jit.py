@@ -131,7 +131,6 @@ def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
 
 
 def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run the caller, as a process of its own."""
     path = os.pathsep.join([str(folder), str(Path(common.__path__[0]).parents[1])])
     usual = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
     command = [sys.executable, str(folder / "caller.py"), *words]

@@ -44,16 +44,12 @@ OBJECTS = FlightSpec(
 
 @dataclass(frozen=True, kw_only=True)
 class Base:
-    """Options of two commands."""
-
     speed: Annotated[float | None, Option("how fast", "N", above=0.0, endless=True)] = None
     names: Annotated[tuple[str, ...], Option("who")] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Example(Base):
-    """Options of one."""
-
     track: Annotated[str, Option("what to fly", "TRACK")]
     log: Annotated[bool, Option("write no log")] = True
     start: Annotated[dict[str, float], Option("where", read=lambda text: {"x": float(text)})] = field(

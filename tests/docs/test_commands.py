@@ -40,7 +40,6 @@ def command_lines() -> list[tuple[str, list[str]]]:
 
 @cache
 def known() -> dict[str, ArgumentParser]:
-    """Return the parsers of all commands."""
     return parsers()
 
 

@@ -29,7 +29,6 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def in_navigation(entry: Any) -> Iterator[str]:
-    """Yield the pages of a part of the navigation."""
     if isinstance(entry, str):
         yield entry
     else:

@@ -17,7 +17,6 @@ _MADE_BY_SCRIPTS = ("mermaid", "glightbox", "pyodide", 'data-md-component="sourc
 
 
 def build(folder: Path) -> subprocess.CompletedProcess[str]:
-    """Build what is in a folder, strictly."""
     command = [sys.executable, "-m", "zensical", "build", "--strict"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 

@@ -13,7 +13,6 @@ from tests.support.pages import DOCS, ROOT, blocks
 
 
 def python_of(page: str) -> list[str]:
-    """Return the snippets of Python of a page."""
     found = [block.text for block in blocks("python") if block.page == page]
     assert found
     return found

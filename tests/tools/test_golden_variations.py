@@ -1,7 +1,6 @@
 """The golden flights, on this computer and on others as far as it can pass for them, are the same to the last bit."""
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
 from tools.golden.__main__ import main as golden_main
 from tools.golden.__main__ import table
-from tools.golden.pythons import environments, is_stale, other_pythons, set_up
+from tools.golden.pythons import environments, is_stale, set_up
 from tools.golden.variations import Flown, Variation, fly, variations
 from tools.harness.processes import begins_as_recorded
 
@@ -107,8 +106,3 @@ def test_current_environments_are_kept(tmp_path: Path) -> None:
     os.utime(tmp_path / ".venv-3.12" / ".ready", (0.0, 0.0))
     with pytest.raises(FileNotFoundError):
         set_up(tmp_path, "3.12", Path("/no/such/python"))
-
-
-def test_other_pythons_are_supported_versions() -> None:
-    own = f"3.{sys.version_info.minor}"
-    assert all(version != own and int(version[2:]) >= 11 for version in other_pythons())

@@ -10,7 +10,6 @@ GOOD, BAD = Merit(0.001, 0.0, 40.0), Merit(0.4, 0.1, 70.0)
 
 
 def recording(x: float = 0.0, phi: float = 0.0, until_s: float = STEP.duration_s) -> Recording:
-    """Return a flight that ends as it is told to."""
     table = np.zeros((100, len(COLUMNS)))
     table[:, COLUMNS.index("t")] = np.linspace(0.0, until_s, 100)
     table[50, COLUMNS.index("x")] = x

@@ -73,8 +73,6 @@ def test_a_first_track_can_be_forgotten() -> None:
 
 
 class Nobody:
-    """A service of which nothing is heard."""
-
     def latest(self, now_us: int, timeout_us: int) -> None:
         """Return nothing."""
 
@@ -83,8 +81,6 @@ class Nobody:
 
 
 class Somebody:
-    """A service that is heard, with sticks, until an age."""
-
     def __init__(self, time_us: int) -> None:
         self.sticks = Sticks(0.0, 0.0, 0.5, 0.0, time_us)
 

@@ -29,7 +29,6 @@ LEADS = {
 
 
 def in_the_air() -> Cockpit:
-    """Return a pilot in hold, with a mission and sticks at hand."""
     cockpit = Cockpit(FLYING)
     cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
     cockpit.steered = STICKS

@@ -121,14 +121,12 @@ def flown(task: FlightTask) -> Iterator[FlightTask]:
 
 
 def kept(kind: type[DATA], data: DATA) -> DATA:
-    """Return data as it is read back after a restart."""
     read = of_bytes(kind, to_bytes(data))
     assert read is not None
     return read
 
 
 def restarted(before: Cockpit) -> Cockpit:
-    """Return another vehicle that resumes the flight of this one, right away."""
     after = Cockpit(PLACE)
     after.missions.resume(PLANS, kept(MissionRecord, before.missions.record()))
     task = kept(TaskRecord, task_record(before.pilot.task))

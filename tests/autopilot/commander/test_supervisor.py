@@ -24,7 +24,6 @@ CHOICES = [
 
 
 def supervisor(**values: int) -> tuple[Supervisor, StatusQueue]:
-    """Return a supervisor, and what it says, where parameters have these values."""
     parameters, lines = Parameters(DEFINITIONS), StatusQueue()
     for name, value in values.items():
         assert parameters.set(name, value) is None

@@ -71,7 +71,6 @@ def test_laws_that_cannot_do_not_say_that_they_can(name: str) -> None:
 
 
 def test_the_attitude_that_a_place_needs_gives_the_same_decision() -> None:
-    """What the position loop makes of references, demanded as attitude and thrust: the same rotor speeds."""
     controller = mpc()
     state = turned(0.0)
     samples = controller.preview.samples
@@ -116,7 +115,6 @@ def test_full_turns_of_yaw_make_no_difference() -> None:
 
 @pytest.mark.parametrize("thrust_n", [-5.0, 0.0, 100.0])
 def test_thrust_leaves_the_moments_their_room(thrust_n: float) -> None:
-    """Clipped with the margin: the plan keeps every rotor within its limits, and there is one."""
     controller = mpc()
     memory, planned = controller.initial(VEHICLE.hover_speed), None
     for sample in range(30):
@@ -146,7 +144,6 @@ def test_far_from_the_demand_the_recovery_law_flies() -> None:
 
 
 def test_both_ways_share_what_they_remember() -> None:
-    """A plan made for a place goes on for an attitude, and back."""
     controller = mpc()
     still, level = np.zeros((22, 3)), np.zeros(22)
     references = Horizon(still, still, still, still, still, level, level, level)

@@ -114,7 +114,6 @@ def test_the_target_attitude_turns_as_it_says(seed: int) -> None:
 
 
 def test_a_symmetrical_airframe_stays_symmetrical() -> None:
-    """Where no roll or pitch moment is asked for, opposite rotors turn alike to the last bit."""
     mixer = Mixer(load_vehicle("hummingbird-thesis"))
     for thrust_n, yaw_moment in ((6.8, 0.01), (3.3, -0.02), (0.7, 0.001)):
         front, right, rear, left = mixer.rotor_speeds(np.array([thrust_n, 0.0, 0.0, yaw_moment]))

@@ -21,7 +21,6 @@ STILL = (0.0, 0.0, 0.0, 0.0)
 
 
 def wobble(sample: int) -> FourRotors:
-    """Return commands that turn and tilt it a little."""
     a, b = 0.02 * (-1) ** (sample // 5), 0.01 * (-1) ** (sample // 3)
     return (HOVER + a, HOVER + b, HOVER - a, HOVER - b)
 

@@ -69,14 +69,10 @@ def test_the_flight_law_remembers_the_reported_charge() -> None:
 
 
 class Counted(NamedTuple):
-    """A memory that calls its charge as it likes."""
-
     taken: float
 
 
 class Counting:
-    """A law that hovers and counts one ampere hour a step."""
-
     control_interval_us = 10_000
     preview = Preview(10_000, 1)
 
@@ -155,8 +151,6 @@ def test_the_mass_estimate_continues_only_in_mid_flight() -> None:
 
 
 class Waiting(Counting):
-    """A law that goes on along its references at half their speed."""
-
     min_path_speed = 0.5
 
     def initial(self, rotor_speed: float) -> Counted:

@@ -56,7 +56,6 @@ def test_a_gap_in_the_frames_begins_anew() -> None:
 
 
 def test_yaw_is_unwrapped_by_continuity() -> None:
-    """Two turns to the left, and the reference that started with the vehicle is two turns behind."""
     autopilot = build(flight())
     decisions = [autopilot.step(frame(4000 * n, psi=1.57 + 0.05 * n)).decision for n in range(252)]
     last = decisions[-2]

@@ -35,7 +35,6 @@ def product(p: Array, q: Array) -> Array:
 
 
 def moved(x: Array, error: Array) -> Array:
-    """Put an error into a nominal state, exactly."""
     y = x.copy()
     y[:6] += error[:6]
     y[10:] += error[9:]
@@ -46,7 +45,6 @@ def moved(x: Array, error: Array) -> Array:
 
 
 def difference(y: Array, x: Array) -> Array:
-    """Return the small error that leads from x to y."""
     turn = product(x[6:10] * np.array([1.0, -1.0, -1.0, -1.0]), y[6:10])
     return np.concatenate([(y - x)[:6], 2.0 * turn[1:] * np.sign(turn[0]), (y - x)[10:]])
 
@@ -79,7 +77,6 @@ def test_transition_is_the_derivative_of_the_strapdown(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("kind", ["horizontal", "height", "velocity", "pressure", "field", "rest"])
 def test_updates_follow_the_derivative_of_the_measurement(kind: str, seed: int) -> None:
-    """NIS of the kernel is that of H by differences, and the state after is that of the textbook's update."""
     x, P = some_state(seed), some_covariance(seed)
     z = np.random.default_rng(seed + 100).normal(size=3)
 
@@ -160,7 +157,6 @@ def test_looking_ahead_is_the_filter_itself_without_corrections() -> None:
 
 @pytest.mark.parametrize("interval_s", [0.004, 0.05, 0.9])
 def test_a_quick_turn_keeps_its_length(interval_s: float) -> None:
-    """The series and the functions themselves meet where one takes over."""
     x = some_state(4)
     strap_down(x, a_sample(4, interval_s) * 5.0, 0, GRAVITY)
     assert np.linalg.norm(x[6:10]) == pytest.approx(1.0, abs=1e-14)

@@ -18,7 +18,6 @@ from tests.support.sensor_source import INTERVAL_US, Faults
 
 
 def max_jump_m(of: list[Estimate | None]) -> float:
-    """Return the largest step of the published position beside what the published velocity explains."""
     positions = np.array([one.frame.position_enu_m for one in known(of)])
     velocities = np.array([one.frame.velocity_enu_m_s for one in known(of)])
     steps = np.diff(positions, axis=0) - velocities[1:] * INTERVAL_US * 1e-6
@@ -30,7 +29,6 @@ def max_jump_m(of: list[Estimate | None]) -> float:
 
 @pytest.mark.parametrize("settles", [True, False])
 def test_a_queued_frame_changes_no_bit(settles: bool) -> None:
-    """Not where frames are lost, either, nor one that has come before comes again."""
     frames = list(recorded(source.climb, 1, 3.0).frames)
     frames = [frame for k, frame in enumerate(frames) if k % 97 not in (3, 4)]
     frames.insert(600, frames[590])
@@ -349,7 +347,6 @@ def test_a_sensor_that_has_nothing_new_is_not_measured_again() -> None:
 
 
 def test_fixes_are_where_they_were_measured() -> None:
-    """Of a vehicle at 3 m/s, fixes agree in the mean with the state of its own instant."""
     tests = [one.tests["position"] for one in known(estimates(recorded(source.circle, 5, 30.0).frames))[-2000:]]
     mean = np.mean([test.innovation for test in tests], axis=0)
     assert np.abs(mean).max() < 0.05

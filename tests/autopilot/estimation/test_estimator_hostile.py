@@ -35,8 +35,6 @@ FIXES = st.builds(
 
 
 class HostileSensors(RuleBasedStateMachine):
-    """A flight on good frames, with anything in between."""
-
     def __init__(self) -> None:
         super().__init__()
         assert _SENSORS is not None
@@ -141,7 +139,6 @@ TestHostileSensors = HostileSensors.TestCase
 
 
 def test_a_long_flight_in_the_dark_stays_positive() -> None:
-    """Half an hour without GPS, magnetometer and barometer."""
     assert _SENSORS is not None
     machine = HostileSensors()
     machine.take_off()

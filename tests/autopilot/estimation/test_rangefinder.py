@@ -15,7 +15,6 @@ BEAM = np.array([np.cos(0.05), np.sin(0.05)])
 
 
 def distance(height_m: float, roll: float, pitch: float) -> float:
-    """Return what is expected: measured less innovation."""
     x, P, y = np.zeros(NOMINAL), np.eye(ERRORS), np.zeros(1)
     x[6:10] = quaternion_from_euler(roll, pitch, 0.3)
     fuse_distance(x, P, 0.0, height_m, BEAM, 1.0, -1.0, y)

@@ -32,8 +32,6 @@ def known(frame: StateFrame) -> Estimate:
 
 
 class Standing(Estimator):
-    """Knows after a while that the vehicle stands under the spiral's start."""
-
     made: int = 0
     caught = False
 

@@ -26,7 +26,6 @@ def plus(vector: Vector, other: Vector, times: float = 1.0) -> Vector:
 
 
 def fails(change: Change) -> Change:
-    """Have frames changed by (frame, s since it began)."""
     return lambda frame, t: frame if t < BEGAN_S else change(frame, t - BEGAN_S)
 
 
@@ -71,7 +70,6 @@ VELOCITY_ALONE: dict[str, GpsLie] = {
 
 
 def sliding(way: Vector) -> GpsLie:
-    """Have place and velocity slide away together, m/s²."""
     return lambda fix, t: replace(
         fix,
         velocity_enu_m_s=plus(fix.velocity_enu_m_s, way, t),
@@ -133,12 +131,10 @@ def test_a_knock_is_no_accelerometer_bias(knock: Vector) -> None:
 
 
 def turned(bias: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
-    """Have the gyroscope be off by a bias, rad/s, that drifts, rad/s²."""
     return fails(lambda frame, t: frame._replace(rate_flu_rad_s=plus(plus(frame.rate_flu_rad_s, bias), drift, t)))
 
 
 def magnetised(iron: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
-    """Put a field beside the magnetometer, gauss, that grows, gauss/s."""
     return fails(
         lambda frame, t: frame._replace(
             magnetic_field_flu_gauss=plus(plus(frame.magnetic_field_flu_gauss, iron), drift, t)

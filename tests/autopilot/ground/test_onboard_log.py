@@ -17,14 +17,6 @@ SAMPLE_US = 8_000
 
 
 class Flight:
-    """A vehicle whose log is kept in memory.
-
-    Attributes:
-        log: Of the vehicle.
-        memory: What it is kept in.
-        parameters: Of the vehicle.
-    """
-
     def __init__(self, memory: Memory | None = None) -> None:
         self.memory = memory or Memory()
         self.memory.make_folder(("logs",))

@@ -85,7 +85,6 @@ def test_rates_are_bounded_derivatives_of_the_angles() -> None:
 
 
 def test_the_preview_is_what_follows() -> None:
-    """Each sample's demand begins where the one before said that it would be."""
     memory, command = REFERENCE.initial(LEVEL), attitude_command(quaternion_from_euler(0.4, 0.2, 0.4), 9.0)
     memory, first = REFERENCE.step(memory, LEVEL, command)
     for sample in range(1, 10):
@@ -112,7 +111,6 @@ def test_body_rates_turn_by_their_integral(axis: int) -> None:
 
 
 def test_body_rates_are_those_of_the_body() -> None:
-    """Leaning 40 degrees to the side, turning about body z moves pitch and yaw as [2.7] has it."""
     memory = ReferenceMemory(np.array([radians(40.0), 0.0, 0.0]), np.zeros(3), WEIGHT_N)
     memory, _ = go(rate_command((0.0, 0.0, 0.3), WEIGHT_N), 0.6, memory)
     phi, theta, _ = memory.angles
@@ -161,7 +159,6 @@ def test_a_pose_upside_down_is_flown_as_far_as_it_goes() -> None:
 
 
 def test_a_poses_yaw_rate_leads_it() -> None:
-    """A client that streams the present yaw and a rate turns the vehicle at that rate."""
     memory = REFERENCE.initial(LEVEL)
     for _ in range(250):
         command = attitude_command(quaternion_from_euler(0.0, 0.0, memory.angles[2]), WEIGHT_N, 0.5)

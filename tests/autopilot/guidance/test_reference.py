@@ -63,7 +63,6 @@ START = at(ORIGIN)
 
 
 def within(limits: Limits, motions: Array, headings: Array) -> bool:
-    """Whether motion and turns keep to the limits."""
     velocity, acceleration, jerk = motions[:, 1], motions[:, 2], motions[:, 3]
     shares = (
         np.hypot(velocity[:, 0], velocity[:, 1]).max() / (limits.speed_m_s + LATE_S * limits.acceleration_m_s2),
@@ -118,7 +117,6 @@ def test_a_velocity_is_reached_and_a_vehicle_stops_from_any(limits: Limits, velo
 
 
 def circling(since_s: float, samples: int = SAMPLES) -> Target:
-    """A point on a circle of 4 m at 0.5 rad/s, and the heading along it."""
     angles = 0.5 * (since_s + INTERVAL_S * np.arange(samples))
     motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
     for order in range(5):

@@ -77,7 +77,6 @@ def test_a_vehicle_has_no_parameters_for_what_it_does_not_model() -> None:
 
 
 def test_defaults_leave_everything_as_it_is() -> None:
-    """64 bits and all: a flight with parameters that nobody touched is the flight without."""
     profile, vehicle = Numbers(FLIGHT, HUMMINGBIRD).applied(parameters_of().values)
     assert profile is FLIGHT
     assert vehicle is HUMMINGBIRD

@@ -24,8 +24,6 @@ def clock() -> float:
 
 
 class Flight:
-    """A control law that hovers, and can be tuned."""
-
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
         self.build = builder(profile.controller, clock)
         self.law = self.build(profile, vehicle)
@@ -47,7 +45,6 @@ class Flight:
 
 
 def made(parameters: Parameters) -> Tuned | None:
-    """Return the control law that was made for the newest change, if one was."""
     tuned = parameters.take_made()
     assert tuned is None or isinstance(tuned, Tuned)
     return tuned
@@ -87,7 +84,6 @@ def test_what_cannot_be_together_is_refused(flight: Flight, name: str, value: fl
 
 @pytest.mark.parametrize("controller", DESCRIBED)
 def test_each_number_can_be_at_its_bounds_or_is_refused(controller: str) -> None:
-    """Nothing raises, and whatever is accepted can be hovered with."""
     flight = Flight(load_profile("flight").with_choices(controller, None), load_vehicle("hummingbird"))
     numbers = {number.name for number in DESCRIBED[controller]}
     refused = set()
@@ -102,7 +98,6 @@ def test_each_number_can_be_at_its_bounds_or_is_refused(controller: str) -> None
 
 
 def test_what_is_only_asked_about_is_not_kept(flight: Flight) -> None:
-    """A check makes the law that would be flown, and leaves all as it is."""
     values = {**flight.parameters.values, "VEH_MASS": 0.75}
     prepared = flight.tuning.prepare("VEH_MASS", values)
     assert isinstance(prepared, Prepared)
@@ -161,8 +156,6 @@ def test_the_rhythm_of_a_law_cannot_change() -> None:
 
 
 class Faulty:
-    """A control law that fails in as many ways as its number says."""
-
     control_interval_us = 10_000
     preview = Preview(10_000, 1)
 
@@ -228,8 +221,6 @@ def faulty() -> tuple[Parameters, list[str]]:
 
 
 class Rigid:
-    """A trial in which nothing can be built."""
-
     def try_vehicle(self, vehicle: Vehicle) -> None:
         raise SettingsError(f"nothing flies {vehicle.body.mass_kg:g} kg")
 

@@ -17,8 +17,6 @@ FRAME_S = 0.004
 
 
 class Clock:
-    """Time that only work and waiting take."""
-
     def __init__(self) -> None:
         self.now_s = 0.0
 
@@ -27,8 +25,6 @@ class Clock:
 
 
 class FakeLink:
-    """A link on which so many datagrams are waiting."""
-
     def __init__(self, number: int, waiting: int) -> None:
         self.url = f"tcpin:127.0.0.1:{number + 1}"
         self.target = None
@@ -71,7 +67,6 @@ def stations(sitl: Sitl) -> Stations:
 
 
 def heard_in_a_frame(links: GroundLinks, stations: Stations, clock: Clock, takes_s: float) -> Counter[int]:
-    """Hear what there is time for, each datagram taking as long as that; return how many of each link."""
     heard: Counter[int] = Counter()
     for received in links.receive(stations):
         heard[received.link] += 1

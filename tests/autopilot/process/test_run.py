@@ -18,8 +18,6 @@ PARAMETERS = "whole-lpv-mpc-asctec-hummingbird.params"
 
 
 class AtOnce(Stop):
-    """Ends the process before its first frame, and leaves signals alone."""
-
     def __init__(self) -> None:
         """Do nothing."""
 
@@ -30,7 +28,6 @@ class AtOnce(Stop):
 
 @pytest.fixture
 def taken() -> Iterator[str]:
-    """A port of this computer that is taken, for UDP and TCP."""
     with socket(AF_INET, SOCK_STREAM) as stream, socket(AF_INET, SOCK_DGRAM) as datagrams:
         stream.bind(("127.0.0.1", 0))
         datagrams.bind(stream.getsockname())
@@ -50,7 +47,6 @@ def start(*options: str) -> int:
 
 
 def refused(capsys: pytest.CaptureFixture[str], *options: str) -> str:
-    """Return the one line that it is refused with, by exit code 2."""
     with pytest.raises(SystemExit) as ended:
         start(*options)
     assert ended.value.code == 2

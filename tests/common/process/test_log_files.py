@@ -24,7 +24,6 @@ def test_records_are_written_a_block_at_a_time(tmp_path: Path) -> None:
 
 @contextmanager
 def no_file_beyond(size: int) -> Iterator[None]:
-    """Let the system refuse to write beyond `size` bytes of any file, as it does on a disk that is full."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:

@@ -11,7 +11,6 @@ from colibri.common.serialization import of_bytes, to_bytes
 
 
 def opened(path: Path) -> bytes | None:
-    """Return what another process would find."""
     slots = Slots(path)
     newest = slots.newest()
     slots.close()

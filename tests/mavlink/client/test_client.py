@@ -29,7 +29,6 @@ def ack(number: int, result: int = 0, to: tuple[int, int] = (255, 190), progress
 
 
 def sent(client: Client, now_us: int) -> list[Message]:
-    """Return what a client sends, but for its HEARTBEAT."""
     messages = [message for datagram in client.poll(now_us) for message in READS.decode(datagram)]
     return [message for message in messages if message.name != "HEARTBEAT"]
 

@@ -41,8 +41,6 @@ few = settings(max_examples=10, deadline=None)
 
 
 class Rig:
-    """A client and a vehicle with every service."""
-
     def __init__(self, seed: int = 0, loss: float = 0.0, unruly: float = 0.0, rules: Rules | None = None) -> None:
         self.obeyed: list[Received] = []
         self.later = False
@@ -60,7 +58,6 @@ class Rig:
         self.link = Link(Vehicle(*services), [self.client], seed, loss=loss, unruly=unruly)
 
     def ended(self, conversation: Conversation) -> int | None:
-        """Return the result of a conversation."""
         self.client.begin(conversation)
         self.link.run(lambda: conversation.result is not None, 10 * MINUTE_US)
         self.link.run(lambda: False, 100_000)  # until no copy of an answer is under way

@@ -137,7 +137,6 @@ def test_numbers_go_round(client: Client) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_transfer_survives_loss(service: Ftp, memory: Memory, seed: int) -> None:
-    """Requests and answers are lost; the client asks again in the same words, as the specification says."""
     chance = random.Random(seed)
     client = Client(service, session=seed)
     data = chance.randbytes(3000)

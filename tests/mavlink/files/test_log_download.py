@@ -42,7 +42,6 @@ def ask(logs: Logs, name: str, *fields: Any, peer: Peer = GROUND) -> list[Send]:
 
 
 def drain(logs: Logs, sends: list[Send]) -> list[Send]:
-    """Return all that comes of a request: no poll sends more than it may."""
     while True:
         more = list(logs.poll(0))
         assert len(more) <= 2 * MESSAGES_A_POLL

@@ -48,7 +48,6 @@ def content(files: Files, names: Names) -> bytes:
 
 
 def plain(outcome: object) -> object:
-    """Return an outcome without what only a disk knows."""
     if isinstance(outcome, list):
         return [entry._replace(modified_s=0) for entry in outcome]
     if isinstance(outcome, Reading):
@@ -75,8 +74,6 @@ def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_p
 
 
 class Model:
-    """What files are, said once more and as simply as can be."""
-
     def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
 
@@ -160,7 +157,6 @@ def changes(files: Files, names: Names) -> list[object]:
 
 
 def test_nothing_leads_out_of_a_folder(tmp_path: Path) -> None:
-    """Neither links, nor dots, nor slashes in names, nor devices and pipes."""
     outside = tmp_path / "outside"
     outside.mkdir()
     (outside / "secret").write_bytes(b"secret")

@@ -169,7 +169,6 @@ SENSORS, STATE = dialect.MSG_HIL_SENSOR, dialect.MSG_ATTITUDE_QUATERNION
 
 
 def sensors_at(time_us: int) -> SensorFrame:
-    """A frame of numbers that float32 holds, with a fix at every second one."""
     fix = GpsFix(time_us, 3, DEFAULT_ORIGIN, (1.0, 0.5, 0.25), 0.5, 1.0, 9)
     now = float(time_us % 1024)
     vectors = ((now, 0.5, 9.75), (0.0, now, -0.5), (0.25, 0.0, now))
@@ -275,7 +274,6 @@ def test_heartbeats_count_in_simulated_time(plant: PlantEnd, autopilot: Autopilo
 @pytest.mark.parametrize("feedback", Feedback)
 @pytest.mark.parametrize("seed", range(10))
 def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Feedback) -> None:
-    """Whatever the link does, the plant obeys each command once, in order, and the autopilot sees each frame once."""
     chance = random.Random(seed)
     tell = frame_at if feedback is Feedback.STATE else sensors_at
     plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))

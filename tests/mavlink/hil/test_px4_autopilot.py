@@ -23,14 +23,11 @@ def frame(number: int, updated: int = int(ALL), gps: GpsFix | None = None) -> Se
 
 
 class Simulator:
-    """What a simulator sends, and what it hears."""
-
     def __init__(self) -> None:
         self.codec = Codec(1, PLANT_COMPONENT)
         self.end = FlierEnd(system_id=1, now_s=0.0, to_motors=lambda c: (c[2] ** 2, c[0] ** 2, c[3] ** 2, c[1] ** 2))
 
     def send(self, *frames: SensorFrame, now_s: float = 0.0) -> list[SensorFrame]:
-        """Send frames, each message as a datagram of its own; return what the autopilot gets."""
         got = []
         for sent in frames:
             for datagram in encode_sensors(self.codec, sent):

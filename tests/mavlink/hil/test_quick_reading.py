@@ -45,7 +45,6 @@ def number(random: Random) -> float:
 
 
 def damaged(random: Random, datagram: bytes, before: bytes) -> bytes:
-    """Return a datagram, or what a link may make of it."""
     at = random.randrange(len(datagram))
     flipped = datagram[:at] + bytes([datagram[at] ^ 1 << random.randrange(8)]) + datagram[at + 1 :]
     ways = (flipped, datagram[:at], datagram[at:], datagram + before, before + datagram, datagram + b"\0", before)
@@ -53,7 +52,6 @@ def damaged(random: Random, datagram: bytes, before: bytes) -> bytes:
 
 
 def conversation(feedback: Feedback, random: Random) -> list[Any]:
-    """Return all that both ends said and did, with datagrams between them damaged."""
     plant = PlantEnd(system_id=1, frame_interval_us=INTERVAL_US, serves=[feedback])
     autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=feedback)
     call(autopilot, plant)

@@ -27,7 +27,6 @@ def text(number: int) -> bytes:
 
 
 def happened(link: SerialLink) -> list[object]:
-    """Return all that the link has to say."""
     return [*link.receive_now(), *link.take_opened(), *link.take_closed(), *link.take_notes()]
 
 
@@ -60,7 +59,6 @@ class Device:
         assert os.write(self._end, data) == len(data)
 
     def received(self) -> bytes:
-        """Return what has come so far."""
         data = b""
         try:
             while chunk := os.read(self._end, 4096):
@@ -91,7 +89,6 @@ def link(device: Device, clock: Clock) -> Iterator[SerialLink]:
 
 
 def heard(link: SerialLink, count: int) -> list[bytes]:
-    """Receive until so many frames have come; return them."""
     frames: list[bytes] = []
     while len(frames) < count:
         link.wait(TIMEOUT_S)
@@ -103,7 +100,6 @@ def heard(link: SerialLink, count: int) -> list[bytes]:
 
 
 def heard_until(link: SerialLink, last: bytes) -> list[bytes]:
-    """Receive until that frame has come; return what came before."""
     frames: list[bytes] = []
     while last not in frames:
         link.wait(TIMEOUT_S)
@@ -112,7 +108,6 @@ def heard_until(link: SerialLink, last: bytes) -> list[bytes]:
 
 
 def arrived(device: Device, count: int) -> list[bytes]:
-    """Return so many frames that were sent to the device."""
     framer, frames = Framer(), list[bytes]()
     for _ in range(100_000):
         frames += framer.take(device.received())
@@ -122,7 +117,6 @@ def arrived(device: Device, count: int) -> list[bytes]:
 
 
 def lost(link: SerialLink) -> None:
-    """Receive until the link knows that its device has gone."""
     for _ in range(100_000):
         assert link.receive_now() == []
         if link.take_closed():

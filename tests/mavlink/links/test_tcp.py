@@ -20,7 +20,6 @@ TEXT = Codec(255, 190).encode("STATUSTEXT", 6, b"x" * 50, 0, 0)
 
 
 def awaited(look: Callable[[], T], timeout_s: float = 5.0) -> T:
-    """Look until there is something."""
     give_up_s = perf_counter() + timeout_s
     while not (seen := look()) and perf_counter() < give_up_s:
         sleep(0.001)
@@ -46,8 +45,6 @@ def client_of(server: GroundLink) -> GroundLink:
 
 
 def exchange(client: GroundLink, server: GroundLink) -> Address:
-    """Send from the client until the server hears it; return its address."""
-
     def look() -> list[tuple[bytes, Address]]:
         client.send(HEARTBEAT)
         return server.receive_now()
@@ -203,12 +200,9 @@ def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
 
 
 class Listener(socket.socket):
-    """A listening socket that counts how often a connection is asked for."""
-
     asked = 0
 
     def accept(self) -> tuple[socket.socket, Address]:
-        """Count, and accept."""
         self.asked += 1
         return super().accept()
 

@@ -121,7 +121,6 @@ class Conversations(RuleBasedStateMachine):
             assert not loaded or self.ground.service.plans[plan_type] is loaded[-1]
 
     def teardown(self) -> None:
-        """What was under way is over after its time; then either station uploads afresh."""
         for _ in range(25):
             self.ground.poll(250_000)
         link, stations = linked(self.ground, 2, 0)

@@ -79,7 +79,6 @@ def test_the_command_to_set_the_current_item(p1: float, p2: float, expected: tup
 
 
 def test_a_place_to_fly_to_now() -> None:
-    """DroneKit's simple_goto."""
     ground = Ground()
     fields = (0, 3, 16, 2, 0, 0, 0, 0, 0, 47.25, 8.5, 20.0)
     assert results(ground.hear(FIRST, "MISSION_ITEM", *VEHICLE, *fields)) == [ACCEPTED]

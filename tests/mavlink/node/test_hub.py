@@ -313,7 +313,6 @@ NAMES = sorted(definition.msgname for definition in dialect.mav.mavlink_map.valu
 
 
 def frame_of(name: str, payload: bytes, source: tuple[int, int], sequence: int) -> bytes:
-    """Return a frame whose CRC holds, whatever its payload is."""
     definition = getattr(dialect.mav, f"MAVLink_{name.lower()}_message")
     body = bytes([len(payload), 0, 0, sequence, *source]) + definition.id.to_bytes(3, "little") + payload
     crc: int = dialect.mav.x25crc(body + bytes([definition.crc_extra])).crc

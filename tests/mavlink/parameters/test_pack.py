@@ -13,7 +13,6 @@ from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Paramet
 
 
 def unpacked(file: bytes | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Return values and defaults as pymavlink reads them."""
     assert file is not None
     data = MAVFTP.ftp_param_decode(file)
     assert data is not None
@@ -25,7 +24,6 @@ def unpacked(file: bytes | None) -> tuple[dict[str, Any], dict[str, Any] | None]
 
 
 def parameters_of(names: list[str]) -> Parameters:
-    """Every second one is an integer, and every third not at its default."""
     parameters = Parameters(
         Parameter(name=name, kind=Kind.INT, default=-i, description="")
         if i % 2

@@ -34,14 +34,11 @@ def parameters_of(count: int = 0) -> Parameters:
 
 
 class Talk:
-    """A service, and what a station hears of it."""
-
     def __init__(self, parameters: Parameters) -> None:
         self.service = ParameterService(parameters)
         self.now_us = 0
 
     def ask(self, name: str, *fields: Any, peer: Peer = ME) -> list[Message]:
-        """Send over the wire; return the answers as they arrive, all for this peer or for everybody."""
         (message,) = STATION.decode(STATION.encode(name, 1, 1, *fields))
         sends = list(self.service.receive(message, peer, self.now_us))
         assert all(send.channel in (None, peer.channel) for send in sends)

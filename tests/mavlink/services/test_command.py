@@ -46,8 +46,6 @@ CALIBRATE: int = mav.MAV_CMD_PREFLIGHT_CALIBRATION
 
 
 class Vehicle:
-    """Obeys by noting what it was told."""
-
     def __init__(self, refusal: Refusal | None = None) -> None:
         self.refusal = refusal
         self.obeyed: list[Command] = []
@@ -71,7 +69,6 @@ def receive(service: CommandService, received: Message, peer: Peer = GROUND, now
 
 
 def acks(sends: list[Send]) -> list[tuple[int | None, int, int]]:
-    """Return channel, command and result of each acknowledgement."""
     return [(send.channel, send.fields[0], send.fields[1]) for send in sends if send.name == "COMMAND_ACK"]
 
 

@@ -16,8 +16,6 @@ Q = [1.0, 0.0, 0.0, 0.0]
 
 
 class Vehicle:
-    """Remembers what it was told; refuses with `reason`."""
-
     def __init__(self, reason: str = "") -> None:
         self.refusal = Refusal(reason) if reason else None
         self.told: list[object] = []

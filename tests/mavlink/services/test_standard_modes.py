@@ -17,8 +17,6 @@ MODES = (
 
 
 class Vehicle:
-    """Notes which mode it was told to fly."""
-
     def __init__(self) -> None:
         self.flown: list[int] = []
 

@@ -34,7 +34,6 @@ def offboard() -> Offboard:
 
 
 def taken(service: Offboard, name: str, **fields: Any) -> OffboardSetpoint | None:
-    """Return what is flown once a message came; None if it was dropped."""
     dropped = service.dropped.total()
     assert list(service.receive(message(name, **fields), FIRST, 1_000)) == []
     setpoint = service.latest(1_000, 0)
@@ -325,7 +324,6 @@ def test_a_crowd_of_clients_takes_no_memory(offboard: Offboard) -> None:
 
 @pytest.mark.parametrize("name", [LOCAL, GLOBAL, ATTITUDE])
 def test_whatever_the_fields_hold(name: str) -> None:
-    """Nothing raises, nothing infinite is flown, and no group is half of numbers that turn into nan."""
     offboard = Offboard()
     offboard.update(PLACE, HEADING, ORIGIN, HOME)
     now_us = 0

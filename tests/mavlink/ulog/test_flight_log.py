@@ -21,7 +21,6 @@ ROWS = 150
 
 
 def rows_of(topic: Topic, count: int = ROWS) -> Array:
-    """Return rows whose numbers every type can hold, at times 4 ms apart."""
     rows = np.random.default_rng(topic.number).integers(0, 100, (count, len(topic.names))).astype(float)
     rows[:, 0] = np.arange(count) * 4000 / 1e6
     if topic is TRUTH:

@@ -47,8 +47,6 @@ def sample(time_us: int) -> dict[str, float]:
 
 
 class Appended(TopicLog):
-    """A log whose messages are kept."""
-
     def __init__(self) -> None:
         super().__init__()
         self.content = b""
@@ -58,7 +56,6 @@ class Appended(TopicLog):
 
 
 def encoded(encoder: RowEncoder, *rows: Sequence[float]) -> bytes:
-    """Return what a log appends of rows."""
     log = Appended()
     for row in rows:
         log.add(encoder, row)
@@ -128,7 +125,6 @@ def test_attitudes_keep_their_angles(phi: float, theta: float, psi: float) -> No
 
 
 def test_samples_are_thinned_alike_in_every_log() -> None:
-    """Whenever a log begins: at a multiple of the interval, or the first sample after one."""
     every_8_ms, late, uneven = Thinning(), Thinning(), Thinning()
     picked = [8 * count for count in range(20) if every_8_ms.is_due(8000 * count)]
     assert picked == [0, 40, 80, 120]
@@ -229,7 +225,6 @@ def test_a_vehicle_of_ground_stations_is_recorded() -> None:
 
 
 def whole_messages(content: bytes) -> int:
-    """Return how many messages of data are whole in the content behind the beginning."""
     at = whole = 0
     while at + 3 <= len(content):
         at += 3 + int.from_bytes(content[at : at + 2], "little")

@@ -62,7 +62,6 @@ def test_an_unknown_message_is_counted() -> None:
 
 
 def pymavlink_frame(name: str, payload: bytes) -> tuple[Any, bytes, list[Any]]:
-    """Return what pymavlink reads from a payload, the frame that it writes of that, and the fields that it wrote."""
     mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
     definition = getattr(common, f"MAVLink_{name.lower()}_message")
     numbers = dict(zip(definition.ordered_fieldnames, unflattened(definition, payload), strict=True))

@@ -15,8 +15,6 @@ FLOATS = (0.0, -0.0, 1.0, 1e-45, 3.4028234e38, nan, inf, -inf, 0.1, -273.15)
 
 
 class Case(NamedTuple):
-    """A message: its layout, its numbers at random, and the fields of them in the order of the definition."""
-
     name: str
     layout: FixedFrame
     numbers: Callable[[Random], tuple[Any, ...]]

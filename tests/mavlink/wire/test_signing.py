@@ -18,7 +18,6 @@ HEARTBEAT = (6, 8, 0, 0, 4, 3)
 
 
 def pymavlink(key: bytes | None = KEY, *, timestamp: int = START, system: int = 255, link_id: int = 5) -> Any:
-    """Return pymavlink's own end of a signed link."""
     mav = common.MAVLink(None, srcSystem=system, srcComponent=190)
     mav.robust_parsing = True
     if key is not None:

@@ -138,11 +138,6 @@ def test_air_that_may_change_but_does_not_is_a_constant_wind(tmp_path: Path) -> 
     assert flown(Weather(steady)) == flown(Weather(changing))
 
 
-def test_calm_air_is_no_weather() -> None:
-    late = Weather(NO_WIND, (gust("6@270:start=1000,duration=1"),))
-    assert flown(late) == flown(Weather(NO_WIND))
-
-
 def test_a_world_says_what_air_it_is_in() -> None:
     weather = Weather(NO_WIND, (gust("6@270:start=0.1,duration=0.2"),))
     worlds = flown(weather)

@@ -23,7 +23,6 @@ def with_arm(arm_m: float) -> Vehicle:
 
 
 def most(said: str, key: str) -> float:
-    """Return the largest value that an error allows for a key."""
     return float(said.partition(f"{key} ")[2].partition("at most ")[2].partition(",")[0])
 
 

@@ -55,13 +55,6 @@ def test_the_wind_blows_from_where_it_is_said_to() -> None:
     assert wind(str(wind("3.7@123.4"))) == wind("3.7@123.4")
 
 
-def test_a_hovering_vehicle_drifts_off_with_the_wind() -> None:
-    start = Start(z=9.0, rotors=rpm(VEHICLE, HOVER))
-    end = flight(VEHICLE, start, hover(VEHICLE), 2.0, wind=wind("5@270").velocity_at(0.0))[-1]
-    rate = (0.025 + 4.0 * ROTOR_DRAG * HOVER) / MASS_KG
-    assert end.state[6] == pytest.approx(5.0 * (2.0 - (1.0 - exp(-2.0 * rate)) / rate), rel=1e-9)
-
-
 @settings(max_examples=25)
 @given(vectors(5.0), vectors(5.0), reals(90.0), vectors(3.0))
 def test_a_wind_is_a_moving_frame(air: Vector, velocity: Vector, tilt_deg: float, rate: Vector) -> None:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from colibri.common.jit import Packed, packed
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, Quaternion, Vector
-from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.air import CALM
 from colibri.plant.physics.equations import angular_acceleration, attitude_of, derivative
 from colibri.plant.physics.integrators import adaptive_step
@@ -30,7 +29,6 @@ Speeds = tuple[float, float, float, float]
 
 
 def free(inertia: Vector, *parts: str) -> Packed:
-    """A Hummingbird whose rotors push nothing and nobody."""
     parameters = parameters_of(hummingbird(*parts), CALM)
     return packed(parameters._replace(thrust=STILL, yaw_moment=STILL, inertia_kg_m2=inertia))
 
@@ -40,8 +38,6 @@ def x_of(velocity: Vector, rate: Vector, position: Vector, attitude: Quaternion,
 
 
 class Spin(NamedTuple):
-    """What a torque-free motion keeps."""
-
     momentum: Array
     energy_j: float
 
@@ -108,11 +104,3 @@ def test_hover_stays_where_it_is(name: str) -> None:
     first, *_, last = flight(vehicle, start, hover(vehicle), 1.0)
     assert last.state == pytest.approx(first.state, abs=1e-9)
     assert last.time_us == 1_000_000
-
-
-def test_a_disarmed_vehicle_falls() -> None:
-    vehicle = hummingbird()
-    disarmed = ActuatorCommand(0, hover(vehicle).controls, armed=False)
-    end = flight(vehicle, Start(rotors=rpm(vehicle, vehicle.hover_speed)), disarmed, 1.0)[-1]
-    assert end.state[8] == pytest.approx(-0.5 * GRAVITY_M_S2, abs=1e-9)
-    assert end.rotor_speeds == STILL

@@ -100,7 +100,6 @@ def test_the_wrench_is_the_sum_over_the_points_that_touch(
 
 
 def test_energy_never_comes_out_of_the_ground() -> None:
-    """Thrown hard and crooked, without thrust and drag: what it has only shrinks, but for the integrator's crumbs."""
     vehicle = hummingbird("ground")
     x = states(flight(vehicle, Start(z=1.0, phi=70.0, vx=3.0, vz=-5.0, p=6.0, q=-9.0, r=4.0), OFF, 3.0, frame_us=1000))
     inertia = np.array(vehicle.body.inertia_kg_m2)

@@ -10,8 +10,7 @@ import pytest
 from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.environment.air import CALM
-from colibri.plant.physics.integrators import Integrator, adaptive_step, fixed_step, runge_kutta_4, solver
+from colibri.plant.physics.integrators import Integrator, adaptive_step, fixed_step, runge_kutta_4
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start
 from colibri.plant.physics.world import Physics, World
@@ -86,13 +85,6 @@ def test_frames_follow_each_other(name: Integrator) -> None:
     long = flight(vehicle, Start(z=9.0, p=1.0), order, 0.1, integrator=name, frame_us=100_000)
     assert all(after.time_us - before.time_us == 4000 for before, after in pairwise(short))
     assert states(short)[-1] == pytest.approx(states(long)[-1], abs=1e-8)
-
-
-def test_an_unknown_wind_is_calm() -> None:
-    vehicle = hummingbird("drag")
-    assert solver("rk4") is fixed_step
-    order = command(*UNEVEN, vehicle=vehicle)
-    assert flight(vehicle, Start(z=9.0), order, 0.1) == flight(vehicle, Start(z=9.0), order, 0.1, wind=CALM)
 
 
 BOTH: tuple[Integrator, Integrator] = ("rk4", "adaptive")

@@ -29,17 +29,14 @@ class Script:
     """A link over which requests come at given times of the wall clock; it is that clock, and the process's end."""
 
     def __init__(self, requests: list[tuple[float, bytes]]) -> None:
-        """Begin at 100 s."""
         self._requests = requests
         self.now_s = 100.0
         self.sent: list[bytes] = []
 
     def __bool__(self) -> bool:
-        """Whether all has come."""
         return not self._requests
 
     def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
-        """Return the next request, when its time has come."""
         at_s, datagram = self._requests[0]
         if at_s > self.now_s + timeout_s:
             self.now_s += timeout_s
@@ -53,7 +50,6 @@ class Script:
         return []
 
     def send(self, datagram: bytes, _address: Address) -> None:
-        """Keep a reply."""
         self.sent.append(datagram)
 
 
@@ -65,7 +61,6 @@ def out(tmp_path: Path) -> Path:
 def served(
     requests: list[tuple[float, bytes]], out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> list[dict[str, Any]]:
-    """Serve what is requested; return the events that were said."""
     script, number = Script(requests), len(requests)
     monkeypatch.setattr(ardupilot_server, "perf_counter", lambda: script.now_s)
     end = ArduPilotEnd(

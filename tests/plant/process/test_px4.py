@@ -45,7 +45,6 @@ def connected() -> tuple[SimulatorEnd, Px4]:
 
 
 def carried(end: SimulatorEnd, px4: Px4) -> list[bytes]:
-    """Carry what the simulator sends to PX4; return the answers, which are not carried."""
     return [answer for frames, _ in end.take_outbox() for answer in px4.hear(b"".join(frames))]
 
 
@@ -175,16 +174,6 @@ def test_nothing_that_comes_breaks_it(datagrams: list[bytes]) -> None:
     assert end.motors == STOPPED
 
 
-def test_foreign_controls_are_mapped_to_our_rotors() -> None:
-    for name, wanted in {"jmavsim": (0.5, 0.6, 0.7, 0.8), "iris": (0.25, 0.36, 0.49, 0.64)}.items():
-        rotors = load_vehicle(name).rotors
-        controls = rotors.numbering().to_vehicle((0.25, 0.36, 0.49, 0.64))
-        assert rotors.speeds_of(controls) == pytest.approx(wanted)
-    plus = load_vehicle("hummingbird").rotors.numbering()
-    right, left, front, rear = 0.1, 0.2, 0.3, 0.4
-    assert plus.to_vehicle((right, left, front, rear)) == (front, right, rear, left)
-
-
 @pytest.mark.parametrize("name", ["jmavsim", "iris"])
 def test_the_vehicles_of_px4_stand_and_have_thrust_to_spare(name: str) -> None:
     vehicle = load_vehicle(name)
@@ -212,7 +201,6 @@ def plant(folder: Path, url: str, *options: str) -> Iterator[Process]:
 
 
 def flown(px4: Px4, link: GroundLink) -> None:
-    """Take off, fly to a point and hold it for a while."""
     serve(px4, link, lambda: px4.sensors > 200, "PX4 to be served")
     assert px4.known is not None
     assert px4.known.position_m == pytest.approx([0.0, 0.0, 0.0], abs=0.02)

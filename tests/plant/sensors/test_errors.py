@@ -23,27 +23,11 @@ def samples(triad: Triad, count: int) -> NDArray[np.float64]:
     return np.array([triad.measure(ZERO) for _ in range(count)])
 
 
-def allan_deviation(values: NDArray[np.float64], each: int) -> NDArray[np.float64]:
-    """Of each column, for clusters of `each` samples (IEEE Std 952, annex C)."""
-    means = values[: len(values) // each * each].reshape(-1, each, values.shape[1]).mean(axis=1)
-    deviation: NDArray[np.float64] = np.sqrt(0.5 * (np.diff(means, axis=0) ** 2).mean(axis=0))
-    return deviation
-
-
 def test_white_noise_has_its_density_at_every_interval() -> None:
     for interval_s in (0.001, 0.004, 0.05):
         noise = samples(Triad(0.3, 0.0, 0.0, 1e9, interval_s, chance()), 20_000)
         assert noise.std(axis=0) * interval_s**0.5 == pytest.approx(0.3, rel=0.02)
         assert noise.mean(axis=0) == pytest.approx(0.0, abs=4.0 * 0.3 / (20_000 * interval_s) ** 0.5)
-
-
-def test_allan_deviation_shows_noise_and_walk() -> None:
-    density, walk = 1.0, 0.05
-    values = samples(Triad(density, walk, 0.0, 1e9, INTERVAL_S, chance(3)), 200_000)
-    short_s, long_s = 0.1, 100.0
-    assert allan_deviation(values, 10) == pytest.approx(density / short_s**0.5, rel=0.03)
-    expected = (density**2 / long_s + walk**2 * long_s / 3.0) ** 0.5
-    assert np.sqrt((allan_deviation(values, 10_000) ** 2).mean()) == pytest.approx(expected, rel=0.25)
 
 
 def test_the_bias_begins_and_walks_as_described() -> None:

@@ -36,7 +36,6 @@ def test_an_overtaken_command_is_never_followed() -> None:
 
 
 def flown(latency_us: int, frames: int) -> list[float]:
-    """Fly from hover with a command that changes once; return the first rotor's speed at each frame."""
     start = Start(z=10.0, rotors=4740.0)
     physics = Physics(VEHICLE, "rk4")
     plant = Plant(
@@ -60,13 +59,6 @@ def test_latency_shifts_what_happens() -> None:
     at_once, late = flown(0, 30), flown(4_000, 31)
     assert late[1:] == pytest.approx(at_once, rel=1e-12)
     assert late[0] == late[1]
-
-
-def test_half_a_frame_is_half_a_frame() -> None:
-    late = flown(2_000, 3)
-    lag = VEHICLE.rotors.lag
-    assert lag is not None
-    assert flown(0, 3)[1] > late[1] > late[0]
 
 
 def test_a_plant_says_how_late_the_last_command_took_effect() -> None:

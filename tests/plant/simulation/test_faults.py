@@ -63,7 +63,6 @@ def plant(feedback: Feedback = Feedback.SENSORS, seed: int = 7) -> Plant:
 
 
 def told(*faults: Fault, frames: int = 300, seed: int = 7) -> list[SensorFrame]:
-    """Fly; the faults happen between two frames."""
     flown, heard = plant(seed=seed), []
     for number in range(frames):
         frame, _ = flown.measure()
@@ -77,7 +76,6 @@ WELL = told()
 
 
 def without(frame: SensorFrame, unit: int) -> SensorFrame:
-    """Return a frame without what a sensor tells."""
     blank: Any = {FIELDS[unit]: None if unit == GPS else 0.0, "updated": frame.updated & ~GROUPS[unit]}
     return frame._replace(**blank)
 
@@ -165,7 +163,6 @@ def test_gps_that_is_stuck_claims_to_be_new() -> None:
 
 
 def states(*faults: Fault, frames: int = 150) -> list[World]:
-    """Fly on state feedback; the faults happen after `ASKED_AT` frames."""
     flown, worlds = plant(Feedback.STATE), []
     for number in range(frames):
         worlds.append(flown.world)

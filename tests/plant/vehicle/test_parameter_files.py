@@ -1,6 +1,6 @@
 """Parameters of PX4 and ArduPilot, by what these do with them: the vehicle does what their mixers want of it."""
 
-from math import copysign, sqrt
+from math import sqrt
 from pathlib import Path
 
 import msgspec
@@ -69,17 +69,8 @@ def test_px4s_mixer_hovers_and_turns_about_one_axis_at_a_time(name: str) -> None
         assert made == pytest.approx([weight_n, torque[0], -torque[1], -torque[2]], rel=1e-6, abs=1e-9)
 
 
-def test_px4_is_given_what_flew_the_hummingbird_as_a_plus() -> None:
-    values = px4_parameters(load_vehicle("hummingbird"))
-    places = [(values[f"CA_ROTOR{i}_PX"], values[f"CA_ROTOR{i}_PY"]) for i in range(4)]
-    assert places == [(0.0, 0.171), (0.0, -0.171), (0.171, 0.0), (-0.171, 0.0)]
-    assert [copysign(1.0, values[f"CA_ROTOR{i}_KM"]) for i in range(4)] == [-1.0, -1.0, 1.0, 1.0]
-    assert (values["CA_AIRFRAME"], values["CA_ROTOR_COUNT"], values["THR_MDL_FAC"]) == (0, 4, 1.0)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_ardupilots_throttle_is_thrust(name: str) -> None:
-    """From the least thrust to the largest in a straight line, at no control below what the rotors idle at."""
     vehicle = load_vehicle(name)
     values, rotors = ardupilot_parameters(vehicle), vehicle.rotors
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colibri import plant
-from colibri.plant.vehicle.description import VehicleError, load_vehicle, vehicle_names
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
 
 FILE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"
 
@@ -18,10 +18,6 @@ def written(tmp_path: Path, old: str, new: str) -> str:
     path = tmp_path / "vehicle.toml"
     path.write_text(text.replace(old, new), encoding="utf-8")
     return str(path)
-
-
-def test_both_hummingbirds_come_along() -> None:
-    assert {"hummingbird", "hummingbird-thesis"} <= set(vehicle_names())
 
 
 def test_hover_is_at_the_speed_that_carries_the_weight() -> None:

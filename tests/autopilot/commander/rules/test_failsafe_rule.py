@@ -34,7 +34,6 @@ def everything(action: Action, delay_us: int = 0) -> dict[Condition, Setting]:
 
 
 def begun(wanted: Mapping[Condition, Action], flight: Flight = IN_FLIGHT) -> Verdict:
-    """Return what is done once all conditions that want something have held for a while."""
     set_to = {condition: Setting(0, wanted.get(condition, Action.NONE)) for condition in Condition}
     return following(ARMED, NOW_US, dict.fromkeys(wanted, NOW_US - SECOND_US), set_to, flight)
 

@@ -116,7 +116,6 @@ def test_motion_rows_hold_iff_slacks_cover_the_excess(rng: np.random.Generator) 
 
 
 def test_the_tilts_row_is_the_tangent_in_the_direction_expected(rng: np.random.Generator) -> None:
-    """Of two angles that each keep to the limit the tilt may not: the row sees that."""
     u = rng.normal(size=3) * 0.05
     responses = responses_of(rng, u)
     schedule = rng.uniform(-1.0, 1.0, (STEPS, len(prediction.SCHEDULE)))

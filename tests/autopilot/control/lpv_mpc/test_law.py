@@ -29,7 +29,6 @@ def build(vehicle: Vehicle = VEHICLE, attitude: dict[str, Any] | None = None) ->
 
 
 def steps(controller: LpvMpc, planner: Planner, state: VehicleState, count: int) -> list[Decision]:
-    """Decide `count` times over the same state."""
     memory, decisions = controller.initial(VEHICLE.hover_speed), []
     for sample in range(count):
         time_us = sample * controller.control_interval_us
@@ -44,7 +43,6 @@ def turned(phi_deg: float, theta_deg: float, rate: tuple[float, float, float] = 
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> None:
-    """Let every QP fail after the first few."""
     solve, calls = QpSolver.solve, []
 
     def solve_at_first(self: QpSolver, qp: Qp) -> QpResult:
@@ -111,7 +109,6 @@ def test_a_solved_qp_ends_every_fallback() -> None:
 
 
 def test_the_shifted_plan_is_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was planned for the next sample is what flies then, if the thrust stays."""
     controller, planner = build()
     memory = controller.initial(VEHICLE.hover_speed)
     memory, _ = controller.step(memory, 0, turned(5.0, -5.0), planner.horizon(0))
@@ -160,7 +157,6 @@ def test_the_qp_after_any_fallback_moments_is_feasible(u: tuple[float, float, fl
 
 
 def test_commands_within_the_plans_limits_are_never_cut() -> None:
-    """The mixer's own clipping has nothing to do where a plan was had: without it, the same commands."""
     lag = rotor_lag(VEHICLE, 0.008)._replace(min_speed=-10.0)
     controller, planner = build()
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
@@ -175,7 +171,6 @@ def test_commands_within_the_plans_limits_are_never_cut() -> None:
 
 
 def test_soft_limits_give_way_only_where_they_must() -> None:
-    """A rate beyond its limit is brought back with slack; without one, no slack at all."""
     upset = steps(*build(), turned(0, 0, (40.0, 0.0, 0.0)), 1)[0].diagnostics
     assert upset.slack > 0.0
     calm = steps(*build(), turned(20, 0, (3.0, 0.0, 0.0)), 1)[0].diagnostics
@@ -184,7 +179,6 @@ def test_soft_limits_give_way_only_where_they_must() -> None:
 
 
 def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
-    """The slack's linear part: a reference at the limit, under weights that would rather cross it."""
     eager = {"max_rate_rad_s": [1.0, 1.0, 1.0], "output_weight": [100.0, 100.0, 1.0]}
     diagnostics = steps(*build(attitude=eager), turned(30, 0), 1)[0].diagnostics
     assert diagnostics.active.rates > 0
@@ -207,7 +201,6 @@ def test_thrust_gives_way_to_stop_a_tilt() -> None:
 
 
 def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
-    """The same QPs, recorded from an upset: each increment to 1e-4 N m and less."""
     recorded: list[Qp] = []
     controller, planner = build()
     solver = controller._attitude._solver  # noqa: SLF001
@@ -228,7 +221,6 @@ def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
 
 
 def test_memory_is_explicit() -> None:
-    """Two flights through one controller do not see each other."""
     controller, planner = build()
 
     def fly(other: bool) -> list[list[float]]:

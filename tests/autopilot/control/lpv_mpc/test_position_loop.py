@@ -56,7 +56,6 @@ def test_the_force_is_newtons_for_the_demanded_acceleration() -> None:
 
 @given(vectors(5.0))
 def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float, float]) -> None:
-    """Thrust, weight and the drag at that thrust's own tilt are in balance."""
     v = np.array(velocity)
     force = forces_for(NOTHING, v, (NOTHING, v, NOTHING), AIRFRAME)
     thrust = float(np.linalg.norm(force))
@@ -97,7 +96,6 @@ def test_commanded_thrust_leads_its_lag() -> None:
 
 
 def test_the_end_of_the_horizon_moves_as_the_angles_do() -> None:
-    """Against a rotation differentiated numerically: body rates, and the moment that makes their derivative."""
     h, inertia = 1e-3, np.array([0.0034, 0.0034, 0.006])
 
     def angles_at(t: float) -> np.ndarray:

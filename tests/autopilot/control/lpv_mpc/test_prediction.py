@@ -64,7 +64,6 @@ def test_at_its_scheduling_point_the_model_is_the_nonlinear_one(seed: int) -> No
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_step_is_a_zero_order_hold(seed: int) -> None:
-    """Against the matrix exponential, step by step with a schedule that changes."""
     rng = np.random.default_rng(seed)
     x, u, d = random_state(seed), rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.01
     schedule = np.array([random_state(100 * seed + step)[list(SCHEDULE)] for step in range(STEPS)])

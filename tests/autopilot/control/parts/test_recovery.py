@@ -55,7 +55,6 @@ def test_too_much_tilting_moment_keeps_its_direction() -> None:
 @settings(max_examples=15)
 @given(quaternions(), vectors(10.0))
 def test_the_thrust_axis_gets_where_it_must_point(q: Quaternion, rate: Vector) -> None:
-    """From any attitude and rotation, with moments as asked: upright, and turning no more, in three seconds."""
     omega, attitude, h = np.array(rate), q, 1e-3
     for _ in range(3000):
         direction = np.array(rotation_matrix(attitude)).T @ [0.0, 0.0, 1.0]

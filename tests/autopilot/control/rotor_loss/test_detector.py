@@ -36,8 +36,6 @@ def told(world: World) -> VehicleState:
 
 
 class Watched:
-    """A vehicle in the air at constant commands, and the watch on its rotors."""
-
     def __init__(self, controls: FourRotors, start: Start = LEVEL) -> None:
         self.world = starting_world(start, HUMMINGBIRD)
         self.watch = RotorWatch(HUMMINGBIRD, SAMPLE_US * 1e-6)
@@ -50,7 +48,6 @@ class Watched:
         self.watch.step(told(self.world), self._controls, 0.0, airborne=True)
 
     def fly(self, physics: Physics, samples: int) -> int | None:
-        """Fly some samples; return at which a rotor was lost."""
         for sample in range(samples):
             self.world = physics.step(self.world, ActuatorCommand(0, self._controls, armed=True), SAMPLE_US)
             self.see()
@@ -103,7 +100,6 @@ def test_a_weak_rotor_is_none_that_is_lost(
 @settings(max_examples=30, deadline=None)
 @given(st.tuples(*[st.floats(-20.0, 20.0)] * 6), st.integers(1, 5))
 def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
-    """Of velocity and rates: a knock, or an estimate that is corrected."""
     flight = Watched((0.6, 0.6, 0.6, 0.6))
     assert flight.fly(WHOLE, after) is None
     state = np.array(flight.world.state)

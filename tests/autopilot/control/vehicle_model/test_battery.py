@@ -43,7 +43,6 @@ def test_an_empty_battery_stays_empty() -> None:
 
 
 def test_a_rotor_alone_can_turn_faster_than_all_together() -> None:
-    """What is left to one depends on what all of them take: at the speed of all together, just that."""
     together = MODEL.max_common_speed(0.5)
     assert MODEL.max_speed_now(0.5, np.full(4, together)) == pytest.approx(together)
     assert together < MODEL.max_speed_now(0.5, np.full(4, 0.6)) < 1.0

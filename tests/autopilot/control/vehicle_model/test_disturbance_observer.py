@@ -60,7 +60,6 @@ def test_no_more_is_estimated_than_the_limit() -> None:
 
 
 def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
-    """Euler's equation with the rotors' momentum, and a drag that slows: one small step, seen by none."""
     h = 1e-6
     before = np.array([3.0, -1.0, 0.5, 2.0, -1.0, 0.7, 0.0, 0.0, 1.0])
     airframe = AIRFRAME._replace(drag_xy=0.2, drag_z=0.05)

@@ -13,7 +13,6 @@ from tests.support.whole_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, roll
 
 @pytest.mark.parametrize("seed", range(4))
 def test_deviations_are_the_motions_derivative(seed: int) -> None:
-    """Against differences of rollouts, block by block and rotor by rotor: within the order of Taylor's series."""
     numbers = model_of(HUMMINGBIRD, INTERVAL_S)
     means, levels = lagging(STARTS, numbers.lag)
     rigid, squared, commands = start(seed)

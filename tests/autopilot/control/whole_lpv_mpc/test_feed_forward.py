@@ -52,7 +52,6 @@ def circle(radius_m: float, period_s: float) -> tuple[np.ndarray, ...]:
 
 @pytest.mark.parametrize("disturbance", [CALM, Disturbance(np.array([0.5, -1.0, 0.7]), np.array([0.02, -0.01, 0.003]))])
 def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> None:
-    """Open loop for 0.32 s at 6 m/s and 13 m/s², with drag, lag, gyroscopic terms and disturbances."""
     p, v, a, yaw = circle(3.0, 3.0)
     asked = flat()
     feed_forward.ask(v, a, yaw, disturbance, WIDE, FROM_WRENCH, PACKED, asked)

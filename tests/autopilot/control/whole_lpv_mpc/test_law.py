@@ -54,7 +54,6 @@ def test_an_attitude_and_a_thrust_are_held() -> None:
 
 
 def failing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let every QP fail, also those that need no solver."""
     monkeypatch.setattr(QpSolver, "solve", lambda *_: QpResult(QpStatus.TIME_OUT, None))
     monkeypatch.setattr(
         "colibri.autopilot.control.whole_lpv_mpc.mpc.planning.is_free",

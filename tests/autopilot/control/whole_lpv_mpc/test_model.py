@@ -15,7 +15,6 @@ from tests.support.whole_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, roll
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_nominal_motion_is_the_plants(seed: int) -> None:
-    """Without lag and drag, which the model simplifies: rigid body, allocation, gyroscopic terms."""
     vehicle = HUMMINGBIRD.without(["rotor-lag", "drag"])
     rigid, squared, commands = start(seed)
     motion, _ = rolled(vehicle, rigid, squared, commands)

@@ -121,7 +121,6 @@ def test_what_cannot_keep_the_time_stays_on_the_path() -> None:
 
 
 def test_what_can_keep_the_time_catches_up_with_it() -> None:
-    """From rest: the lag of the start is made up for at up to 1.05 times the references' speed."""
     flight, _ = on_path(8.0, 2.0)
     after_start_us = flight.law.lag_us(flight.memory)
     assert after_start_us > 0

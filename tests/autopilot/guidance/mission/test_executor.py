@@ -219,7 +219,6 @@ def test_pausing_goes_on_with_the_current_item() -> None:
 
 
 def test_an_item_that_another_mode_flies_to_its_end() -> None:
-    """Return is a mode of its own: the mission is over when it is handed the vehicle."""
     flight = begun(item("NAV_WAYPOINT", (1.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
     while flight.orders[-1:] != [Return()]:
         flight.step()

@@ -117,7 +117,6 @@ MILLIMETRES = st.integers(-100_000, 100_000).map(lambda number: number / 1000.0)
 def test_a_polygon_has_the_sum_of_angles_as_its_measure(
     vertices: list[tuple[float, float]], east: float, north: float
 ) -> None:
-    """The winding number, from the angles that the corners are seen under, is odd just where a point is inside."""
     depth = Polygon(vertices).depth_m(east, north)
     assert Polygon(vertices[::-1]).depth_m(east, north) == pytest.approx(depth, abs=1e-9)
     assume(abs(depth) > 1e-6)

@@ -67,7 +67,6 @@ def test_the_floor_may_lie_elsewhere(tmp_path: Path, floor_m: float) -> None:
 
 
 def test_a_path_held_is_as_smooth_as_one_that_is_not(tmp_path: Path) -> None:
-    """Continuous to the sixth derivative, also where it is held: the next jumps, there as at any waypoint."""
     track, _ = fit(waypoints(tmp_path, DIPS), reach(), 0.0)
     assert len(track.position(track.clock(np.array([1.0]), 0))) == 3
     t = np.arange(0.1, track.duration_s - 0.1, 0.002)

@@ -19,13 +19,10 @@ POINTS = np.array([[0.0, 1.0], [3.0, 1.0], [3.0, 4.0], [-2.0, 0.0], [0.0, 0.0]])
 
 
 def derivatives(curve: PiecewisePolynomial, t: Array, order: int) -> Array:
-    """Return (n, axes)."""
     return np.stack([axis.derivative(order) for axis in curve(TaylorSeries.time(t, order))], axis=1)
 
 
 def cost(curve: PiecewisePolynomial, order: int) -> float:
-    """Integrate the squared derivative by quadrature, piece by piece."""
-
     def squared(t: float) -> float:
         return float((derivatives(curve, np.array([t]), order) ** 2).sum())
 

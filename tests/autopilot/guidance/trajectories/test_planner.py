@@ -83,7 +83,6 @@ def test_formulas_are_derivatives_of_each_other(tmp_path: Path, name: str, begin
 @pytest.mark.parametrize("name", ENDLESS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_track_without_end_goes_on(name: str, kind: References) -> None:
-    """Whatever was asked for before, and across the blocks that the table is made of."""
     planner, flown = Planner(track(name), kind, PREVIEW), track(name)
     for time_us in (3_600_000_000, 0, 4_088_000, 4_096_000, 4_090_123, 99_000_000, 100_008_000):
         horizon, fresh = planner.horizon(time_us), Planner(track(name), kind, PREVIEW).horizon(time_us)
@@ -99,7 +98,6 @@ def test_a_track_without_end_goes_on(name: str, kind: References) -> None:
 
 @pytest.mark.parametrize("name", ENDLESS)
 def test_yaw_of_a_track_without_end(name: str) -> None:
-    """Along the path and without jumps, or where it was told to look; the same by differences."""
     by_formula, by_differences = (Planner(track(name), kind, Preview(8_000, 2_000)).horizon(0) for kind in KINDS[::-1])
     assert (by_formula.yaw_rad == by_differences.yaw_rad).all()
     assert not by_differences.yaw_rate_rad_s.any()

@@ -27,7 +27,6 @@ def cost(pieces: int, weight: float, floor_m: float = -inf) -> FlightCost:
 
 
 def points(pieces: int) -> Array:
-    """Return points a little beside the straight lines between those given."""
     part = np.arange(pieces * 3 + 1) / pieces
     lines = np.stack([np.interp(part, np.arange(4), axis) for axis in GIVEN.T], axis=1)
     between = np.arange(len(part)) % pieces > 0

@@ -86,7 +86,6 @@ def test_a_turn_from_the_floor_to_the_floor(tmp_path: Path, monkeypatch: pytest.
 
 
 def _is_smooth(flown: LoadedTrack) -> None:
-    """Check that all that a law's preview reads, up to snap, is continuous."""
     t: Array = np.arange(0.01, flown.track.duration_s - 0.01, 0.001)
     for axis in flown.track.position(flown.track.clock(t, 5)):
         for order in range(1, 5):

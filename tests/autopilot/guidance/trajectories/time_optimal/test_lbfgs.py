@@ -8,7 +8,6 @@ from colibri.common.types import Array
 
 
 def bowl(x: Array) -> tuple[float, Array]:
-    """Curvatures from 1 to 100."""
     curvature = 10.0 ** np.linspace(0.0, 2.0, len(x))
     return float((0.5 * curvature * (x - 1.0) * (x - 1.0)).sum()), curvature * (x - 1.0)
 
