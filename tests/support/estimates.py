@@ -41,8 +41,17 @@ def known(all_of_them: list[Estimate | None]) -> list[Estimate]:
     return [one for one in all_of_them if one is not None]
 
 
-def error_m(flight: Recording, of: list[Estimate | None], at_s: float) -> float:
-    k = round(at_s * 1e6 / INTERVAL_US)
-    one = of[k]
+def at(of: list[Estimate | None], at_s: float) -> Estimate:
+    one = of[round(at_s * 1e6 / INTERVAL_US)]
     assert one is not None
-    return float(np.linalg.norm(flight.motion.position[k] - one.frame.position_enu_m))
+    return one
+
+
+def last(of: list[Estimate | None]) -> Estimate:
+    assert of[-1] is not None
+    return of[-1]
+
+
+def error_m(flight: Recording, of: list[Estimate | None], at_s: float) -> float:
+    position = flight.motion.position[round(at_s * 1e6 / INTERVAL_US)]
+    return float(np.linalg.norm(position - at(of, at_s).frame.position_enu_m))

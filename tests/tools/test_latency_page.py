@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import COLUMNS, Recording
-from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, Flight, Merit, Point, fly, merit, page, told_ms
+from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, Flight, Merit, Point, fly, merit, page
 
 GOOD, BAD = Merit(0.001, 0.0, 40.0), Merit(0.4, 0.1, 70.0)
 
@@ -37,10 +37,6 @@ def test_the_page_says_up_to_where_it_flies() -> None:
     text = page(points)
     assert text.count("flown well up to 0 ms, kept up to 8 ms") == len(LAWS) * len(WAYS)
     assert text.count("| lost |") > 0
-
-
-def test_what_is_told_is_never_below_zero() -> None:
-    assert [told_ms(way, 3.0) for way in WAYS] == [0.0, None, 0.0, 8.0]
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.pages.rotor_loss import CASES, SEEDS, draw, table
+from tools.pages.rotor_loss import CASES, SEEDS, table
 from tools.pages.rotor_loss_flights import Flown
 
 PAGE = Path(__file__).parents[2] / "docs" / "rotor-loss.md"
@@ -54,8 +54,3 @@ def test_the_page_tells_of_every_case_and_all_seeds() -> None:
     for case in CASES:
         (row,) = (line for line in lines if line.startswith(f"| {case.name} |"))
         assert f" of {len(SEEDS)} |" in row
-
-
-def test_the_figure_draws_every_flight() -> None:
-    figure = draw([flown(seed) for seed in (4, 5, 6)], "three")
-    assert [len(axes.get_lines()) for axes in figure.axes] == [3, 3, 4, 3, 4] * 2

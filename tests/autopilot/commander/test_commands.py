@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State, custom_mode
+from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, State, custom_mode
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
@@ -69,16 +69,6 @@ def test_do_set_mode_takes_every_number_of_the_table(flying: Cockpit, mode: Mode
     assert flying.pilot.state.mode is mode
     assert flying.commands.set_custom_mode(int(CUSTOM), custom_mode(Mode.LAND)) is None
     assert flying.pilot.state.mode is Mode.LAND
-
-
-@pytest.mark.parametrize("need", Need)
-def test_what_a_mode_needs_is_asked_for_at_each_command(flying: Cockpit, need: Need) -> None:
-    flying.unmet = (need,)
-    for mode in Mode:
-        flying.pilot.select(Mode.LAND, ())
-        refusal = flying.commands.select(mode)
-        assert (refusal is not None) is (need in ROWS[mode].needs)
-        assert refusal is None or need.value in refusal.reason
 
 
 @pytest.mark.parametrize(

@@ -59,17 +59,6 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     assert cockpit.pilot.state == FIRST
 
 
-def test_takeoff_and_landing_items_are_flown() -> None:
-    cockpit = Cockpit()
-    cockpit.load(MISSION, item("NAV_TAKEOFF", place=(0.0, 0.0, 3.0)), item("NAV_LAND", place=(0.0, 0.0, 0.0)))
-    cockpit.pilot.select(Mode.MISSION, ())
-    assert cockpit.pilot.arm(()) is None
-    cockpit.fly_for(5.0)
-    assert not cockpit.pilot.ground.standing
-    cockpit.fly_for(25.0)
-    assert cockpit.pilot.state == FIRST
-
-
 def test_a_mission_moves_home() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(MISSION, item("DO_SET_HOME", 1.0), PLAN[0])

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.mode_tasks import task_record
-from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
@@ -39,15 +38,6 @@ def in_the_air() -> Cockpit:
 @pytest.fixture(scope="module")
 def flying() -> Cockpit:
     return in_the_air()
-
-
-@pytest.mark.parametrize("target", Mode)
-@pytest.mark.parametrize("source", Mode)
-def test_in_flight_every_mode_follows_every_other(flying: Cockpit, source: Mode, target: Mode) -> None:
-    for mode in (source, target):
-        assert flying.pilot.select(mode, ()) is None
-        assert flying.pilot.state == State(mode, armed=True)
-    assert flying.step() is not RESTS
 
 
 @pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
@@ -93,16 +83,6 @@ def test_a_missing_need_other_than_position_prevents_arming(mode: Mode, need: Ne
     cockpit.pilot.select(mode, ())
     armed = cockpit.pilot.arm((need,)) is None
     assert armed is (ROWS[mode].to_arm and need is Need.POSITION)
-
-
-def test_a_check_that_fails_holds_back_arming_unless_by_force() -> None:
-    cockpit = Cockpit()
-    cockpit.pilot.readiness.update(ArmingInputs(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
-    refusal = cockpit.pilot.arm(())
-    assert refusal is not None
-    assert refusal.reason == "not armed: battery at 5%"
-    assert cockpit.pilot.arm((), force=True) is None
-    assert cockpit.pilot.ground.times.flights == 1
 
 
 @pytest.mark.parametrize("mode", Mode)

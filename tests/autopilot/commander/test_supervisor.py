@@ -37,13 +37,6 @@ def look(of: Supervisor, inputs: FailsafeInputs, flight: Flight = HOLDING, for_s
     return [action for action in begun if action is not Action.NONE]
 
 
-def test_a_healthy_flight_triggers_no_failsafe() -> None:
-    well, lines = supervisor()
-    assert look(well, WELL) == []
-    assert lines.take() == []
-    assert well.position_known(None)
-
-
 @pytest.mark.parametrize(
     ("row", "value", "action"), CHOICES, ids=[f"{row.condition}: {NAMES[action]}" for row, _, action in CHOICES]
 )

@@ -5,11 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Fallback, Horizon, VehicleState
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Fallback, VehicleState
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
-from colibri.autopilot.control.lpv_mpc.position_loop import attitudes
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.qp import QpStatus
 from colibri.autopilot.control.registry import check_rotor_speeds, load_controller
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
@@ -70,38 +68,6 @@ def test_laws_that_cannot_do_not_say_that_they_can(name: str) -> None:
     assert not isinstance(controller, AttitudeController)
 
 
-def test_the_attitude_that_a_place_needs_gives_the_same_decision() -> None:
-    controller = mpc()
-    state = turned(0.0)
-    samples = controller.preview.samples
-    thrust_n = 1.2 * WEIGHT_N
-    forces = np.tile((0.3 * WEIGHT_N, -0.2 * WEIGHT_N, 0.0), (samples, 1))
-    forces[:, 2] = np.sqrt(thrust_n**2 - (forces[:, :2] ** 2).sum(axis=1))
-    angles = np.empty((samples, 3))
-    attitudes(forces, np.zeros(samples), np.zeros(samples), angles)
-    demand = AttitudeDemand(angles, np.zeros((samples, 3)), np.full(samples, thrust_n))
-    memory = controller.initial(VEHICLE.hover_speed)
-    _, by_attitude = controller.step_attitude(memory, 0, state, demand)
-
-    nowhere = np.zeros((samples, 3))
-    acceleration = forces / VEHICLE.body.mass_kg - np.array([0.0, 0.0, VEHICLE.gravity_m_s2])
-    k1, k2 = 30.0, 11.0
-    ahead = controller._outer_loop.loop.errors_ahead  # noqa: SLF001
-    e_rate = -np.array(state.velocity_enu_m_s)
-    follow = acceleration + k1 * (ahead[:, 0, 1, None] * e_rate) + k2 * (ahead[:, 1, 1, None] * e_rate)
-    level = np.zeros(samples)
-    references = Horizon(nowhere, nowhere, follow, nowhere, nowhere, level, level, level)
-    no_drag = build_without_drag()
-    _, by_place = no_drag.step(no_drag.initial(VEHICLE.hover_speed), 0, state, references)
-    assert by_attitude.attitude_reference == pytest.approx(by_place.attitude_reference, abs=1e-9)
-    moments = [VEHICLE.allocation()[1:] @ d.rotor_speeds**2 for d in (by_attitude, by_place)]
-    assert moments[0] == pytest.approx(moments[1], abs=0.05)
-
-
-def build_without_drag() -> LpvMpc:
-    return LpvMpc(PROFILE.table("lpv-mpc"), VEHICLE.without({"drag"}), lambda: 0.0)
-
-
 def test_full_turns_of_yaw_make_no_difference() -> None:
     controller = mpc()
     memory = controller.initial(VEHICLE.hover_speed)
@@ -141,19 +107,3 @@ def test_far_from_the_demand_the_recovery_law_flies() -> None:
     assert decision.diagnostics.fallback is None
     _, decision = controller.step_attitude(memory, 0, turned(40.0), held(22, np.radians(-40.0), 0.0, 0.0))
     assert decision.diagnostics.fallback is Fallback.RECOVERY
-
-
-def test_both_ways_share_what_they_remember() -> None:
-    controller = mpc()
-    still, level = np.zeros((22, 3)), np.zeros(22)
-    references = Horizon(still, still, still, still, still, level, level, level)
-    memory = controller.initial(VEHICLE.hover_speed)
-    for sample in range(6):
-        before = memory
-        if sample % 2:
-            memory, decision = controller.step_attitude(memory, 8000 * sample, turned(3.0), held(22, 0.0, 0.0, 0.0))
-        else:
-            memory, decision = controller.step(memory, 8000 * sample, turned(3.0), references)
-        assert decision.diagnostics.qp_status is QpStatus.SOLVED
-        assert controller.charge_ah(memory) > controller.charge_ah(before)
-        assert memory.plan is not None

@@ -19,7 +19,6 @@ from colibri.autopilot.control.registry import (
     controller_names,
     load_controller,
 )
-from colibri.autopilot.control.vehicle_model.mixer import Mixer
 from colibri.common.config import SettingsError
 from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
@@ -111,14 +110,6 @@ def test_the_target_attitude_turns_as_it_says(seed: int) -> None:
     turned = (target.rotation.T @ later.rotation - np.eye(3)) / step
     assert [turned[2, 1], turned[0, 2], turned[1, 0]] == pytest.approx(target.rate, abs=1e-4)
     assert target.rotation @ target.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
-
-
-def test_a_symmetrical_airframe_stays_symmetrical() -> None:
-    mixer = Mixer(load_vehicle("hummingbird-thesis"))
-    for thrust_n, yaw_moment in ((6.8, 0.01), (3.3, -0.02), (0.7, 0.001)):
-        front, right, rear, left = mixer.rotor_speeds(np.array([thrust_n, 0.0, 0.0, yaw_moment]))
-        assert front == rear
-        assert right == left
 
 
 @pytest.mark.parametrize("link", ["direct", "memory"])

@@ -7,7 +7,7 @@ from pyulog import ULog
 
 from colibri.autopilot.ground.onboard_log import OnboardLog
 from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import Quota, Reading
+from colibri.mavlink.files.tree import Reading
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
 from colibri.mavlink.services.statustext import INFO, Line
 from colibri.mavlink.telemetry.snapshot import Snapshot
@@ -87,17 +87,6 @@ def test_the_onboard_log_is_complete_up_to_the_last_second(flight: Flight) -> No
             assert flight.now_us <= 1_100_000
 
 
-def test_changes_are_recorded_when_they_happen(flight: Flight) -> None:
-    flight.run(3)
-    flight.parameters.set("A", 2.0)
-    flight.run(200, armed=True)
-    flight.run(1, armed=False)
-    assert [change[1:] for change in flight.read().changed_parameters] == [("A", 2.0)]
-    flight.run(1)
-    flight.run(1, armed=False)
-    assert flight.read("00002.ulg").initial_parameters == {"A": 2.0}
-
-
 def test_who_was_killed_in_flight_begins_another_one(flight: Flight) -> None:
     flight.run(300)
     flight.log = flight.begun()
@@ -108,11 +97,3 @@ def test_who_was_killed_in_flight_begins_another_one(flight: Flight) -> None:
     first, second = (times_us(flight.read(name)) for name in names(flight))
     assert first[0] < second[0]
     assert second[-1] > flight.now_us - EVERY_US
-
-
-def test_without_room_the_flight_goes_on() -> None:
-    flight = Flight(Memory(Quota(20_000, 10)))
-    flight.run(2000)
-    assert flight.log.name is None
-    assert len(flight.content("00001.ulg")) <= 20_000
-    assert times_us(flight.read())

@@ -93,13 +93,6 @@ def test_the_preview_is_what_follows() -> None:
             assert now[0] == pytest.approx(ahead[sample], abs=1e-12)
 
 
-def test_yaw_is_integrated_from_its_rate() -> None:
-    memory, _ = go(tilt_command(0.0, 0.0, radians(60.0), WEIGHT_N), 3.0)
-    memory, _ = go(tilt_command(0.0, 0.0, 0.0, WEIGHT_N), 3.0, memory)
-    assert degrees(memory.angles[2]) == pytest.approx(180.0, abs=0.1)
-    assert memory.rates[2] == pytest.approx(0.0, abs=1e-3)
-
-
 @pytest.mark.parametrize("axis", range(3))
 def test_body_rates_turn_by_their_integral(axis: int) -> None:
     rate = [0.0, 0.0, 0.0]

@@ -15,7 +15,7 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
 from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
-from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
+from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, named, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float32
@@ -115,12 +115,6 @@ def test_units_of_the_vehicle() -> None:
     assert parameters["VEH_CT"] == float32(6.9472)
     units = {parameter.name: parameter.unit for parameter in parameters_of(vehicle=load_vehicle("hummingbird-thesis"))}
     assert (units["VEH_CT"], units["VEH_ROT_MAX"]) == ("uN/rpm^2", "rpm")
-
-
-@pytest.mark.parametrize(("name", "value"), [("VEH_MASS", 50.0), ("VEH_ROT_MAX", 100.0), ("VEH_IZZ", 50.0)])
-def test_a_vehicle_that_cannot_be_is_refused(name: str, value: float) -> None:
-    with pytest.raises(ImpossibleError):
-        Numbers(FLIGHT, HUMMINGBIRD).applied({**parameters_of().values, name: value})
 
 
 def test_a_vehicle_outside_our_bounds_has_parameters() -> None:

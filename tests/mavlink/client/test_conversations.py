@@ -102,11 +102,13 @@ def test_parameters_over_bad_links(seed: int, loss: float, unruly: float, value:
 def test_plans_over_bad_links(seed: int, loss: float, unruly: float, plan: int) -> None:
     rig = Rig(seed, loss, unruly)
     for items in (ITEMS, ITEMS[3:9], ()):
-        assert rig.ended(Upload(TARGET, items, plan, repeat=PATIENTLY)) == OK
+        upload = Upload(TARGET, items, plan, repeat=PATIENTLY)
+        assert rig.ended(upload) == OK
         assert bits(rig.ground.service.plans[plan].items) == bits(items)
         download = Download(TARGET, plan, repeat=PATIENTLY)
         assert rig.ended(download) == OK
         assert bits(download.items) == bits(items)
+        assert download.opaque_id == upload.opaque_id == rig.ground.service.plans[plan].id
     rig.ended(Upload(TARGET, ITEMS, plan, repeat=PATIENTLY))
     assert rig.ended(Clear(TARGET, ALL, repeat=PATIENTLY)) == OK
     assert not rig.ground.service.plans[plan].items

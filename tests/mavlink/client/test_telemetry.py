@@ -66,13 +66,6 @@ def test_a_drifting_clock_of_a_simulator_is_followed(drift: float) -> None:
     assert not unknown
 
 
-def test_jitter_is_no_drift() -> None:
-    clock, chance = VehicleClock(), Random(6)
-    ways_us = [(20_000 + chance.randrange(20_000), 20_000 + chance.randrange(20_000)) for _ in range(100)]
-    now_us = exchanged(clock, 7_000_000, ways_us)
-    assert abs(clock.own_us(now_us + 7_000_000) - now_us) <= 5_000
-
-
 def test_what_is_no_answer_says_nothing_of_the_clock() -> None:
     clock = VehicleClock()
     clock.receive(0, 1_000_000, 2_000)

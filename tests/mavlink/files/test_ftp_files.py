@@ -50,13 +50,6 @@ def test_a_burst_brings_the_rest_of_a_file(client: Client, memory: Memory, size:
     assert {reply.req_opcode for reply in replies} == {Opcode.BURST}
 
 
-def test_a_burst_is_paced(client: Client) -> None:
-    client.do(Opcode.OPEN_TO_READ, b"text")
-    assert client.send(Opcode.BURST, size=100) == []
-    assert len(client.poll()) == ftp.BURST_PACKETS_A_POLL
-    assert len(client.poll()) == ftp.BURST_PACKETS_A_POLL
-
-
 def test_bursts_of_several_clients_share_the_pace(service: Ftp) -> None:
     clients = [Client(service, Peer(number, 1, number)) for number in range(20)]
     for client in clients:
@@ -250,11 +243,5 @@ def test_checksum(client: Client, memory: Memory, length: int) -> None:
     assert polls == max(length - 1, 0) // ftp.CHECKSUM_BYTES_A_POLL
     (reply,) = replies
     assert reply.sequence == client.sequence + 1
-    bits = 0
-    for byte in data[:1000]:
-        bits ^= byte
-        for _ in range(8):
-            bits = bits >> 1 ^ (0xEDB88320 if bits & 1 else 0)
-    assert length > 1000 or int.from_bytes(reply.data, "little") == bits
     assert int.from_bytes(reply.data, "little") == crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
     assert client.poll() == []

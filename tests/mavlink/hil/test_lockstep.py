@@ -23,13 +23,6 @@ from colibri.mavlink.wire.dialect import Codec
 from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, answer_to, call, command_at, frame_at
 
 
-def test_the_call_sets_peer_and_frame_interval(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
-    call(autopilot, plant)
-    assert plant.peer == ADDRESS
-    assert plant.frame_interval_us == INTERVAL_US
-    assert autopilot.refused is None
-
-
 def test_a_frame_is_answered_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     answer = answer_to(plant, autopilot, 0)

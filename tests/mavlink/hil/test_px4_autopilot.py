@@ -60,22 +60,15 @@ def test_it_calls_until_it_is_served_and_goes_on_with_heartbeats() -> None:
     assert heartbeat.fields.base_mode == mav.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def test_time_counts_from_the_first_frame() -> None:
+def test_an_answer_has_the_simulators_time_order_and_unit() -> None:
     simulator = Simulator()
     got = simulator.send(frame(0), frame(1))
     assert [sensors.time_us for sensors in got] == [0, 4000]
     simulator.end.answer(command(4000))
     (answer,) = simulator.received()
     assert (answer.name, answer.fields.time_usec) == ("HIL_ACTUATOR_CONTROLS", FIRST_US + 4000)
-    assert (answer.fields.mode & mav.MAV_MODE_FLAG_SAFETY_ARMED, answer.fields.flags) == (128, 1)
-
-
-def test_motors_are_in_the_simulators_order_and_unit() -> None:
-    simulator = Simulator()
-    simulator.send(frame(0))
-    simulator.end.answer(command(0))
-    (answer,) = simulator.received()
     assert answer.fields.controls[:4] == pytest.approx([0.09, 0.01, 0.16, 0.04])
+    assert (answer.fields.mode & mav.MAV_MODE_FLAG_SAFETY_ARMED, answer.fields.flags) == (128, 1)
 
 
 def test_a_fix_behind_its_frame_belongs_to_the_next() -> None:

@@ -109,11 +109,6 @@ def test_course_is_clockwise_from_north(velocity: Vector, course: int) -> None:
     assert gps.fields.cog == course
 
 
-def test_between_two_fixes_there_is_no_gps() -> None:
-    (only,) = on_the_wire(SensorFrame(0, ALL, ZERO, ZERO, ZERO, 1e5, 15.0))
-    assert only.name == "HIL_SENSOR"
-
-
 def test_a_group_is_new_when_all_of_it_is() -> None:
     (sensor,) = on_the_wire(SensorFrame(0, 0x3 | Updated.GYROSCOPE, ZERO, ZERO, ZERO, 1e5, 15.0))
     frame = decode_sensors(sensor)

@@ -68,14 +68,6 @@ def test_a_download_is_the_upload_bit_for_bit(items: list[MissionItem], plan_typ
     assert bits(download(ground, plan_type, name)) == bits(items)
 
 
-def test_types_are_stored_by_themselves() -> None:
-    ground = Ground()
-    for plan_type in (MISSION, FENCE, RALLY):
-        upload(ground, [some_item(plan_type)], plan_type)
-    for plan_type in (MISSION, FENCE, RALLY):
-        assert bits(download(ground, plan_type)) == bits([some_item(plan_type)])
-
-
 def test_ids_are_told_and_change_with_the_items() -> None:
     ground = Ground()
     upload(ground, ITEMS)

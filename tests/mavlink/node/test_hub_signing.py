@@ -57,18 +57,6 @@ def test_unsigned_wrong_and_repeated_messages_change_nothing(service: Recorder) 
     assert ours.dropped == {"unsigned": 1, "bad signature": 1, "replayed": 2, "stranger": 1}
 
 
-def test_a_forwarded_message_keeps_its_signature(service: Recorder) -> None:
-    ours = Hub(1, 1, [service], signing=Signing(KEY, START))
-    sdk = signed(245)
-    ours.receive(packed(sdk), 0, SDK, 0)
-    frame = packed(signed())
-    ours.receive(frame, 0, GCS, 0)
-    forwarded = frames_to(ours, SDK)
-    assert forwarded == frame
-    (message,) = sdk.parse_buffer(forwarded)
-    assert message.get_signed()
-
-
 def setup(key: bytes = KEY, target: tuple[int, int] = (1, 1), initial: int = START) -> bytes:
     return Station().says("SETUP_SIGNING", *target, list(key), initial)
 

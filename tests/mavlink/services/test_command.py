@@ -159,31 +159,22 @@ def test_a_command_sent_again_is_answered_and_not_obeyed_again(vehicle: Vehicle)
 
 
 @pytest.mark.parametrize(
-    ("again", "peer", "now_us"),
+    ("confirmation", "again", "peer", "now_us"),
     [
-        (command_long(ARM, 1.0), GROUND, 1),
-        (command_long(ARM, 0.0, confirmation=1), GROUND, 1),
-        (command_long(ARM, 1.0, confirmation=1), OTHER, 1),
-        (command_long(ARM, 1.0, confirmation=1), GROUND, REMEMBERED_FOR_US),
+        (0, command_long(ARM, 1.0), GROUND, 1),
+        (0, command_long(ARM, 0.0, confirmation=1), GROUND, 1),
+        (0, command_long(ARM, 1.0, confirmation=1), OTHER, 1),
+        (0, command_long(ARM, 1.0, confirmation=1), GROUND, REMEMBERED_FOR_US),
+        (1, command_long(ARM, 1.0, confirmation=1), GROUND, 1),
     ],
-    ids=["anew", "other parameters", "another sender", "long after"],
+    ids=["anew", "other parameters", "another sender", "long after", "one confirmation for all"],
 )
-def test_what_is_no_repetition_is_obeyed(vehicle: Vehicle, again: Message, peer: Peer, now_us: int) -> None:
+def test_what_is_no_repetition_is_obeyed(
+    vehicle: Vehicle, confirmation: int, again: Message, peer: Peer, now_us: int
+) -> None:
     service = service_of({ARM: vehicle})
-    receive(service, command_long(ARM, 1.0))
+    receive(service, command_long(ARM, 1.0, confirmation=confirmation))
     receive(service, again, peer, now_us)
-    assert len(vehicle.obeyed) == 2
-
-
-def test_a_first_transmission_may_have_been_lost(vehicle: Vehicle) -> None:
-    receive(service_of({ARM: vehicle}), command_long(ARM, 1.0, confirmation=2))
-    assert len(vehicle.obeyed) == 1
-
-
-def test_whoever_confirms_always_alike_is_obeyed_each_time(vehicle: Vehicle) -> None:
-    service = service_of({ARM: vehicle})
-    for now_us in (0, 1):
-        receive(service, command_long(ARM, 1.0, confirmation=1), now_us=now_us)
     assert len(vehicle.obeyed) == 2
 
 
@@ -208,13 +199,9 @@ def test_progress_is_told_once_a_second_until_the_end(calibrating: CommandServic
 
 
 def test_the_last_answer_is_remembered(calibrating: CommandService) -> None:
-    calibrating.finish(CALIBRATE, GROUND, Refusal(result=FAILED))
-    assert acks(receive(calibrating, command_long(CALIBRATE, 1.0, confirmation=1))) == [(1, CALIBRATE, FAILED)]
-
-
-def test_a_failure_in_the_end_says_why(calibrating: CommandService) -> None:
     sends = calibrating.finish(CALIBRATE, GROUND, Refusal("moved", FAILED))
     assert [send.name for send in sends] == ["COMMAND_ACK", "STATUSTEXT"]
+    assert acks(receive(calibrating, command_long(CALIBRATE, 1.0, confirmation=1))) == [(1, CALIBRATE, FAILED)]
 
 
 def test_another_of_its_kind_is_rejected_for_now(calibrating: CommandService) -> None:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Send
-from colibri.mavlink.services.identity import GENERIC, IDENTITIES, PX4, autopilot_version, banner, version_of
+from colibri.mavlink.services.identity import GENERIC, PX4, autopilot_version, banner, version_of
 from colibri.mavlink.wire.dialect import mav
 from tests.support.messages import on_the_wire
 
@@ -49,7 +49,3 @@ def test_versions(text: str, version: tuple[int, int, int]) -> None:
 @given(st.text("0123456789.rc-²٣", max_size=20))
 def test_any_text_is_some_version(text: str) -> None:
     on_the_wire([Send("AUTOPILOT_VERSION", autopilot_version(PX4, version_of(text), 255))])
-
-
-def test_identities_are_found_by_name() -> None:
-    assert IDENTITIES == {"px4": PX4, "generic": GENERIC}

@@ -5,7 +5,7 @@ from math import atan2, cos, degrees, hypot, isclose, pi, sin
 import pytest
 from hypothesis import assume, given
 
-from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler
+from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Quaternion, Vector
 from tests.support.snapshots import FLYING, sent
 from tests.support.strategies import ANGLES, quaternions, vectors
@@ -90,7 +90,3 @@ def test_the_way_to_the_target(target: Vector) -> None:
     if hypot(east, north) > 1e-3:
         bearing = degrees(atan2(east, north))
         assert abs((output.target_bearing - bearing + 180.0) % 360.0 - 180.0) < 0.51
-
-
-def test_angles_inside_are_of_the_flu_frame() -> None:
-    assert euler_from_quaternion(FLYING.attitude) == pytest.approx((0.1, 0.2, pi / 2))

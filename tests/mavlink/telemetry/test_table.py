@@ -252,30 +252,10 @@ def test_unknown_cells_are_told_as_one() -> None:
     assert list(fields.voltages) == [11_100] + [65535] * 9
 
 
-@pytest.mark.parametrize("state", [1, 2, 3, 4])
-def test_charge_states(state: int) -> None:
-    assert FLYING.battery is not None
-    (fields,) = sent("BATTERY_STATUS", FLYING._replace(battery=FLYING.battery._replace(charge_state=state)))
-    assert fields.charge_state == state
-
-
 def test_unix_time_goes_on_from_the_start() -> None:
     table = telemetry(1_800_000_000_000_000)
     (fields,) = sent("SYSTEM_TIME", FLYING, table)
     assert fields.time_unix_usec == 1_800_000_012_345_678
-
-
-def test_gravity_is_felt_at_rest() -> None:
-    table = telemetry()
-    (fields,) = sent("HIGHRES_IMU", Snapshot(time_us=0), table)
-    assert (fields.xacc, fields.yacc, fields.zacc) == pytest.approx((0.0, 0.0, -9.81))
-
-
-def test_the_standard_atmosphere() -> None:
-    """ISO 2533: 898.76 hPa and 8.5 °C at 1000 m."""
-    (fields,) = sent("SCALED_PRESSURE", FLYING._replace(position_enu_m=(0.0, 0.0, 600.0)))
-    assert fields.press_abs == pytest.approx(898.76, abs=0.05)
-    assert fields.temperature == 850
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)

@@ -25,10 +25,6 @@ def test_sequence_numbers_count_and_wrap() -> None:
     assert sequence == [*range(256), 0]
 
 
-def test_several_frames_in_one_datagram() -> None:
-    assert [message.source for message in Codec(1, 1).decode(heartbeat(1) + heartbeat(2))] == [(1, 9), (2, 9)]
-
-
 @given(st.binary(max_size=400))
 def test_random_bytes_neither_raise_nor_hide_the_next_datagram(noise: bytes) -> None:
     codec = Codec(1, 1)
@@ -98,13 +94,6 @@ def test_reads_and_writes_as_pymavlink_does(data: st.DataObject, name: str) -> N
     assert codec.encode(name, *written) == frame
     if name not in WITH_TEXT:
         assert Codec(7, 9).encode(name, *fields) == frame
-
-
-@given(st.binary(max_size=60).filter(lambda text: not text.endswith(b"\0")), st.sampled_from([0, 7]))
-def test_writes_text_as_pymavlink_does(text: bytes, chunk: int) -> None:
-    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
-    frame = bytes(common.MAVLink_statustext_message(6, text, 0, chunk).pack(mav))
-    assert Codec(7, 9).encode("STATUSTEXT", 6, text, 0, chunk) == frame
 
 
 def test_text_may_be_a_str_and_is_cut_where_it_is_too_long() -> None:

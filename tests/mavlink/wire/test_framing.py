@@ -48,12 +48,6 @@ def test_frames_come_out_whole_wherever_the_stream_is_cut(frames: list[bytes], c
     assert [frame for chunk in chunks(b"".join(frames), cuts) for frame in framer.take(chunk)] == frames
 
 
-def test_every_byte_alone() -> None:
-    framer = Framer()
-    stream = b"".join(FRAMES)
-    assert [frame for i in range(len(stream)) for frame in framer.take(stream[i : i + 1])] == FRAMES
-
-
 @given(
     st.lists(st.tuples(HARMLESS, st.sampled_from(FRAMES[:5])), max_size=5), st.lists(st.integers(0, 3000), max_size=9)
 )

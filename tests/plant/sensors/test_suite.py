@@ -187,23 +187,6 @@ def test_gps_errs_as_it_claims(vehicle: str) -> None:
     assert np.std(velocities) == pytest.approx(gps.velocity_noise_m_s, rel=0.06)
 
 
-def test_gps_drifts_slowly_between_its_noisy_fixes() -> None:
-    sensors = parts(gps={"horizontal_noise_m": 0.0, "vertical_noise_m": 0.0})
-    tracks = [
-        [
-            enu_of(fix.place, DEFAULT_ORIGIN)[0]
-            for fix in fixes(watch(standing(), suite(sensors, seed, 100_000), 60.3, 100_000))
-        ]
-        for seed in range(60)
-    ]
-    first, later = np.array([(track[0], track[-1]) for track in tracks]).T
-    steps = np.diff(np.array(tracks), axis=1)
-    gps = sensors.gps
-    expected = gps.horizontal_drift_m * (2.0 * (1.0 - np.exp(-0.1 / gps.drift_time_s))) ** 0.5
-    assert steps.std() == pytest.approx(expected, rel=0.05)
-    assert np.corrcoef(first, later)[0, 1] == pytest.approx(np.exp(-1.0), abs=0.3)
-
-
 @pytest.mark.parametrize(("rate_hz", "interval_us"), [(10.0, 4000), (8.0, 4000), (10.0, 7000), (5.0, 100_000)])
 def test_gps_tells_where_the_vehicle_was_its_delay_ago(rate_hz: float, interval_us: int) -> None:
     """Exactly: what is told late between two frames says so."""

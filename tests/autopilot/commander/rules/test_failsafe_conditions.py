@@ -2,9 +2,8 @@
 
 from math import inf, sqrt
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.failsafe_conditions import (
@@ -15,7 +14,6 @@ from colibri.autopilot.commander.rules.failsafe_conditions import (
     battery_below,
     needs_position,
     position_known,
-    resting_place,
     stopping_m,
 )
 from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS
@@ -23,8 +21,6 @@ from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
 from colibri.autopilot.estimation.estimate import Estimate, Health
-from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.reference import Kind, Reference, lead, still_target
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
@@ -151,21 +147,6 @@ def test_stopping_distance_has_bounded_acceleration_and_jerk(speed: float, maxim
         way += max(v, 0.0) * dt
         v -= a * dt
     assert stopping_m(speed, maximum, jerk) == pytest.approx(way, abs=0.02 * speed + 1e-3)
-
-
-@settings(max_examples=20)
-@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
-def test_the_reference_comes_to_rest_close_to_where_that_is_said(east: float, north: float) -> None:
-    pace, interval_s = Limits(), 0.008
-    motion = np.zeros((4, 3))
-    motion[1] = (east, north, 0.0)
-    reference = Reference(motion, np.zeros(2))
-    target = still_target((0.0, 0.0, 0.0), 0.0, 20, (Kind.VELOCITY,) * 3)
-    for _ in range(750):
-        _, reference = lead(reference, target, pace, interval_s)
-    x, y, _ = resting_place(at_speed((east, north, 0.0), (0.0, 0.0, 0.0)), pace)
-    assert abs(reference.motion[0, 0] - x) < 1.0
-    assert abs(reference.motion[0, 1] - y) < 1.0
 
 
 def test_a_fence_may_be_foreseen() -> None:

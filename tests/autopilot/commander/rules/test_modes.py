@@ -22,7 +22,6 @@ from colibri.autopilot.commander.rules.modes import (
     next_state,
 )
 from colibri.mavlink.wire.refusal import Refusal
-from tools.pages.modes import PLACES
 
 
 def test_every_mode_has_one_row_and_one_number() -> None:
@@ -108,7 +107,3 @@ def test_on_the_ground_needs_hold_back_arming_and_not_the_choice(mode: Mode) -> 
     assert isinstance(chosen, State) is ROWS[mode].selectable
     armed = next_state(State(mode, armed=False), Event.ARM, None, needs)
     assert isinstance(armed, State) is (ROWS[mode].to_arm and not needs)
-
-
-def test_every_mode_has_its_place_in_the_picture() -> None:
-    assert PLACES.keys() == set(Mode)

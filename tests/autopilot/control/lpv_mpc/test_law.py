@@ -6,11 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.interface import Decision, Diagnostics, Fallback, VehicleState
-from colibri.autopilot.control.lpv_mpc.law import LpvMpc, Memory
+from colibri.autopilot.control.interface import Decision, Fallback, VehicleState
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
-from colibri.autopilot.control.vehicle_model.rotor_lag import lead, rotor_lag
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
@@ -120,13 +119,6 @@ def test_the_shifted_plan_is_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (after.moments == planned).all()
 
 
-@pytest.mark.parametrize("state", [turned(170, 0), turned(180, 0), turned(0, 89), turned(120, 60, (10, -10, 5))])
-def test_far_from_upright_the_recovery_law_flies(state: VehicleState) -> None:
-    decision = steps(*build(), state, 1)[0]
-    assert decision.diagnostics.fallback is Fallback.RECOVERY
-    assert ((decision.rotor_speeds >= 83.8) & (decision.rotor_speeds <= 838.0)).all()
-
-
 @pytest.mark.parametrize("max_speed", [600.0, 838.0])
 def test_the_plan_itself_respects_the_rotors(max_speed: float) -> None:
     """Of an upset vehicle, the first of whose plans bind: at every step of the horizon, to the QP's accuracy."""
@@ -154,20 +146,6 @@ def test_the_qp_after_any_fallback_moments_is_feasible(u: tuple[float, float, fl
         memory = memory._replace(tracked=memory.tracked._replace(speeds=speeds))
         _, decision = controller.step(memory, 0, turned(20, -30), planner.horizon(0))
         assert decision.diagnostics.qp_status is QpStatus.SOLVED
-
-
-def test_commands_within_the_plans_limits_are_never_cut() -> None:
-    lag = rotor_lag(VEHICLE, 0.008)._replace(min_speed=-10.0)
-    controller, planner = build()
-    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
-        memory = controller.initial(VEHICLE.hover_speed)
-        for sample in range(20):
-            speeds = memory.tracked.speeds
-            memory, decision = controller.step(memory, 8000 * sample, state, planner.horizon(0))
-            planned = decision.diagnostics.planned_squared
-            assert planned is not None
-            uncut = lead(speeds, planned[0], lag, 10.0)
-            assert decision.rotor_speeds / VEHICLE.rotors.max_speed == pytest.approx(uncut, abs=1e-6)
 
 
 def test_soft_limits_give_way_only_where_they_must() -> None:
@@ -198,47 +176,3 @@ def test_thrust_gives_way_to_stop_a_tilt() -> None:
         thrusts.append(float(planned.mean(axis=1).max()))
     assert thrusts[0] > 0.6
     assert thrusts[1] < 0.52
-
-
-def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
-    recorded: list[Qp] = []
-    controller, planner = build()
-    solver = controller._attitude._solver  # noqa: SLF001
-    solve = solver.solve
-
-    def record(qp: Qp) -> QpResult:
-        recorded.append(Qp(*(part.copy() for part in qp)))
-        return solve(qp)
-
-    solver.solve = record  # type: ignore[method-assign]
-    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2)), ON_SPIRAL):
-        steps(controller, planner, state, 10)
-    daqp, clarabel = QpSolver("daqp", 1e-8), QpSolver("clarabel", 1e-10)
-    for qp in recorded:
-        one, other = daqp.solve(qp), clarabel.solve(qp)
-        assert one.x is not None
-        assert one.x == pytest.approx(other.x, abs=1e-5)
-
-
-def test_memory_is_explicit() -> None:
-    controller, planner = build()
-
-    def fly(other: bool) -> list[list[float]]:
-        memory: Memory = controller.initial(VEHICLE.hover_speed)
-        speeds = []
-        for sample in range(6):
-            memory, decision = controller.step(memory, 8000 * sample, turned(10, sample), planner.horizon(0))
-            speeds.append(decision.rotor_speeds.tolist())
-            if other:
-                controller.step(controller.initial(300.0), 0, turned(-40, 20), planner.horizon(0))
-        return speeds
-
-    assert fly(other=False) == fly(other=True)
-
-
-def test_diagnostics_hold_the_whole_horizon() -> None:
-    how: Diagnostics = steps(*build(), ON_SPIRAL, 1)[0].diagnostics
-    assert how.predicted is not None
-    assert how.planned_squared is not None
-    assert how.predicted.shape == (21, 9)
-    assert how.planned_squared.shape == (20, 4)

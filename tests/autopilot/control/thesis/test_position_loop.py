@@ -44,11 +44,6 @@ def test_no_error_is_too_large_to_fly(error: Vector, speed: Vector, yaw: float) 
     assert demand.thrust_n > 0.0
 
 
-def test_at_the_reference_it_hovers() -> None:
-    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
-    assert controller.step(AT_REST, AT_REST, AT_REST, AT_REST, 1.0) == pytest.approx((0.0, 0.0, WEIGHT_N))
-
-
 def test_ahead_is_pitch_and_left_is_negative_roll() -> None:
     controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
     yaw = 0.6

@@ -1,6 +1,6 @@
 """Flatness: what references ask for, flown by the model, is the reference."""
 
-from math import cos, pi, sin, tan
+from math import pi, tan
 from typing import TypeAlias
 
 import numpy as np
@@ -67,26 +67,6 @@ def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> No
     assert np.abs(motion[:, :3] - p[:-1]).max() < 2e-3
     assert np.abs(motion[:, 3:6] - v[:-1]).max() < 0.03
     assert np.abs(motion[1:, 10:] - asked.rates).max() < 0.05
-
-
-def test_the_thrust_points_along_the_force_at_the_yaw() -> None:
-    attitude = np.empty((3, 3))
-    force = np.array([2.0, -1.0, 6.0])
-    feed_forward.point(force, 2.2, attitude)
-    assert attitude @ attitude.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert attitude[:, 2] == pytest.approx(force / np.linalg.norm(force))
-    assert np.arctan2(attitude[1, 0], attitude[0, 0]) == pytest.approx(2.2)
-
-
-def test_a_rate_turns_one_attitude_into_the_next() -> None:
-    q = quaternion_from_euler(0.3, -0.5, 1.0)
-    before = np.array(rotation_matrix(q))
-    axis, angle = np.array([0.6, -0.64, 0.48]), 0.12
-    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    after = before @ (np.eye(3) + sin(angle) * K + (1.0 - cos(angle)) * K @ K)
-    rate = np.empty(3)
-    feed_forward.rate_between(before, after, INTERVAL_S, rate)
-    assert rate == pytest.approx(axis * angle / INTERVAL_S, rel=1e-6)
 
 
 Three: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]

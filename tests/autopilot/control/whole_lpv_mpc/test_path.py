@@ -129,12 +129,6 @@ def test_what_can_keep_the_time_catches_up_with_it() -> None:
     assert distances_m[500:].max() < 0.01
 
 
-def test_the_lag_is_told_and_taken() -> None:
-    law = WholeLpvMpc(ON_PATH, VEHICLE, lambda: 0.0)
-    memory = law.with_lag(law.initial(VEHICLE.hover_speed), 2_000_000)
-    assert law.lag_us(memory) == 2_000_000
-
-
 def test_a_speed_that_is_none_is_refused() -> None:
     with pytest.raises(SettingsError, match="min_speed"):
         WholeLpvMpc({**TABLE, "path": {**TABLE["path"], "min_speed": 0.0}}, VEHICLE, lambda: 0.0)

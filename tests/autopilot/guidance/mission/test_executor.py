@@ -296,15 +296,6 @@ def test_speeds_last_until_they_are_changed() -> None:
     assert [order.speed_m_s for order in flight.orders if isinstance(order, GoTo)] == [3.0, 3.0, None]
 
 
-def test_progress_is_one_object_while_nothing_changes() -> None:
-    flight = begun(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
-    flight.step()
-    before, order = flight.mission.progress, flight.orders[-1]
-    flight.step()
-    assert flight.mission.progress is before
-    assert flight.orders[-1] is order
-
-
 @given(
     st.lists(ITEMS.filter(lambda each: MISSION_RULES.check_item(each) == ACCEPTED), max_size=6),
     st.lists(st.tuples(st.integers(0, 5), st.integers(-2, 7), st.booleans(), st.booleans(), st.floats(0.0, 3.0))),

@@ -160,15 +160,6 @@ def test_there_and_back_yaw_turns_by_half_a_turn_at_once(tmp_path: Path) -> None
     assert np.count_nonzero(steps > 1e-6) == 1
 
 
-@pytest.mark.parametrize("name", THESIS_TRACKS)
-def test_by_formula_is_what_differences_come_near(name: str) -> None:
-    backward, formula = (horizon_from(name, 0, SAMPLES + 1, kind) for kind in KINDS)
-    assert formula.position_enu_m == pytest.approx(backward.position_enu_m, abs=1e-12)
-    midway = 0.5 * (formula.velocity_enu_m_s[1:] + formula.velocity_enu_m_s[:-1])
-    assert backward.velocity_enu_m_s[1:] == pytest.approx(midway, abs=0.03)
-    assert np.abs(formula.yaw_rad - backward.yaw_rad)[1:].max() < 0.1
-
-
 def test_a_flight_starts_with_the_first_yaw() -> None:
     assert start_yaw(track("line"), "by-differences") == pytest.approx(np.arctan2(-2.0, 1.0) + np.pi / 2)
     assert start_yaw(track("line"), "by-formula") == pytest.approx(np.pi / 4)
@@ -187,14 +178,6 @@ def test_a_horizon_begins_with_the_sample_it_lies_in() -> None:
     for time_us, sample in ((0, 0), (399_999, 0), (400_000, 1), (700_000, 1), (99_999_999, 249)):
         horizon = horizon_from("spiral", time_us, 2)
         assert horizon.position_enu_m == pytest.approx(everything.position_enu_m[sample : sample + 2])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("time_us", [100_000_000, 100_400_000, 3_600_000_000])
-def test_after_its_end_a_track_holds_its_last_point(time_us: int, kind: References) -> None:
-    horizon = horizon_from("wave", time_us, 2, kind)
-    assert horizon.position_enu_m[1] == pytest.approx([-2.0, 200.0, 5.0])
-    assert horizon.velocity_enu_m_s[1] == pytest.approx([0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("name", ["lemniscate", "circle:radius=3,speed=4"])

@@ -21,13 +21,6 @@ def derivatives(x: TaylorSeries) -> Array:
     return np.array([x.derivative(order)[0] for order in range(len(x.coefficients))])
 
 
-@given(reals(10.0))
-def test_the_direction_of_a_circle_turns_at_its_rate(t: float) -> None:
-    theta = derivatives(atan2(2.0 * sin(0.7 * at(t)), 2.0 * cos(0.7 * at(t))))
-    assert np.cos(theta[0] - 0.7 * t) == pytest.approx(1.0)
-    assert theta[1:] == pytest.approx([0.7, 0.0, 0.0, 0.0, 0.0], abs=1e-12)
-
-
 @given(reals(3.0))
 def test_the_direction_of_a_line_is_the_arc_tangent(t: float) -> None:
     """d/dt atan t = 1 / (1 + t²), whose derivatives are those of the imaginary part of 1 / (i + t)."""
