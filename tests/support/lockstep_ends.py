@@ -2,7 +2,8 @@
 
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.hil.plant_status import ReceivedFrame
+from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus, ReceivedFrame
+from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 
 ADDRESS = ("autopilot", 1)
@@ -26,10 +27,15 @@ def call(autopilot: AutopilotEnd, plant: PlantEnd) -> None:
         autopilot.receive(outgoing.datagram, 0.0)
 
 
-def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
-    plant.offer(frame_at(time_us), 0.0)
+def offered(plant: PlantEnd, frame: Frame, plant_status: PlantStatus = NOTHING) -> bytes:
+    """Return the datagram by which the plant offers a frame."""
+    plant.offer(frame, 0.0, plant_status)
     (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 0.0) == ReceivedFrame(frame_at(time_us))
+    return outgoing.datagram
+
+
+def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
+    assert autopilot.receive(offered(plant, frame_at(time_us)), 0.0) == ReceivedFrame(frame_at(time_us))
     autopilot.answer(command_at(time_us))
     (answer,) = autopilot.take_outbox()
     return answer

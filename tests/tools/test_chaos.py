@@ -21,13 +21,6 @@ def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, 
     [
         ("autopilot.control.loop:ControlLoop.decide", "hover", 1, "flown on", "control law failed: plain law flies"),
         (
-            "autopilot.control.whole_lpv_mpc.mpc:WholeMpc.solve",
-            "offboard",
-            inf,
-            "flown on",
-            "control law failed: plain law flies",
-        ),
-        (
             "autopilot.guidance.tasks.offboard:OffboardTask.update",
             "offboard",
             1,
@@ -38,14 +31,6 @@ def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, 
         ("autopilot.commander.pilot:Pilot.sense", "landing", inf, "landed", "step failed: descending"),
         ("autopilot.ground.snapshots:SnapshotBuilder.take", "hover", inf, "flown on", "telemetry failed"),
         ("mavlink.services.command:CommandService.receive", "hover", inf, "flown on", "CommandService failed"),
-        ("mavlink.streaming.service:StreamService.poll", "hover", inf, "flown on", "StreamService failed"),
-        (
-            "autopilot.core.subscription:Subscribers._calls",
-            "hover",
-            1,
-            "flown on",
-            "parameters failed: old values stay",
-        ),
         ("autopilot.commander.supervisor:Supervisor.step", "hover", inf, "flown on", "failsafes failed: none may act"),
     ],
 )

@@ -1,6 +1,5 @@
 """The golden flights, on this computer and on others as far as it can pass for them, are the same to the last bit."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -8,8 +7,6 @@ import pytest
 from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
 from tools.golden.__main__ import main as golden_main
-from tools.golden.__main__ import table
-from tools.golden.pythons import environments, is_stale, set_up
 from tools.golden.variations import Flown, Variation, fly, variations
 from tools.harness.processes import begins_as_recorded
 
@@ -69,20 +66,6 @@ def test_what_the_cpu_cannot_do_is_not_flown_and_says_why() -> None:
     assert not Variation(name="here").obstacle()
 
 
-def test_the_table_says_what_differs_and_how_long_it_took(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    golden = tmp_path / "hashes.json"
-    golden.write_text('{"crown": "aa", "wave": "bb"}', encoding="utf-8")
-    monkeypatch.setattr("tools.golden.variations.HASHES", golden)
-    flown = {"here": Flown({"crown": "aa", "wave": "bb"}, 2.4), "there": Flown({"crown": "cc", "wave": "bb"}, 3.6)}
-    assert table(flown).splitlines() == [
-        "| flight | here | there |",
-        "| --- | --- | --- |",
-        "| crown | = | **differs** |",
-        "| wave | = | = |",
-        "| took | 2 s | 4 s |",
-    ]
-
-
 def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         golden_main(["--variation", "abacus"])
@@ -90,19 +73,3 @@ def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixtu
     error = capsys.readouterr().err
     assert "--variation abacus: there is no such variation; there are as-it-is, openblas-nehalem" in error
     assert error.count("\n") == 1
-
-
-def test_current_environments_are_kept(tmp_path: Path) -> None:
-    for name in ("requirements.lock", "pyproject.toml"):
-        (tmp_path / name).touch()
-        os.utime(tmp_path / name, (0.0, 0.0))
-    for version in ("3.10", "3.12", "3.13"):
-        (tmp_path / f".venv-{version}").mkdir()
-    for version in ("3.10", "3.12"):
-        (tmp_path / f".venv-{version}" / ".ready").touch()
-    assert environments(tmp_path) == {"3.12": tmp_path / ".venv-3.12" / "bin" / "python"}
-    set_up(tmp_path, "3.12", Path("/no/such/python"))
-    assert [is_stale(tmp_path, version) for version in ("3.12", "3.13")] == [False, True]
-    os.utime(tmp_path / ".venv-3.12" / ".ready", (0.0, 0.0))
-    with pytest.raises(FileNotFoundError):
-        set_up(tmp_path, "3.12", Path("/no/such/python"))

@@ -17,20 +17,6 @@ def flights_of(out: Path) -> dict[str, Any]:
     return figures
 
 
-def test_flies_beside_the_peer_in_every_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(rotorpy_peer, "installed", lambda: True)
-    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
-    monkeypatch.setattr(speed, "real_time_factor", lambda *_: 8.0)
-    flights = flights_of(tmp_path / "flights.json")
-    assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
-    for rate in flights["rates_hz"].values():
-        assert set(rate) == {"memory", "udp", "rotorpy", "memory / rotorpy", "udp / rotorpy"}
-        assert rate["udp / rotorpy"]["median"] == pytest.approx(rate["udp"]["median"] / 2.0)
-    assert "memory / rotorpy" in capsys.readouterr().out
-
-
 def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, State, custom_mode
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.mission.items import FENCE, MISSION
@@ -188,14 +187,6 @@ def test_places_heights_and_headings_of_a_reposition(flying: Cockpit) -> None:
     assert flying.do("DO_REPOSITION", z=15.0 + flying.home.origin.altitude_m).result == ACCEPTED
     assert isinstance(flying.pilot.task, GoToTask)
     assert flying.pilot.task.order.position_enu_m == pytest.approx((0.0, 0.0, 15.0), abs=0.01)
-
-
-def test_a_circle_is_as_wide_and_as_fast_as_it_was_asked_for(flying: Cockpit) -> None:
-    assert flying.do("DO_ORBIT", -7.0, 2.0).result == ACCEPTED
-    task = flying.pilot.task
-    assert isinstance(task, OrbitTask)
-    assert task.order.radius_m == -7.0
-    assert task.order.speed_m_s == 2.0
 
 
 def test_the_speed_that_is_asked_for(flying: Cockpit) -> None:

@@ -64,14 +64,6 @@ def test_a_track_from_time_0_is_flown_once() -> None:
     assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.context()), TaskSequence)
 
 
-def test_a_first_track_can_be_forgotten() -> None:
-    cockpit = Cockpit(first=track("spiral"))
-    assert cockpit.tasks.is_first
-    cockpit.tasks.forget_first()
-    assert not cockpit.tasks.is_first
-    assert cockpit.tasks.first_yaw_rad == 0.0
-
-
 class Nobody:
     def latest(self, now_us: int, timeout_us: int) -> None:
         """Return nothing."""

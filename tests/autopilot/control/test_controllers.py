@@ -58,20 +58,6 @@ def test_each_keeps_the_interface(name: str) -> None:
     assert decision.rotor_speeds == pytest.approx(np.full(4, vehicle.hover_speed), rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["cascade", "global-lpv-mpc"])
-def test_an_mpc_shows_its_plan(name: str) -> None:
-    controller = build(name)
-    _, decision = controller.step(
-        controller.initial(4740.24), 0, hovering((0.1, 0.0, 0.0)), staying(controller.preview)
-    )
-    how = decision.diagnostics
-    assert how.predicted is not None
-    assert how.predicted.shape == (4, 3 if name == "cascade" else 4)
-    assert np.isfinite(how.predicted).all()
-    assert how.active.increments == 0
-    assert how.cost <= 0.0, "doing nothing costs 0, and the optimum no more than that"
-
-
 @pytest.mark.parametrize("name", PROFILES)
 @pytest.mark.parametrize("spoil", [{"colour": 1.0}, {"control_interval_s": 0.0}, {"control_interval_s": 0.0005}])
 def test_a_wrong_table_is_refused(name: str, spoil: dict[str, float]) -> None:

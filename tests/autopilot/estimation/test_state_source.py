@@ -111,18 +111,6 @@ def test_the_first_estimate_begins_the_flight_from_idle() -> None:
     assert max(second.command.controls) > idle
 
 
-def test_time_that_goes_back_is_another_flight() -> None:
-    flown = autopilot()
-    made = Standing.made
-    first = [flown.step(sensors(time_us)).command for time_us in range(0, 2 * ALIGNED_US, FRAME_US)]
-    assert Standing.made == made
-    second = [flown.step(sensors(time_us)).command for time_us in range(0, 2 * ALIGNED_US, FRAME_US)]
-    assert Standing.made == made + 1
-    assert first == second
-    assert not first[0].armed
-    assert first[-1].armed
-
-
 def test_a_station_vehicle_starts_with_the_first_estimate() -> None:
     flown = copter()
     for time_us in range(0, ALIGNED_US, FRAME_US):

@@ -69,11 +69,9 @@ def test_a_port_that_is_taken(capsys: pytest.CaptureFixture[str], taken: str, sc
     ("content", "line"),
     [
         (bytes(range(31)), "expected 32 bytes or 64 hexadecimal digits, found 31 bytes"),
-        (b"zz" * 32, "expected 32 bytes or 64 hexadecimal digits, found 64 bytes"),
-        (b"", "expected 32 bytes or 64 hexadecimal digits, found 0 bytes"),
         (bytes(32), "a key of zeros signs nothing"),
     ],
-    ids=["short", "no digits", "empty", "zeros"],
+    ids=["short", "zeros"],
 )
 @pytest.mark.parametrize("kept", [False, True], ids=["given", "kept"])
 def test_a_key_that_is_none(
@@ -143,16 +141,10 @@ def test_a_remote_link_needs_a_key_or_an_explicit_option(tmp_path: Path, allows:
     [
         (("--gcs", "14550"), "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT or tcp:HOST:PORT"),
         (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
-        (("--home", "91,8,0,0"), "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180"),
-        (("--home", "47,8,nan,0"), "argument --home: not an altitude of -500 to 10000 m and a yaw of -360 to 360"),
         (("--identity", "ardupilot"), 'argument --identity: unknown value "ardupilot" (choose '),
         (("--system-id", "0"), "argument --system-id: must be a whole number from 1 to 255, not 0"),
-        (("--system-id", "256"), "argument --system-id: must be a whole number from 1 to 255, not 256"),
-        (("--profile", "fast"), 'unknown profile "fast" (choose flight'),
-        (("--vehicle", "dragonfly"), 'unknown vehicle "dragonfly" (choose hummingbird'),
         (("--controller", "pid"), 'unknown controller "pid" (choose '),
         (("--track", "loop"), 'unknown track "loop" (choose spiral'),
-        (("--solver", "simplex"), "unknown solver simplex: installed are"),
     ],
 )
 def test_a_command_line_that_is_none(capsys: pytest.CaptureFixture[str], options: tuple[str, ...], line: str) -> None:

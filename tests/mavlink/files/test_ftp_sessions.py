@@ -1,7 +1,5 @@
 """File transfer to clients that ask again, are lost, have many sessions, or ask for nothing that makes sense."""
 
-import random
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +11,7 @@ from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Tree
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import Codec
-from tests.support.ftp_client import HEADER, OTHER, PEER, TEXT, Client, Reply, parsed
+from tests.support.ftp_client import HEADER, OTHER, PEER, TEXT, Client, parsed
 
 
 @pytest.mark.parametrize(
@@ -133,36 +131,6 @@ def test_numbers_go_round(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.sequence = 0xFFFE
     assert [reply.sequence for reply in client.burst(0, 239)][:3] == [0, 1, 2]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_transfer_survives_loss(service: Ftp, memory: Memory, seed: int) -> None:
-    chance = random.Random(seed)
-    client = Client(service, session=seed)
-    data = chance.randbytes(3000)
-
-    def do(opcode: int, what: bytes = b"", offset: int = 0, size: int | None = None) -> Reply:
-        client.sequence += 1
-        while True:
-            client.now_us += 50_000
-            if chance.random() < 0.3:
-                continue
-            (reply,) = client.send(opcode, what, offset, size)
-            if chance.random() < 0.7:
-                return reply
-
-    assert do(Opcode.MAKE_FOLDER, b"d").opcode == Opcode.ACK
-    assert do(Opcode.CREATE, b"d/up").opcode == Opcode.ACK
-    for offset in range(0, len(data), 200):
-        assert do(Opcode.WRITE, data[offset : offset + 200], offset).opcode == Opcode.ACK
-    assert do(Opcode.TERMINATE).opcode == Opcode.ACK
-    assert do(Opcode.RENAME, b"d/up\0d/file").opcode == Opcode.ACK
-    assert do(Opcode.OPEN_TO_READ, b"d/file").opcode == Opcode.ACK
-    read = b"".join(do(Opcode.READ, offset=offset, size=200).data for offset in range(0, len(data), 200))
-    assert read == data
-    assert do(Opcode.REMOVE, b"d/file").opcode == Opcode.ACK
-    assert do(Opcode.REMOVE_FOLDER, b"d").opcode == Opcode.ACK
-    assert [entry.name for entry in memory.list(())] == ["text"]  # type: ignore[union-attr]
 
 
 PATHS = st.sampled_from([b"", b"text", b"d", b"d/e", b"logs", b"logs/x", b"@PARAM/param.pck", b"..", b"a\0b", b"\xff"])

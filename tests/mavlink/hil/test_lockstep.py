@@ -20,7 +20,7 @@ from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, encode_senso
 from colibri.mavlink.hil.state import encode_actuators
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
-from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, answer_to, call, command_at, frame_at
+from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, answer_to, call, command_at, frame_at, offered
 
 
 def test_a_frame_is_answered_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
@@ -55,32 +55,22 @@ def test_a_frame_is_sent_again_only_after_silence(plant: PlantEnd, autopilot: Au
 def test_a_frame_out_of_step_is_dropped(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> None:
     call(autopilot, plant)
     answer_to(plant, autopilot, 0)
-    plant.offer(frame_at(time_us), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.receive(offered(plant, frame_at(time_us)), 0.5) is None
     assert autopilot.dropped["out of step"] == 1
 
 
-def test_an_earlier_frame_begins_a_new_flight_only_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
-    call(autopilot, plant)
-    for time_us in (0, INTERVAL_US, 2 * INTERVAL_US):
-        answer_to(plant, autopilot, time_us)
-    plant.offer(frame_at(0), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 0.5) is None
-    assert autopilot.receive(outgoing.datagram, CALL_AFTER_S) == ReceivedFrame(frame_at(0))
-
-
-@pytest.mark.parametrize("time_us", [INTERVAL_US, 4 * INTERVAL_US, 77 * INTERVAL_US])
-def test_no_silence_makes_another_frame_than_the_first_begin_one(
+@pytest.mark.parametrize("time_us", [0, INTERVAL_US, 4 * INTERVAL_US, 77 * INTERVAL_US])
+def test_only_the_first_frame_after_silence_begins_a_new_flight(
     plant: PlantEnd, autopilot: AutopilotEnd, time_us: int
 ) -> None:
     call(autopilot, plant)
     for before_us in (0, INTERVAL_US, 2 * INTERVAL_US):
         answer_to(plant, autopilot, before_us)
-    plant.offer(frame_at(time_us), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 10.0 * CALL_AFTER_S) is None
+    datagram = offered(plant, frame_at(time_us))
+    assert autopilot.receive(datagram, 0.5) is None
+    begun = ReceivedFrame(frame_at(0)) if time_us == 0 else None
+    assert autopilot.receive(datagram, CALL_AFTER_S) == begun
+    assert autopilot.receive(datagram, 10.0 * CALL_AFTER_S) is None
 
 
 def test_a_heartbeat_in_flight_does_not_end_lockstep(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
@@ -88,9 +78,7 @@ def test_a_heartbeat_in_flight_does_not_end_lockstep(plant: PlantEnd, autopilot:
     answer_to(plant, autopilot, 0)
     forged = encode_heartbeat(Codec(1, dialect.PLANT_COMPONENT), 0, 0, armed=False, custom_mode=FREE_RUNNING)
     assert autopilot.receive(forged, 0.5) is None
-    plant.offer(frame_at(5 * INTERVAL_US), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.receive(offered(plant, frame_at(5 * INTERVAL_US)), 0.5) is None
 
 
 def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
@@ -201,14 +189,10 @@ def test_feedback_is_not_changed_in_mid_flight() -> None:
 
 def test_frames_of_the_other_kind_are_not_flown_on(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
-    plant.offer(sensors_at(INTERVAL_US), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert autopilot.receive(outgoing.datagram, 0.0) is None
+    assert autopilot.receive(offered(plant, sensors_at(INTERVAL_US)), 0.0) is None
     assert autopilot.dropped["unexpected"] == 2
     plant, on_sensors = both_ends_on_sensors()
-    plant.offer(frame_at(0), 0.0)
-    (outgoing,) = plant.take_outbox()
-    assert on_sensors.receive(outgoing.datagram, 0.0) is None
+    assert on_sensors.receive(offered(plant, frame_at(0)), 0.0) is None
     assert on_sensors.dropped["unexpected"] == 2
 
 

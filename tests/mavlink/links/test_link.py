@@ -27,18 +27,6 @@ def client_of(server: UdpLink) -> UdpLink:
     return open_link(server.url.replace("udpin", "udpout"))
 
 
-def test_a_datagram_there_and_back(server: UdpLink) -> None:
-    with closing(client_of(server)) as client:
-        client.send(b"there")
-        received = server.receive(TIMEOUT_S)
-        assert received is not None
-        datagram, address = received
-        server.send(datagram + b" and back", address)
-        answer = client.receive(TIMEOUT_S)
-        assert answer is not None
-        assert answer[0] == b"there and back"
-
-
 def test_an_outgoing_endpoint_hears_nobody_but_its_target(server: UdpLink) -> None:
     with closing(client_of(server)) as client, closing(open_link("udpin:127.0.0.1:0")) as stranger:
         client.send(b"hello")

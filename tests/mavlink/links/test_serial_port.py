@@ -177,11 +177,6 @@ def test_broken_frames_are_dropped_and_later_ones_received(device: Device, link:
     assert {frame for frame in frames if intact(frame)} < set(sent)
 
 
-def test_a_break_of_the_line_is_noise(device: Device, link: SerialLink) -> None:
-    device.send(text(1)[:20] + b"\0" + text(2) + QUIET + text(3))
-    assert heard(link, 2) == [text(2), text(3)]
-
-
 def test_a_device_that_goes_and_comes_back_is_told_once_each(device: Device, link: SerialLink, clock: Clock) -> None:
     device.send(text(1)[:20])
     assert link.receive_now() == []

@@ -54,13 +54,6 @@ def exchange(client: GroundLink, server: GroundLink) -> Address:
     return received[0][1]
 
 
-def test_a_frame_there_and_back(server: GroundLink) -> None:
-    with closing(client_of(server)) as client:
-        address = exchange(client, server)
-        server.send(TEXT, address)
-        assert awaited(client.receive_now) == [(TEXT, client.target)]
-
-
 def test_several_clients_are_told_apart(server: GroundLink) -> None:
     with caller(server) as one, caller(server) as two:
         one.sendall(HEARTBEAT)
@@ -197,46 +190,6 @@ def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
         with closing(open_ground_link(url)) as again:
             client.receive_now()
             assert again.receive_now() == []
-
-
-class Listener(socket.socket):
-    asked = 0
-
-    def accept(self) -> tuple[socket.socket, Address]:
-        self.asked += 1
-        return super().accept()
-
-
-def test_a_server_with_clients_accepts_only_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A look costs a system call and an exception: too much for each of the polls between two frames."""
-    now_s = [10.0]
-    monkeypatch.setattr(tcp, "perf_counter", lambda: now_s[0])
-    listener = Listener(socket.AF_INET, socket.SOCK_STREAM)
-    listener.bind(("127.0.0.1", 0))
-    listener.listen()
-    with closing(tcp.TcpServer(listener, f"tcpin:127.0.0.1:{listener.getsockname()[1]}")) as server:
-        with caller(server) as one:
-            one.sendall(HEARTBEAT)
-            awaited(server.receive_now)
-            asked = listener.asked
-            for _ in range(1000):
-                server.receive_now()
-            assert listener.asked == asked
-            with caller(server) as two:
-                assert server.take_opened() == [one.getsockname()]
-                now_s[0] += tcp.ACCEPT_EVERY_S
-                assert awaited(lambda: server.receive_now() or server.take_opened()) == [two.getsockname()]
-        closed: list[Address] = []
-
-        def both_gone() -> bool:
-            server.receive_now()
-            closed.extend(server.take_closed())
-            return len(closed) == 2
-
-        assert awaited(both_gone)
-        asked = listener.asked
-        server.receive_now()
-        assert listener.asked > asked  # nobody is there: whoever comes is served at once
 
 
 def test_a_sleeping_server_is_woken_by_a_new_client(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RALLY, MissionItem, plan_of
+from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RALLY, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import Codec, mav
@@ -325,8 +325,3 @@ def test_version_1_frames_are_about_the_mission() -> None:
     (message,) = Codec(1, 1).decode(frame)
     answers = ground.decoded(ground.service.receive(message, FIRST, 0))
     assert asked(answers) == [("MISSION_REQUEST_INT", 0)]
-
-
-def test_an_id_is_never_that_of_no_plan() -> None:
-    assert plan_of(()).id == 0
-    assert plan_of(ITEMS).id != plan_of(ITEMS[::-1]).id

@@ -312,16 +312,6 @@ def test_nothing_that_comes_raises(events: list[tuple[Any, ...]], key: bytes | N
     assert observer.open == [channel.number for channel in ours.channels]
 
 
-@given(DATAGRAMS)
-def test_a_good_message_is_heard_after_anything(datagram: bytes) -> None:
-    service = Recorder()
-    ours = Hub(1, 1, [service])
-    ours.receive(datagram, 0, GCS, 0)
-    service.received.clear()
-    ours.receive(Station().says(), 0, GCS, 0)
-    assert service.names == ["HEARTBEAT"]
-
-
 def test_a_flood_of_senders_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hub, "CHANNELS", 3)
     ours = Hub(1, 1, [])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from colibri.mavlink.node.service import Fields, Peer, Send, to
+from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
@@ -100,22 +100,6 @@ def test_a_clock_that_begins_anew_goes_on() -> None:
     stream = flying(SDK)
     fly(stream, 0, 10_000_000)
     assert counts(fly(stream, 0, 1_000_000))["ATTITUDE"] == pytest.approx(100, abs=1)
-
-
-def test_fields_are_worked_out_once_for_all_channels() -> None:
-    calls = []
-
-    def encoder(s: Snapshot) -> Fields:
-        calls.append(s.time_us)
-        return TELEMETRY["ATTITUDE"](s)  # type: ignore[return-value]
-
-    stream = StreamService({"ATTITUDE": encoder})
-    for peer in (GROUND, OTHER):
-        stream.opened(peer.channel, 0)
-        ask(stream, SET, ATTITUDE, 4_000.0, peer)
-    sends = fly(stream, 0, 400_000)
-    assert len(sends) == pytest.approx(200, abs=2)
-    assert len(calls) == len(set(calls)) == len(sends) / 2
 
 
 def test_a_closed_channel_gets_nothing() -> None:

@@ -16,7 +16,7 @@ from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from tests.support.plant_flights import OFF, command, flight, hummingbird, rpm, speeds
 
 LAGGING = hummingbird("rotor-lag")
@@ -34,16 +34,11 @@ def test_a_step_is_followed_as_a_first_order_lag(
     assert speeds(worlds) == pytest.approx(np.array([wanted] * 4).T, rel=1e-6)
 
 
-def test_each_rotor_follows_its_own_command() -> None:
+@pytest.mark.parametrize(("vehicle", "after_s"), [(LAGGING, 0.8), (hummingbird(), 0.004)], ids=["lag", "no lag"])
+def test_each_rotor_follows_its_own_command(vehicle: Vehicle, after_s: float) -> None:
     wanted = (200.0, 400.0, 600.0, 800.0)
-    end = flight(LAGGING, Start(z=50.0, rotors=rpm(LAGGING, 500.0)), command(*wanted, vehicle=LAGGING), 0.8)[-1]
+    end = flight(vehicle, Start(z=50.0, rotors=rpm(vehicle, 500.0)), command(*wanted, vehicle=vehicle), after_s)[-1]
     assert end.rotor_speeds == pytest.approx(wanted, rel=1e-9)
-
-
-def test_without_lag_rotors_follow_at_once() -> None:
-    vehicle = hummingbird()
-    wanted = (200.0, 400.0, 600.0, 800.0)
-    assert flight(vehicle, Start(), command(*wanted, vehicle=vehicle), 0.004)[-1].rotor_speeds == pytest.approx(wanted)
 
 
 def test_disarmed_rotors_coast_down_and_armed_ones_idle() -> None:

@@ -5,7 +5,6 @@ import pytest
 
 from colibri.autopilot.control.lpv_mpc import condensing, prediction
 from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, RATES, STATES
-from colibri.common.jit import packed
 
 STEPS, STARTS = 12, np.array([0, 1, 3, 7])
 MOVED = INPUTS * len(STARTS)
@@ -145,25 +144,3 @@ def test_no_tilt_within_the_limit_is_beyond_any_tangent_to_it(rng: np.random.Gen
         touched = (np.arcsin(y), np.arctan2(x, np.cos(max_tilt)))
         assert tilt_of(*touched) == pytest.approx(max_tilt)
         assert normal @ touched == pytest.approx(distance)
-
-
-def test_the_plan_is_read_as_it_was_predicted(rng: np.random.Generator) -> None:
-    u, thrust = rng.normal(size=3) * 0.05, rng.uniform(4.0, 12.0, STEPS)
-    responses, z = responses_of(rng, u), rng.normal(size=N) * 0.1
-    states, moments, squared = condensing.read_plan(responses, packed(PROBLEM), u, z, thrust)
-    assert states == pytest.approx(responses @ [1.0, *z[:MOVED]])
-    assert moments == pytest.approx(moments_of(u, z))
-    assert squared == pytest.approx(thrust[:, None] * FROM_THRUST + moments @ FROM_MOMENTS.T)
-
-
-def test_active_limits_are_counted_by_kind() -> None:
-    rotor_rows, motion_rows = 8, condensing.MOTION_ROWS
-    G, h = np.zeros((rotor_rows + motion_rows, N)), np.ones(rotor_rows + motion_rows)
-    h[[0, 5]] = 0.0  # rotors
-    h[[rotor_rows, rotor_rows + 4]] = 0.0  # tilt, theta
-    h[[rotor_rows + 5, rotor_rows + 8, rotor_rows + 10]] = 0.0  # p, q, r
-    lower, upper = -np.ones(N), np.ones(N)
-    z = np.zeros(N)
-    z[[1, 2, 4]] = (1.0, -1.0, 1.0)
-    z[-1] = 1.0  # a slack is no increment
-    assert condensing.count_active(G, h, lower, upper, z, rotor_rows, 1e-6) == (2, 3, 2, 3)

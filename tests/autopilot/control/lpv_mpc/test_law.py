@@ -161,18 +161,3 @@ def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
     diagnostics = steps(*build(attitude=eager), turned(30, 0), 1)[0].diagnostics
     assert diagnostics.active.rates > 0
     assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)
-
-
-def test_thrust_gives_way_to_stop_a_tilt() -> None:
-    """Turning fast towards the limit under full thrust: the rotors make half of it, and moments with the rest."""
-    controller, _ = build()
-    planner = Planner(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is
-    thrusts = []
-    for rate in (0.0, 9.0):
-        decision = steps(controller, planner, turned(30, -30, (rate, -rate, 0.0)), 1)[0]
-        planned = decision.diagnostics.planned_squared
-        assert planned is not None
-        assert decision.diagnostics.qp_status is QpStatus.SOLVED
-        thrusts.append(float(planned.mean(axis=1).max()))
-    assert thrusts[0] > 0.6
-    assert thrusts[1] < 0.52

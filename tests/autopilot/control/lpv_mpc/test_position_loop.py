@@ -93,21 +93,3 @@ def test_commanded_thrust_leads_its_lag() -> None:
         thrust += 0.3 * (command - thrust)
         assert thrust == pytest.approx(wanted)
     assert commands[2] == LIMITS.max_n
-
-
-def test_the_end_of_the_horizon_moves_as_the_angles_do() -> None:
-    h, inertia = 1e-3, np.array([0.0034, 0.0034, 0.006])
-
-    def angles_at(t: float) -> np.ndarray:
-        return np.array([0.3 + 0.5 * t + t**2, -0.2 + 0.4 * t, 1.0 + 0.7 * t])
-
-    end = np.empty(12)
-    disturbance = np.array([1e-3, -2e-3, 3e-3])
-    position_loop.end_of_motion(np.array([angles_at(-h), angles_at(0), angles_at(h)]), inertia, disturbance, h, end)
-    R0, R1 = (np.array(rotation_matrix(quaternion_from_euler(*angles_at(t).tolist()))) for t in (-h, h))
-    skew = R0.T @ R1
-    rate = np.array([skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1]]) / (4.0 * h)
-    assert end[[0, 2, 4]] == pytest.approx(angles_at(0))
-    assert end[[1, 3, 5]] == pytest.approx(rate, abs=1e-4)
-    assert end[6:9] == pytest.approx(end[9:12])
-    assert end[6] + disturbance[0] == pytest.approx(inertia[0] * 2.0, rel=1e-6)

@@ -19,12 +19,10 @@ from colibri.autopilot.control.lpv_mpc.prediction import (
     InitialState,
     flow,
     respond,
-    schedule_along,
 )
 from colibri.common.rotations import euler_rates
 
 BODY = Body(0.0034, 0.0034, 0.006, 40.0)
-NO_LAG = BODY._replace(lag_1_s=0.0)
 MOMENTUM = 3e-4
 INTERVAL_S = 0.008
 STARTS = np.array([0, 1, 4, 9])
@@ -83,28 +81,9 @@ def test_a_step_is_a_zero_order_hold(seed: int) -> None:
         assert responses[step + 1] @ [1.0, *increments.ravel()] == pytest.approx(state, rel=1e-3, abs=1e-4)
 
 
-def test_without_lag_moments_follow_at_once() -> None:
-    x = random_state(1)
-    u = np.array([0.01, -0.02, 0.003])
-    schedule = np.zeros((STEPS, len(SCHEDULE)))
-    responses = predicted(x, u, np.zeros(3), schedule, NO_LAG)
-    assert responses[1:, M1:, 0] == pytest.approx(np.tile(u, (STEPS, 1)))
-    rate = x[1] + INTERVAL_S * u[0] / BODY.ix
-    coupled = x[1] - MOMENTUM / BODY.ix * INTERVAL_S * x[3]
-    assert responses[1, 1, 0] == pytest.approx(rate + coupled - x[1], rel=1e-2)
-
-
 def test_increments_do_nothing_before_they_are_made() -> None:
     responses = predicted(random_state(2), np.zeros(3), np.zeros(3), np.zeros((STEPS, len(SCHEDULE))), BODY)
     for move, start in enumerate(STARTS):
         columns = responses[:, :, 1 + INPUTS * move : 1 + INPUTS * (move + 1)]
         assert not columns[: start + 1].any()
         assert columns[start + 1].any()
-
-
-def test_the_schedule_runs_along_the_plan_and_stays_at_its_end() -> None:
-    now, ahead = random_state(3), np.array([random_state(seed) for seed in range(4, 7)])
-    schedule = np.empty((5, len(SCHEDULE)))
-    schedule_along(now, ahead, schedule)
-    nodes = np.array([now, *ahead, ahead[-1], ahead[-1]])[:, list(SCHEDULE)]
-    assert schedule == pytest.approx(0.5 * (nodes[:-1] + nodes[1:]))

@@ -43,18 +43,3 @@ def test_the_condensed_cost_is_the_simulated_one(horizon: int, seed: int) -> Non
 
     simulated = cost(horizon, x, reference, one) - cost(horizon, x, reference, other)
     assert condensed(one) - condensed(other) == pytest.approx(simulated, rel=1e-7, abs=1e-7)
-
-
-@pytest.mark.parametrize("horizon", [1, 4, 20])
-def test_the_hessian_is_symmetric_and_positive_definite(horizon: int) -> None:
-    qp = condense(model(), horizon, np.ones(9), np.ones((horizon, 3)), WEIGHTS)
-    assert (qp.H == qp.H.T).all()
-    assert np.linalg.eigvalsh(qp.H).min() >= WEIGHTS.increment.min()
-
-
-def test_the_increment_model_holds_the_last_input() -> None:
-    A, B, C = model()
-    x = np.arange(9.0)
-    increment = np.array([0.1, 0.2, 0.3])
-    assert (A @ x + B @ increment)[6:] == pytest.approx(x[6:] + increment)
-    assert C @ x == pytest.approx([0.0, 2.0, 4.0])

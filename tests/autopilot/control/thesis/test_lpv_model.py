@@ -30,13 +30,3 @@ def test_zero_order_hold(phi_rate: float, theta_rate: float, momentum: float) ->
     assert transition[:6, :6] == pytest.approx(Ad, abs=1e-9)
     assert transition[:6, 6:] == pytest.approx(Bd, rel=1e-9, abs=1e-9)
     assert transition[6:] == pytest.approx(np.hstack([np.zeros((3, 6)), np.eye(3)]))
-
-
-def test_forward_euler_is_the_first_order_term() -> None:
-    A, B = attitude_model(1.0, 2.0, 0.01, inertia_kg_m2=INERTIA)
-    transition = discretise(A, B, 0.1, "forward-euler")
-    assert transition[:6, :6] == pytest.approx(np.eye(6) + 0.1 * A)
-    assert transition[:6, 6:] == pytest.approx(0.1 * B)
-    step = 1e-6
-    difference = discretise(A, B, step, "zero-order-hold") - discretise(A, B, step, "forward-euler")
-    assert np.abs(difference).max() < 1e3 * step**2

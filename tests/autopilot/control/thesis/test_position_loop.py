@@ -1,7 +1,5 @@
 """Position controller, mixer, and the core that composes them."""
 
-from math import cos, sin
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -42,18 +40,6 @@ def test_no_error_is_too_large_to_fly(error: Vector, speed: Vector, yaw: float) 
     assert abs(demand.phi) <= np.pi / 2
     assert abs(demand.theta) <= np.pi / 2
     assert demand.thrust_n > 0.0
-
-
-def test_ahead_is_pitch_and_left_is_negative_roll() -> None:
-    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
-    yaw = 0.6
-    ahead, left = (cos(yaw), sin(yaw), 0.0), (-sin(yaw), cos(yaw), 0.0)
-    pitched = controller.step(AT_REST, AT_REST, ahead, AT_REST, yaw)
-    rolled = controller.step(AT_REST, AT_REST, left, AT_REST, yaw)
-    assert pitched.theta > 0.1
-    assert pitched.phi == pytest.approx(0.0, abs=1e-12)
-    assert rolled.phi < -0.1
-    assert rolled.theta == pytest.approx(0.0, abs=1e-12)
 
 
 SPEED = st.floats(0.0, VEHICLE.rotors.max_speed)

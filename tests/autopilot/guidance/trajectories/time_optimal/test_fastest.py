@@ -1,7 +1,6 @@
 """The fastest flights: within the limits, above the floor, through every point, smooth, nearly as fast as can be."""
 
 from functools import cache
-from math import exp, log, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -37,37 +36,6 @@ def beyond(flown: LoadedTrack, margin: float) -> float:
     motion = exact_motion(flown.track)
     demands = reach().demands(motion, reach().charge_of(motion))
     return max(float(demand.beyond(margin).max()) for demand in demands)
-
-
-def bang_bang(distance_m: float, acceleration_m_s2: float, drag_1_s: float) -> float:
-    """Return the time of a straight line at full acceleration, then at full deceleration, s."""
-
-    def stop(accelerating_s: float) -> tuple[float, float]:
-        terminal = acceleration_m_s2 / drag_1_s
-        top = terminal * (1.0 - exp(-drag_1_s * accelerating_s))
-        braking_s = log(1.0 + drag_1_s * top / acceleration_m_s2) / drag_1_s
-        there = terminal * accelerating_s - top / drag_1_s
-        return there + top / drag_1_s - terminal * braking_s, accelerating_s + braking_s
-
-    low, high = 0.0, 10.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stop(middle)[0] < distance_m else (low, middle)
-    return stop(low)[1]
-
-
-@pytest.mark.long
-def test_a_straight_line_is_flown_near_the_thrust_limit(tmp_path: Path) -> None:
-    """Rotors that need no time to turn the vehicle over would be 12 % faster."""
-    flown = loaded(tmp_path, LINE)
-    motion = exact_motion(flown.track)
-    thrust, _, tilt, _ = reach().demands(motion, reach().charge_of(motion))
-    specific = 4.0 * (thrust.limit - 0.1 * thrust.span) / 0.698
-    level = min(sqrt(specific * specific - 9.81**2), 9.81 * np.tan(np.radians(0.9 * tilt.limit)))
-    assert flown.track.duration_s <= 1.2 * bang_bang(30.0, level, 0.025 / 0.698)
-    assert beyond(flown, 0.1) <= 0.0
-    assert flown.note.startswith(f"{tmp_path / 'points.csv'}: fastest: {flown.track.duration_s:.2f} s, up to ")
-    assert flown.note.endswith(" m/s and 90% of the thrust")
 
 
 def test_a_turn_from_the_floor_to_the_floor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
