@@ -50,63 +50,6 @@ def doubled(x):
     return {factor} * x
 """
 
-KINDS = """
-import sys
-
-import numpy as np
-
-from colibri.common.jit import compiled
-
-
-@compiled
-def total(x):
-    return x.sum()
-
-
-@compiled
-def twice_total(x):
-    return 2.0 * total(x)
-
-
-@compiled
-def filled(x, y):
-    x[:] = y
-    return x
-
-
-@compiled
-def squared(A):
-    return A @ A
-
-
-@compiled
-def hashed(text):
-    return hash(text)
-
-
-@compiled
-def shown(x):
-    print("x =", x)
-
-
-if __name__ == "__main__":
-    front_end = "numba.np.arraymath"
-    x = np.arange(4.0)
-    total(x)
-    loaded = front_end in sys.modules
-    try:
-        filled(np.zeros(2), x)
-    except ValueError as error:
-        print(error)
-    print(*filled(np.zeros(4), x), *squared(np.ones((2, 2)))[0], hashed("colibri") == hash("colibri"))
-    shown(1.0)
-    kernels = (total, filled, squared, hashed, shown)
-    hits = [sum(kernel.stats.cache_hits.values()) for kernel in kernels]
-    if "caller" in sys.argv:
-        print(twice_total(x))
-    print("front end" if loaded else "machine code", *hits)
-"""
-
 
 def test_there_are_kernels_on_both_sides() -> None:
     assert {
@@ -136,16 +79,6 @@ def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedP
     command = [sys.executable, str(folder / "caller.py"), *words]
     done = {**os.environ, **usual, **environment}
     return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
-
-
-@pytest.mark.long
-def test_cached_kernels_are_the_same_and_load_quickly(tmp_path: Path) -> None:
-    (tmp_path / "caller.py").write_text(KINDS)
-    first, second, third = (_run(tmp_path, *words).stdout.splitlines() for words in ((), (), ("caller",)))
-    said = ["cannot assign slice of shape (2,) from input of shape (4,)", "0.0 1.0 2.0 3.0 2.0 2.0 True", "x = 1.0"]
-    assert first == [*said, "front end 0 0 0 0 0"]
-    assert second == [*said, "machine code 1 1 1 1 1"]
-    assert third == [*said, "12.0", "machine code 1 1 1 1 1"]
 
 
 def _write(folder: Path, factor: float, argument: str = "Number") -> None:

@@ -1,16 +1,17 @@
 """Control laws that are told an attitude: the same law as for a place, the same limits, the same fallbacks."""
 
+from math import radians
 from typing import Any
 
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Fallback, VehicleState
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Fallback
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import check_rotor_speeds, load_controller
-from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.states import turned
 
 VEHICLE = load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
@@ -26,13 +27,6 @@ def mpc() -> LpvMpc:
     controller = build()
     assert isinstance(controller, LpvMpc)
     return controller
-
-
-def turned(phi_deg: float, theta_deg: float = 0.0, psi: float = 0.0) -> VehicleState:
-    q = quaternion_from_euler(np.radians(phi_deg), np.radians(theta_deg), psi)
-    phi, theta, _ = euler_from_quaternion(q)
-    still = (0.0, 0.0, 0.0)
-    return VehicleState(still, still, q, (phi, theta, psi), still)
 
 
 def held(samples: int, phi: float, theta: float, psi: float, thrust_n: float = WEIGHT_N) -> AttitudeDemand:
@@ -72,7 +66,7 @@ def test_full_turns_of_yaw_make_no_difference() -> None:
     controller = mpc()
     memory = controller.initial(VEHICLE.hover_speed)
     decisions = [
-        controller.step_attitude(memory, 0, turned(5.0, psi=psi), held(22, 0.2, 0.1, wanted))[1]
+        controller.step_attitude(memory, 0, turned(radians(5.0), psi=psi), held(22, 0.2, 0.1, wanted))[1]
         for psi, wanted in ((0.3, 0.5), (0.3, 0.5 - 4.0 * np.pi), (0.3 + 6.0 * np.pi, 0.5))
     ]
     for decision in decisions[1:]:
@@ -100,10 +94,10 @@ def test_thrust_leaves_the_moments_their_room(thrust_n: float) -> None:
 def test_far_from_the_demand_the_recovery_law_flies() -> None:
     controller = mpc()
     memory = controller.initial(VEHICLE.hover_speed)
-    for state in (turned(170.0), turned(0.0, 80.0), turned(80.0)):
+    for state in (turned(radians(170.0)), turned(0.0, radians(80.0)), turned(radians(80.0))):
         _, decision = controller.step_attitude(memory, 0, state, held(22, 0.0, 0.0, 0.0))
         assert decision.diagnostics.fallback is Fallback.RECOVERY
-    _, decision = controller.step_attitude(memory, 0, turned(50.0), held(22, 0.0, 0.0, 0.0))
+    _, decision = controller.step_attitude(memory, 0, turned(radians(50.0)), held(22, 0.0, 0.0, 0.0))
     assert decision.diagnostics.fallback is None
-    _, decision = controller.step_attitude(memory, 0, turned(40.0), held(22, np.radians(-40.0), 0.0, 0.0))
+    _, decision = controller.step_attitude(memory, 0, turned(radians(40.0)), held(22, radians(-40.0), 0.0, 0.0))
     assert decision.diagnostics.fallback is Fallback.RECOVERY

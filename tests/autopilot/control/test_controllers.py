@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.geometric import track_direction
-from colibri.autopilot.control.interface import Controller, Horizon, Preview, VehicleState
+from colibri.autopilot.control.interface import Controller
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import (
     ControllerError,
@@ -20,9 +20,9 @@ from colibri.autopilot.control.registry import (
     load_controller,
 )
 from colibri.common.config import SettingsError
-from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.foreign import LAW, FlyTheirs, example, fly_as_a_user
+from tests.support.states import staying, turned
 from tools.harness.processes import fly, fly_thesis, rows
 
 PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
@@ -31,16 +31,6 @@ PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "s
 def build(name: str) -> Controller[Any]:
     vehicle = load_vehicle("hummingbird-thesis")
     return load_controller(name)(load_profile(PROFILES[name]).table(name), vehicle, lambda: 0.0)
-
-
-def hovering(position: tuple[float, float, float] = (0.0, 0.0, 0.0), psi: float = 0.0) -> VehicleState:
-    still = (0.0, 0.0, 0.0)
-    return VehicleState(position, still, quaternion_from_euler(0.0, 0.0, psi), (0.0, 0.0, psi), still)
-
-
-def staying(preview: Preview) -> Horizon:
-    nowhere, east = np.zeros((preview.samples, 3)), np.zeros(preview.samples)
-    return Horizon(nowhere, nowhere, nowhere, nowhere, nowhere, east, east, east)
 
 
 def test_four_come_along() -> None:
@@ -53,7 +43,7 @@ def test_each_keeps_the_interface(name: str) -> None:
     check_controller(name, controller)
     vehicle = load_vehicle("hummingbird-thesis")
     memory = controller.initial(vehicle.hover_speed)
-    _, decision = controller.step(memory, 0, hovering(), staying(controller.preview))
+    _, decision = controller.step(memory, 0, turned(0.0), staying(controller.preview.samples))
     check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
     assert decision.rotor_speeds == pytest.approx(np.full(4, vehicle.hover_speed), rel=1e-9)
 

@@ -29,12 +29,13 @@ from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.ground.forecast import POINTS, Forecaster
 from colibri.conformance.interface_checks import OPTIONAL
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from tests.support.states import staying, turned
 
 DOCS = Path(__file__).parents[3] / "docs" / "controllers.md"
 HUMMINGBIRD = load_vehicle("hummingbird")
 NOTHING = (0.0, 0.0, 0.0)
-LEVEL = VehicleState(NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING, NOTHING)
-STAYING = Horizon(*(np.zeros((8, 3)) for _ in range(5)), *(np.zeros(8) for _ in range(3)))
+LEVEL = turned(0.0)
+STAYING = staying(8)
 OF_FLIGHT = ("lpv-mpc", "whole-lpv-mpc")
 LAWS = {
     "lpv-mpc": "flight",
@@ -136,18 +137,18 @@ def test_a_law_begins_with_what_its_battery_has_told(monkeypatch: pytest.MonkeyP
 def test_the_mass_estimate_continues_only_in_mid_flight() -> None:
     loop = ControlLoop(load_profile("flight"), HUMMINGBIRD, lambda: 0.0)
     assert isinstance(loop.controller, MassController)
-    staying = Horizon(*(np.zeros((loop.preview.samples, 3)),) * 5, *(np.zeros(loop.preview.samples),) * 3)
+    references = staying(loop.preview.samples)
     loop.begin(HUMMINGBIRD.hover_speed, 0.0)
     for sample in range(50):
         falling = LEVEL._replace(velocity_enu_m_s=(0.0, 0.0, -0.02 * sample))
-        flown_kg = loop.decide(8000 * sample, falling, staying).diagnostics.mass_kg
+        flown_kg = loop.decide(8000 * sample, falling, references).diagnostics.mass_kg
     resumed = ControlLoop(load_profile("flight"), HUMMINGBIRD, lambda: 0.0)
     resumed.resume(loop.record(), seamless=False)
     loop.begin_in_flight(0.0)
-    assert loop.decide(0, LEVEL, staying).diagnostics.mass_kg == flown_kg > 1.001 * HUMMINGBIRD.body.mass_kg
-    assert resumed.decide(0, LEVEL, staying).diagnostics.mass_kg == flown_kg
+    assert loop.decide(0, LEVEL, references).diagnostics.mass_kg == flown_kg > 1.001 * HUMMINGBIRD.body.mass_kg
+    assert resumed.decide(0, LEVEL, references).diagnostics.mass_kg == flown_kg
     loop.begin(HUMMINGBIRD.hover_speed, 0.0, afresh=False)
-    assert loop.decide(0, LEVEL, staying).diagnostics.mass_kg == HUMMINGBIRD.body.mass_kg
+    assert loop.decide(0, LEVEL, references).diagnostics.mass_kg == HUMMINGBIRD.body.mass_kg
 
 
 class Waiting(Counting):

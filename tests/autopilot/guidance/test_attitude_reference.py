@@ -22,6 +22,7 @@ from colibri.common.rotations import euler_from_quaternion, quaternion_from_eule
 from colibri.common.types import Quaternion
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.states import turned
 from tests.support.strategies import quaternions, reals, vectors
 
 INTERVAL_S = 0.008
@@ -30,12 +31,6 @@ LIMITS = AttitudeLimits()
 SLEW = LIMITS.slew
 WEIGHT_N = 0.698 * 9.81
 NONE = (nan, nan, nan)
-
-
-def turned(phi: float, theta: float, psi: float) -> VehicleState:
-    q = quaternion_from_euler(phi, theta, psi)
-    still = (0.0, 0.0, 0.0)
-    return VehicleState(still, still, q, (*euler_from_quaternion(q)[:2], psi), still)
 
 
 LEVEL = turned(0.0, 0.0, 0.0)

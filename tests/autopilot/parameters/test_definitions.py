@@ -16,7 +16,7 @@ from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
 from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
-from colibri.autopilot.parameters.number_paths import described, named, paths, read
+from colibri.autopilot.parameters.number_paths import described, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float32
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -207,8 +207,3 @@ def test_any_table_has_parameters(name: str, table: dict[str, Any]) -> None:
     assert all(number.name in parameters for number in numbers)
     assert {number.path for number in numbers} == {path for path in paths(table) if path[0] not in STRUCTURE}
     assert tuned.applied(parameters.values)[0] is profile
-
-
-def test_names_that_would_be_alike_differ() -> None:
-    numbers = named("LAW", {"a_b": 1.0, "A_b": 2.0, "a.b": {"": 3.0}, "a" * 20: 1.0, "a" * 21: 2.0}, frozenset())
-    assert len({number.name for number in numbers}) == 5

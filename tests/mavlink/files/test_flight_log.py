@@ -30,22 +30,6 @@ def fly(log: FlightLog, data: bytes = b"") -> None:
     log.update(False, 2)
 
 
-def test_a_log_holds_what_is_recorded_while_armed(memory: Memory) -> None:
-    log = FlightLog(memory, ("logs",))
-    log.update(False, 0)
-    log.record(b"before")
-    assert (log.name, names(memory)) == (None, [])
-    log.update(True, 4000)
-    assert log.name == "00001.ulg"
-    log.record(b"one, ")
-    log.update(True, 8000)
-    log.record(b"two")
-    log.update(False, 12000)
-    log.record(b"after")
-    assert log.name is None
-    assert content(memory, "00001.ulg") == b"one, two"
-
-
 def test_each_flight_has_its_own(memory: Memory) -> None:
     log = FlightLog(memory, ("logs",))
     fly(log, b"one")

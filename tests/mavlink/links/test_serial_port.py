@@ -2,7 +2,6 @@
 
 import os
 import pty
-import random
 import sys
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,13 +12,11 @@ import pytest
 from colibri.mavlink.links.link import BlockingReceiver, LinkError
 from colibri.mavlink.links.open import beyond_loopback, check_reach, open_ground_link
 from colibri.mavlink.links.serial_port import MIN_QUEUE_BYTES, REOPEN_AFTER_S, SerialLink
-from colibri.mavlink.wire.dialect import Codec, intact
+from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.framing import Framer
 
 BAUD = 57600
 TIMEOUT_S = 5.0
-QUIET = bytes(300)
-"""What ends a frame that noise has begun: no frame is longer."""
 
 
 def text(number: int) -> bytes:
@@ -99,14 +96,6 @@ def heard(link: SerialLink, count: int) -> list[bytes]:
     return frames
 
 
-def heard_until(link: SerialLink, last: bytes) -> list[bytes]:
-    frames: list[bytes] = []
-    while last not in frames:
-        link.wait(TIMEOUT_S)
-        frames += [frame for frame, _ in link.receive_now()]
-    return frames[: frames.index(last)]
-
-
 def arrived(device: Device, count: int) -> list[bytes]:
     framer, frames = Framer(), list[bytes]()
     for _ in range(100_000):
@@ -144,37 +133,6 @@ def test_it_opens_by_url_and_counts_as_no_network(device: Device) -> None:
         device.send(text(1))
         received = BlockingReceiver(link).receive(TIMEOUT_S)
         assert received == (text(1), link.target)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_frames_in_pieces_between_noise_are_all_heard(device: Device, link: SerialLink, seed: int) -> None:
-    rng = random.Random(seed)
-    sent, stream = [text(number) for number in range(20)], b""
-    for frame in sent:
-        stream += bytes(rng.randrange(0xFD) for _ in range(rng.randrange(40))) + frame  # 0xFD begins a frame
-    frames: list[bytes] = []
-    while stream:
-        cut = rng.randrange(1, 200)
-        device.send(stream[:cut])
-        stream = stream[cut:]
-        frames += [frame for frame, _ in link.receive_now()]
-    assert frames + heard(link, len(sent) - len(frames)) == sent
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_broken_frames_are_dropped_and_later_ones_received(device: Device, link: SerialLink, seed: int) -> None:
-    rng = random.Random(seed)
-    sent = [text(number) for number in range(20)]
-    frames: list[bytes] = []
-    for frame in sent:
-        broken = bytearray(frame)
-        if rng.random() < 0.5:
-            broken[rng.randrange(len(broken))] ^= 1 << rng.randrange(8)
-        device.send(bytes(broken) + rng.randbytes(rng.randrange(20)))
-        frames += [frame for frame, _ in link.receive_now()]
-    device.send(QUIET + text(99))
-    frames += heard_until(link, text(99))
-    assert {frame for frame in frames if intact(frame)} < set(sent)
 
 
 def test_a_device_that_goes_and_comes_back_is_told_once_each(device: Device, link: SerialLink, clock: Clock) -> None:

@@ -299,25 +299,6 @@ def test_clearing() -> None:
     assert (answer.fields.count, answer.fields.opaque_id) == (0, 0)
 
 
-def test_readers_are_told_one_plan_from_beginning_to_end() -> None:
-    ground = Ground()
-    upload(ground)
-    for peer in (FIRST, SECOND):
-        ground.hear(peer, "MISSION_REQUEST_LIST", *VEHICLE, MISSION)
-    upload(ground, [some_item(20), some_item(21)])
-    (old,) = ground.hear(SECOND, "MISSION_REQUEST_INT", *VEHICLE, 2, MISSION)
-    assert old.fields.z == ITEMS[2].z
-    ground.hear(SECOND, "MISSION_ACK", *VEHICLE, ACCEPTED, MISSION)
-    (new,) = ground.hear(SECOND, "MISSION_REQUEST_INT", *VEHICLE, 1, MISSION)
-    assert new.fields.z == some_item(21).z
-    ground.poll(6_000_000)
-    (late,) = ground.hear(FIRST, "MISSION_REQUEST_INT", *VEHICLE, 0, MISSION)
-    assert late.fields.z == some_item(20).z
-    assert results(ground.hear(FIRST, "MISSION_REQUEST_INT", *VEHICLE, 2, MISSION)) == [
-        mav.MAV_MISSION_INVALID_SEQUENCE
-    ]
-
-
 def test_version_1_frames_are_about_the_mission() -> None:
     ground = Ground()
     old = mav.MAVLink(None, srcSystem=255, srcComponent=190)

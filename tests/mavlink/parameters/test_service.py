@@ -182,12 +182,6 @@ def test_150_parameters_are_listed_in_well_under_a_second() -> None:
     assert talk.poll() == []
 
 
-def test_a_slow_frame_rate_does_not_slow_the_list_down_as_much() -> None:
-    talk = Talk(parameters_of(146))
-    talk.ask("PARAM_REQUEST_LIST")
-    assert len(list(talk.service.poll(100_000))) == 20
-
-
 def test_each_station_gets_its_list() -> None:
     talk = Talk(parameters_of(20))
     got: dict[int | None, list[int]] = {ME.channel: [], OTHER.channel: []}

@@ -204,31 +204,27 @@ def test_unknown_values_are_those_of_the_definition() -> None:
     assert isnan(odometry.pose_covariance[0])
 
 
+PREARM, GEOFENCE = mav.MAV_SYS_STATUS_PREARM_CHECK, mav.MAV_SYS_STATUS_GEOFENCE
+
+
 @pytest.mark.parametrize(
-    ("snapshot", "present", "enabled", "healthy"),
+    ("changes", "bit", "enabled", "healthy"),
     [
-        (Snapshot(time_us=0), True, True, True),
-        (Snapshot(time_us=0, armable=False), True, True, False),
-        (Snapshot(time_us=0, armable=False, armed=True), True, True, True),
+        ({}, PREARM, True, True),
+        ({"armable": False}, PREARM, True, False),
+        ({"armable": False, "armed": True}, PREARM, True, True),
+        ({"fence_enabled": False}, GEOFENCE, False, True),
+        ({"fence_enabled": True}, GEOFENCE, True, True),
+        ({"fence_enabled": True, "fence_breached": True}, GEOFENCE, True, False),
     ],
 )
-def test_arming_checks_are_a_bit(snapshot: Snapshot, present: bool, enabled: bool, healthy: bool) -> None:
-    (fields,) = sent("SYS_STATUS", snapshot)
-    bit = mav.MAV_SYS_STATUS_PREARM_CHECK
-    masks = (
-        fields.onboard_control_sensors_present,
-        fields.onboard_control_sensors_enabled,
-        fields.onboard_control_sensors_health,
-    )
-    assert [bool(mask & bit) for mask in masks] == [present, enabled, healthy]
-
-
-@pytest.mark.parametrize(("enabled", "breached"), [(False, False), (True, False), (True, True)])
-def test_the_fence_is_healthy_until_it_is_breached(enabled: bool, breached: bool) -> None:
-    (fields,) = sent("SYS_STATUS", Snapshot(time_us=0, fence_enabled=enabled, fence_breached=breached))
-    fence = mav.MAV_SYS_STATUS_GEOFENCE
-    assert bool(fields.onboard_control_sensors_enabled & fence) == enabled
-    assert bool(fields.onboard_control_sensors_health & fence) != breached
+def test_arming_checks_and_the_fence_are_a_bit_each(
+    changes: dict[str, Any], bit: int, enabled: bool, healthy: bool
+) -> None:
+    (fields,) = sent("SYS_STATUS", Snapshot(time_us=0, **changes))
+    assert bit == GEOFENCE or fields.onboard_control_sensors_present & bit
+    assert bool(fields.onboard_control_sensors_enabled & bit) is enabled
+    assert bool(fields.onboard_control_sensors_health & bit) is healthy
 
 
 def test_health_is_what_clients_wait_for() -> None:

@@ -1,5 +1,6 @@
 """The flight profile's control law: its plans, and what flies when there is none."""
 
+from math import radians
 from typing import Any
 
 import msgspec
@@ -12,8 +13,10 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
-from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.common.rotations import quaternion_from_euler
+from colibri.common.types import Vector
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from tests.support.states import turned
 
 VEHICLE = load_vehicle("hummingbird")
 TABLE = load_profile("flight").table("lpv-mpc")
@@ -36,9 +39,8 @@ def steps(controller: LpvMpc, planner: Planner, state: VehicleState, count: int)
     return decisions
 
 
-def turned(phi_deg: float, theta_deg: float, rate: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> VehicleState:
-    q = quaternion_from_euler(np.radians(phi_deg), np.radians(theta_deg), 0.0)
-    return VehicleState(START, (0.0, 0.0, 0.0), q, euler_from_quaternion(q), rate)
+def leaning(phi_deg: float, theta_deg: float, rate: Vector = (0.0, 0.0, 0.0)) -> VehicleState:
+    return turned(radians(phi_deg), radians(theta_deg), position=START, rate=rate)
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> None:
@@ -110,11 +112,11 @@ def test_a_solved_qp_ends_every_fallback() -> None:
 def test_the_shifted_plan_is_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     controller, planner = build()
     memory = controller.initial(VEHICLE.hover_speed)
-    memory, _ = controller.step(memory, 0, turned(5.0, -5.0), planner.horizon(0))
+    memory, _ = controller.step(memory, 0, leaning(5.0, -5.0), planner.horizon(0))
     assert memory.plan is not None
     planned = memory.plan.moments[1]
     failing(monkeypatch, QpStatus.TIME_OUT, after=0)
-    after, decision = controller.step(memory, 8000, turned(5.0, -5.0), planner.horizon(0))
+    after, decision = controller.step(memory, 8000, leaning(5.0, -5.0), planner.horizon(0))
     assert decision.diagnostics.fallback is Fallback.SHIFTED_PLAN
     assert (after.moments == planned).all()
 
@@ -125,7 +127,7 @@ def test_the_plan_itself_respects_the_rotors(max_speed: float) -> None:
     rotors = msgspec.structs.replace(VEHICLE.rotors, max_speed=max_speed)
     vehicle = msgspec.structs.replace(VEHICLE, rotors=rotors)
     bound = 0
-    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2)), turned(0, -55, (0, 6, 0))):
+    for state in (leaning(40, 0), leaning(-30, 30, (4, -4, 2)), leaning(0, -55, (0, 6, 0))):
         for decision in steps(*build(vehicle), state, 5):
             planned = decision.diagnostics.planned_squared
             assert planned is not None
@@ -144,20 +146,20 @@ def test_the_qp_after_any_fallback_moments_is_feasible(u: tuple[float, float, fl
     for thrust_speed in (100.0, VEHICLE.hover_speed, 800.0):
         speeds = np.full(4, thrust_speed / VEHICLE.rotors.max_speed)
         memory = memory._replace(tracked=memory.tracked._replace(speeds=speeds))
-        _, decision = controller.step(memory, 0, turned(20, -30), planner.horizon(0))
+        _, decision = controller.step(memory, 0, leaning(20, -30), planner.horizon(0))
         assert decision.diagnostics.qp_status is QpStatus.SOLVED
 
 
 def test_soft_limits_give_way_only_where_they_must() -> None:
-    upset = steps(*build(), turned(0, 0, (40.0, 0.0, 0.0)), 1)[0].diagnostics
+    upset = steps(*build(), leaning(0, 0, (40.0, 0.0, 0.0)), 1)[0].diagnostics
     assert upset.slack > 0.0
-    calm = steps(*build(), turned(20, 0, (3.0, 0.0, 0.0)), 1)[0].diagnostics
+    calm = steps(*build(), leaning(20, 0, (3.0, 0.0, 0.0)), 1)[0].diagnostics
     assert calm.qp_status is QpStatus.SOLVED
     assert calm.slack == pytest.approx(0.0, abs=1e-9)
 
 
 def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
     eager = {"max_rate_rad_s": [1.0, 1.0, 1.0], "output_weight": [100.0, 100.0, 1.0]}
-    diagnostics = steps(*build(attitude=eager), turned(30, 0), 1)[0].diagnostics
+    diagnostics = steps(*build(attitude=eager), leaning(30, 0), 1)[0].diagnostics
     assert diagnostics.active.rates > 0
     assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)

@@ -5,15 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.rotor_loss.detector import ALARM, MAX_EVIDENCE, RotorWatch
-from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.plant_flights import rpm
+from tests.support.states import state_of
 
 HUMMINGBIRD = load_vehicle("hummingbird")
 SAMPLE_US = 8000
@@ -25,14 +24,11 @@ LEVEL = Start(z=50.0, rotors=4740.0)
 commands = st.tuples(*[st.floats(0.55, 0.7)] * 4)
 about_hover = st.tuples(*[st.floats(0.58, 0.65)] * 4)
 """Hover's command is 0.59. A rotor that is commanded less than that while the others are not is missed later."""
-rates = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
-angles = st.tuples(*[st.floats(-180.0, 180.0)] * 3)
-
-
-def told(world: World) -> VehicleState:
-    frame = state_frame(world)
-    euler = euler_from_quaternion(frame.attitude)
-    return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+starts = st.builds(
+    LEVEL._replace,
+    **dict.fromkeys(("p", "q", "r"), st.floats(-10.0, 10.0)),
+    **dict.fromkeys(("phi", "theta", "psi"), st.floats(-180.0, 180.0)),
+)
 
 
 class Watched:
@@ -45,7 +41,7 @@ class Watched:
         self.see()
 
     def see(self) -> None:
-        self.watch.step(told(self.world), self._controls, 0.0, airborne=True)
+        self.watch.step(state_of(self.world), self._controls, 0.0, airborne=True)
 
     def fly(self, physics: Physics, samples: int) -> int | None:
         for sample in range(samples):
@@ -71,13 +67,8 @@ def test_a_lost_rotor_is_named_after_two_samples(rotor: int) -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(about_hover, rates, angles, st.integers(0, 3))
-def test_it_is_named_in_any_attitude_and_at_any_rate(
-    controls: FourRotors, pqr: tuple[float, ...], euler: tuple[float, ...], rotor: int
-) -> None:
-    p, q, r = pqr
-    phi, theta, psi = euler
-    start = Start(z=50.0, phi=phi, theta=theta, psi=psi, p=p, q=q, r=r, rotors=4740.0)
+@given(about_hover, starts, st.integers(0, 3))
+def test_it_is_named_in_any_attitude_and_at_any_rate(controls: FourRotors, start: Start, rotor: int) -> None:
     flight = Watched(controls, start)
     assert flight.fly(WHOLE, 5) is None
     assert flight.fly(lacking(rotor), WITHIN_SAMPLES) is not None
@@ -85,13 +76,8 @@ def test_it_is_named_in_any_attitude_and_at_any_rate(
 
 
 @settings(max_examples=30, deadline=None)
-@given(commands, rates, angles, st.integers(0, 3), st.floats(0.6, 1.0))
-def test_a_weak_rotor_is_none_that_is_lost(
-    controls: FourRotors, pqr: tuple[float, ...], euler: tuple[float, ...], rotor: int, part: float
-) -> None:
-    p, q, r = pqr
-    phi, theta, psi = euler
-    start = Start(z=50.0, phi=phi, theta=theta, psi=psi, p=p, q=q, r=r, rotors=4740.0)
+@given(commands, starts, st.integers(0, 3), st.floats(0.6, 1.0))
+def test_a_weak_rotor_is_none_that_is_lost(controls: FourRotors, start: Start, rotor: int, part: float) -> None:
     flight = Watched(controls, start)
     assert flight.fly(lacking(rotor, part), 25) is None
     assert flight.watch.max_evidence < 0.5 * ALARM
@@ -116,7 +102,7 @@ def test_a_noisy_gyroscope_is_no_rotor(noise_rad_s: float) -> None:
     hover = HUMMINGBIRD.hover_speed / HUMMINGBIRD.rotors.max_speed
     watch = RotorWatch(HUMMINGBIRD, SAMPLE_US * 1e-6)
     watch.begin((hover, hover, hover, hover))
-    still = told(starting_world(LEVEL, HUMMINGBIRD))
+    still = state_of(starting_world(LEVEL, HUMMINGBIRD))
     for _ in range(1000):
         p, q, r = (noise_rad_s * random.standard_normal(3)).tolist()
         watch.step(still._replace(rate_flu_rad_s=(p, q, r)), (hover, hover, hover, hover), 0.0, airborne=True)
@@ -127,6 +113,6 @@ def test_on_the_ground_nothing_is_lost() -> None:
     flight = Watched((0.6, 0.6, 0.6, 0.6))
     for _ in range(10):
         flight.world = lacking(0).step(flight.world, ActuatorCommand(0, (0.6,) * 4, armed=True), SAMPLE_US)
-        flight.watch.step(told(flight.world), (0.6, 0.6, 0.6, 0.6), 0.0, airborne=False)
+        flight.watch.step(state_of(flight.world), (0.6, 0.6, 0.6, 0.6), 0.0, airborne=False)
     assert flight.watch.lost is None
     assert flight.watch.max_evidence == 0.0

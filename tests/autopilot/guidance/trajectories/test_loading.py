@@ -113,12 +113,6 @@ def test_samples_that_contradict_are_refused(tmp_path: Path, line: int, column: 
     assert str(refused.value) == f"{tmp_path / 'track.csv'}: {why}"
 
 
-def test_samples_below_the_ground_are_refused(tmp_path: Path) -> None:
-    lines = [line.replace(",3.000000,", ",-3.000000,") for line in samples(0.05)[0]]
-    with pytest.raises(TrackError, match=r"is at -3\.00 m after 0\.00 s, below the floor of 0 m"):
-        loaded(write(tmp_path, lines))
-
-
 EXAMPLE = example("tracks.md")
 
 
