@@ -30,14 +30,12 @@ class Sample(NamedTuple):
         state: At that time.
         guidance: The references it was decided by.
         decision: Of this sample; None while the rotors stand or idle, or an earlier decision is being made.
-        duration_s: Time of the computation.
     """
 
     now_us: int
     state: VehicleState
     guidance: Guidance
     decision: Decision | None
-    duration_s: float = 0.0
 
 
 class Stages(Protocol):
@@ -95,8 +93,8 @@ class Stages(Protocol):
     def faults(self) -> tuple[Fault, ...]:
         """Return the faults to request of the plant."""
 
-    def sampled(self, sample: Sample) -> None:
-        """Take in a control sample that was flown, to report it in `serve`."""
+    def sampled(self, sample: Sample, duration_s: float) -> None:
+        """Take in a control sample that was flown, and the time of its computation, to report it in `serve`."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
         """Do the work that needs no answer in time; serve ground stations, and return what to send them."""
@@ -147,14 +145,14 @@ class Autopilot(Generic[StagesT]):
         command = stages.actuate(now_us)
         stages.delay.sent(command)
         duration_s = self._clock() - started_s
-        if flown is not None:
-            stages.sampled(flown._replace(duration_s=duration_s))
-        return Step(
-            *(command, decision, duration_s, estimate, stages.faults()),
-            delay_us=stages.delay.delay_us,
-            frame=frame if due else None,
-            references=None if flown is None else flown.guidance.horizon,
-        )
+        if flown is None:
+            references = None
+        else:
+            references = flown.guidance.horizon
+            stages.sampled(flown, duration_s)
+        asked = frame if due else None
+        faults, delay_us = stages.faults(), stages.delay.delay_us
+        return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
 
     def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
         """Do what waits until a frame is answered, while the plant integrates; return what to send ground stations."""

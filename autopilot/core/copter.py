@@ -20,7 +20,7 @@ from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.guidance import Guidance
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.faults import Fault
-from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
+from colibri.mavlink.hil.plant_status import NOTHING, PlantBattery, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.node.hub import Outgoing
@@ -94,7 +94,7 @@ class Copter:
         self._flying = Flying(parts)
         self._start = FlightStart(parts, self._supervision, checkpointer, history, start_speed)
         self._reporter = Reporter(parts)
-        self._sample: Sample | None = None
+        self._sampled: tuple[Sample, Decision | None, float] | None = None
         self._plant_status = NOTHING
         self.time_us: int | None = None
         self._waiting_us: int | None = None
@@ -119,15 +119,15 @@ class Copter:
         self._plant_status, self.defence.frame = plant_status, frame
         battery = plant_status.battery
         if battery is not None:
-
-            def know_charge() -> None:
-                self.loop.know_charge(battery.used_ah)
-                self.parts.battery.receive(battery)
-
-            self.guard(table.BATTERY, know_charge, _nothing)
+            self.guard(table.BATTERY, self._know_charge, _nothing, battery)
         if plant_status.delay_us is not None:
             self.delay.measure(plant_status.delay_us)
-        self.guard(table.RESTART, self._start.wake, _nothing, frame.time_us)
+        if self._start.wakes:
+            self.guard(table.RESTART, self._start.wake, _nothing, frame.time_us)
+
+    def _know_charge(self, battery: PlantBattery) -> None:
+        self.loop.know_charge(battery.used_ah)
+        self.parts.battery.receive(battery)
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
         """Return the state at a frame, or unless `now` the one before, whatever the estimator does."""
@@ -144,15 +144,14 @@ class Copter:
 
         Where the start raises, start once more without the past, and then descend.
         """
-
-        def begin() -> bool:
-            self._start.begin(known, self.time_us)
-            self.delay.begin(self.parts.actuation.sent)
-            return True
-
-        if begins and not any(self.guard(part, begin, lambda: False) for part in (table.RESTART, table.START)):
+        if begins and not any(self.guard(part, self._begin, bool, known) for part in (table.RESTART, table.START)):
             self._flying.descend(now_us)
         self.time_us = now_us
+
+    def _begin(self, known: StateFrame) -> bool:
+        self._start.begin(known, self.time_us)
+        self.delay.begin(self.parts.actuation.sent)
+        return True
 
     def ahead(self, known: StateFrame) -> StateFrame:
         """Return the state at which a command of now takes effect."""
@@ -185,9 +184,9 @@ class Copter:
         """Return the faults that ground stations have injected."""
         return self.guard(table.FAULTS, self.stations.failures.take, tuple)
 
-    def sampled(self, sample: Sample) -> None:
+    def sampled(self, sample: Sample, duration_s: float) -> None:
         """Take in a sample, with the decision that is flown, to report it in `serve`."""
-        self._sample = sample._replace(decision=self.parts.actuation.decision)
+        self._sampled = sample, self.parts.actuation.decision, duration_s
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Serve ground stations, and return what to send them; after each step, while the plant integrates."""
@@ -198,7 +197,8 @@ class Copter:
         plant_status, self._plant_status = self._plant_status, NOTHING
         self.guard(table.STATIONS, self.stations.receive_status, _nothing, plant_status, now_us)
         self._receive_from_stations(inbox, now_us)
-        self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
+        if self.parameters.revision != self.parts.subscribers.revision:
+            self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
         return self.stations.poll(now_us)
 
     def record(self) -> Checkpoint | None:
@@ -213,12 +213,14 @@ class Copter:
 
     def _report(self) -> None:
         """Report a control sample; where that raises, ground stations read the mode, and old values beside it."""
-        sample, self._sample = self._sample, None
-        if sample is not None:
-            self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, sample)
+        sampled, self._sampled = self._sampled, None
+        if sampled is not None:
+            self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, *sampled)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
         """Pass on what came; a datagram that raises is dropped."""
+        if not inbox:
+            return
         arriving = iter(inbox)
         while self.guard(table.DATAGRAM, self._receive_one, _true, arriving, now_us):
             pass

@@ -16,6 +16,7 @@ class FlightStart:
 
     Attributes:
         resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
+        wakes: Whether the estimator is to be resumed before the next frame.
     """
 
     def __init__(
@@ -29,14 +30,14 @@ class FlightStart:
         """Start a vehicle of these parts, from `history` if there is one; at time 0 rotors turn at `start_speed`."""
         self._parts, self._supervision, self._checkpointer = parts, supervision, checkpointer
         self._history = history
-        self._wakes = history is not None
+        self.wakes = history is not None
         self._start_speed = start_speed
         self.resumed = ""
 
     def wake(self, time_us: int) -> None:
         """Resume the estimator before it takes in the first frame."""
-        wakes, self._wakes = self._wakes, False
-        if wakes and self._history is not None and self._history.checkpoint.state_source:
+        self.wakes = False
+        if self._history is not None and self._history.checkpoint.state_source:
             self._parts.state_source.resume(self._history.checkpoint.state_source, time_us)
 
     def begin(self, frame: StateFrame, before_us: int | None) -> None:

@@ -18,6 +18,7 @@ class Flying:
     def __init__(self, parts: Parts) -> None:
         self._parts, self._guard = parts, parts.defence.guard
         self._blind = False
+        self._now_us = 0
 
     @property
     def armed(self) -> bool:
@@ -49,25 +50,27 @@ class Flying:
 
     def guide(self, now_us: int) -> Guidance:
         """Return the pilot's references; where the task raises, those of hold, and where that does, none."""
-        pilot = self._parts.pilot
+        pilot, self._now_us = self._parts.pilot, now_us
         if self._parts.actuation.descent is not None:
             return RESTS
-        holds = not isinstance(pilot.task, HoldTask) and pilot.state.mode is not Mode.LAND
+        if isinstance(pilot.task, HoldTask) or pilot.state.mode is Mode.LAND:
+            return self._guard(table.GUIDANCE, pilot.step, self._last_resort)
+        return self._guard(table.TASK, pilot.step, self._hold)
 
-        def hold() -> Guidance:
-            pilot.save(Action.HOLD)
-            return pilot.step()
-
-        def last_resort() -> Guidance:
-            self.descend(now_us)
+    def _hold(self) -> Guidance:
+        """Replace a task that has raised by hold."""
+        if not self._parts.pilot.state.armed:
             return RESTS
+        return self._guard(table.GUIDANCE, self._step_hold, self._last_resort)
 
-        def instead() -> Guidance:
-            if not pilot.state.armed:
-                return RESTS
-            return self._guard(table.GUIDANCE, hold, last_resort) if holds else last_resort()
+    def _step_hold(self) -> Guidance:
+        self._parts.pilot.save(Action.HOLD)
+        return self._parts.pilot.step()
 
-        return self._guard(table.TASK if holds else table.GUIDANCE, pilot.step, instead)
+    def _last_resort(self) -> Guidance:
+        if self._parts.pilot.state.armed:
+            self.descend(self._now_us)
+        return RESTS
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         """Return the decision of the control law, or of what flies in its place."""
@@ -84,11 +87,6 @@ class Flying:
         parts = self._parts
         flown = table.THREE_ROTORS if parts.rotor_loss.flies else table.LAW
 
-        def by_law() -> Decision | None:
-            solve_time_s = parts.pilot.behaviour.solve_time_s
-            felt = state if parts.pilot.ground.clear(state) else state._replace(airborne=False)
-            return parts.actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
-
         def instead() -> Decision | None:
             if flown is table.THREE_ROTORS and flown not in parts.defence.off:
                 return None
@@ -96,7 +94,13 @@ class Flying:
             parts.actuation.by_plain_law = True
             return self._decide_plainly(now_us, state, guidance)
 
-        return self._guard(flown, by_law, instead)
+        return self._guard(flown, self._by_law, instead, now_us, state, guidance)
+
+    def _by_law(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        parts = self._parts
+        felt = state if parts.pilot.ground.clear(state) else state._replace(airborne=False)
+        solve_time_s = parts.pilot.behaviour.solve_time_s
+        return parts.actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
 
     def _decide_plainly(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         actuation, pilot = self._parts.actuation, self._parts.pilot

@@ -26,7 +26,11 @@ class Flown(NamedTuple):
 
 
 class Subscribers:
-    """Callbacks that adopt a change, by what they take."""
+    """Callbacks that adopt a change, by what they take.
+
+    Attributes:
+        revision: Of the parameters that were adopted last.
+    """
 
     def __init__(
         self,
@@ -48,13 +52,13 @@ class Subscribers:
         """
         self._parameters, self._behaviour, self._law, self._vehicle = parameters, behaviour, law, vehicle
         self._flown = flown
-        self._revision = 0
+        self.revision = 0
 
     def adopt(self, parameters: Parameters) -> None:
         """Call back with the changes since the last call, if there are any."""
-        if parameters.revision == self._revision:
+        if parameters.revision == self.revision:
             return
-        self._revision, made = parameters.revision, parameters.take_made()
+        self.revision, made = parameters.revision, parameters.take_made()
         tuned = made if isinstance(made, Tuned) else None
         for call in self._calls(parameters, tuned):
             call()
@@ -67,7 +71,7 @@ class Subscribers:
             return
         parameters.load(self._flown.values)
         parameters.take_made()
-        self._revision = parameters.revision
+        self.revision = parameters.revision
         calls = list[Callable[[], None]]()
         with suppress(Exception):  # what has raised may raise again, and has adopted nothing
             calls += self._calls(parameters, self._flown.tuned)

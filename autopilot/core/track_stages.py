@@ -138,7 +138,7 @@ class TrackStages:
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         """Return the decision of the control law."""
         assert guidance.horizon is not None, "a track has references at any time"
-        felt = state._replace(airborne=is_clear(self._landing, state, self._ground_m))
+        felt = VehicleState(*state[:-1], airborne=is_clear(self._landing, state, self._ground_m))
         return self.loop.decide(now_us, felt, guidance.horizon, guidance.pace)
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
@@ -154,7 +154,7 @@ class TrackStages:
         """Return none."""
         return ()
 
-    def sampled(self, sample: Sample) -> None:
+    def sampled(self, sample: Sample, duration_s: float) -> None:
         """Report nothing."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":

@@ -85,9 +85,11 @@ class StateSource:
         self.estimate = self._estimating.last
 
     def state(self) -> StateFrame | None:
-        if self._estimating is not None and self._given is None:
+        if self._given is not None:
+            return self._given
+        if self._estimating is not None:
             self.estimate = self._estimating.estimate()
-        return self.last
+        return None if self.estimate is None else self.estimate.frame
 
     @property
     def last(self) -> StateFrame | None:

@@ -152,6 +152,7 @@ class Stations:
             caught=defence.caught,
         )
         self.snapshot: Snapshot | None = None
+        self._logged: Snapshot | None = None
         self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
 
     def use(self, channel: int, kind: str) -> None:
@@ -191,9 +192,13 @@ class Stations:
         self._guard("hub", self._poll_hub, _nothing, now_us)
         said = self._text.take()
         self._said.extend(said)
-        armed = self._pilot.state.armed
-        self._guard("flight log", lambda: self.log.update(self.snapshot, said, now_us, armed=armed), _nothing)
+        if said or self.snapshot is not self._logged:  # at control samples, not at each frame
+            self._logged = self.snapshot
+            self._guard("flight log", self._log_flight, _nothing, said, now_us)
         return self.take_outbox()
+
+    def _log_flight(self, said: list[Line], now_us: int) -> None:
+        self.log.update(self.snapshot, said, now_us, armed=self._pilot.state.armed)
 
     def _poll_hub(self, now_us: int) -> None:
         for severity, text in self._lines.take():

@@ -107,7 +107,7 @@ class Ground:
         """Answer ground stations last: acknowledged changes are then on disk, even if the process is killed."""
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
-        if self._log:
+        if self._log and received:
             received = self._recorded(self._log, received)
         outbox = self.autopilot.serve(received)
         self._record_told()

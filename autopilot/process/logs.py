@@ -60,7 +60,10 @@ class AutopilotLog:
         self._fallback: Fallback | None = None
 
     def write(self, step: Step, datagram: bytes | None = None) -> None:
-        """Append a control sample; between samples, only command and filter check. A replay lacks the `datagram`."""
+        """Append a control sample; between samples, only command and filter check.
+
+        The `datagram` is empty where only the state was sent, and None in a replay.
+        """
         time_us = step.command.time_us
         if time_us < self._time_us:
             self._begin_anew()
@@ -145,7 +148,7 @@ class AutopilotLog:
             self.topics.append(encode_input(time_us, Kind.SETUP, encoded(setup)))
         if datagram is None:
             return
-        if self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES:
+        if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
             self.topics.queue(encode_input(time_us, Kind.FRAME, datagram))
         self.topics.add(COMMAND, (time_us / 1e6, *controls, armed))
 

@@ -9,9 +9,11 @@ from colibri.common.types import Address
 from colibri.flights.snapshots import Snapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.plant_status import NOTHING
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, command_as_received, state_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
@@ -32,7 +34,7 @@ class Answered(NamedTuple):
 
     Attributes:
         faults: Faults and changes of the world that come with it.
-        datagram: The frame as the autopilot received it; `None` on a wire without datagrams.
+        datagram: The frame as the autopilot received it; empty where it was only rounded, None on a wire without any.
     """
 
     step: Step
@@ -111,7 +113,10 @@ class Direct:
 
 
 class InMemory:
-    """Carries the datagrams of two processes in memory."""
+    """Carries the datagrams of two processes in memory.
+
+    A frame with nothing but the state is only rounded as its datagram would round it, unless traffic is recorded.
+    """
 
     def __init__(
         self, frame_interval_us: int, feedback: Feedback, system_id: int = SYSTEM_ID, traffic: Traffic | None = None
@@ -128,10 +133,25 @@ class InMemory:
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         now_us = plant.world.time_us
         frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
-        self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
-        step, datagram = self._to_autopilot(now_us, autopilot)
+        alone = plant_status == NOTHING and now_us % HEARTBEAT_EVERY_US != 0
+        if alone and self._traffic is None and isinstance(frame, StateFrame):
+            received, datagram = state_as_received(frame), b""
+            assert received is not None, "the plant's state is finite"
+            step = autopilot.step(received)
+            self.autopilot_end.follow(now_us)
+            if not step.faults:
+                command = command_as_received(step.command)
+                assert command is not None, "a control law's command is one that rotors can follow"
+                return Answered(step, command, (), datagram)
+            self.plant_end.offer(frame, NEVER_LATE_S)
+            self.plant_end.take_outbox()
+            self.autopilot_end.answer(step.command, step.faults)
+        else:
+            self.plant_end.offer(frame, NEVER_LATE_S, plant_status)
+            answered, datagram = self._to_autopilot(now_us, autopilot)
+            assert answered is not None, "the autopilot answers every new frame"
+            step = answered
         command = self._to_plant(now_us)
-        assert step is not None, "the autopilot answers every new frame"
         assert command is not None, "the answer names the frame awaited"
         return Answered(step, command, self.plant_end.take_faults(), datagram)
 

@@ -97,6 +97,10 @@ class AutopilotEnd:
         following = self._next(frame, now_s)
         return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
+    def follow(self, time_us: int) -> None:
+        """Go on from the frame of a time that was answered without a datagram."""
+        self._time_us = time_us
+
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Send and remember the answer to the last frame, with faults for that time."""
         answer = encode_actuators(self._codec, command)

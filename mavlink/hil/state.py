@@ -9,7 +9,7 @@ from typing import NamedTuple
 from colibri.common.types import FourRotors, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from colibri.mavlink.wire.ned import ned_frd_state
 
 ROTORS = 4
 LOCKSTEP_FLAG = 1
@@ -20,6 +20,9 @@ _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspee
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
 STATE_BYTES = _ATTITUDE.size + _POSITION.size
 """Size of a state frame's datagram."""
+"""Size of a datagram that is nothing but a frame of state feedback."""
+_DISARMED = MODE_CUSTOM | MODE_HIL
+_ARMED = _DISARMED | MODE_ARMED
 _ACTUATORS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
 
 
@@ -43,12 +46,22 @@ class ActuatorCommand(NamedTuple):
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
     """Encode a frame as ATTITUDE_QUATERNION and LOCAL_POSITION_NED of the same `time_boot_ms`."""
+    turning, moving = _numbers(frame)
+    return [_ATTITUDE.encode(codec, turning), _POSITION.encode(codec, moving)]
+
+
+def state_as_received(frame: StateFrame) -> StateFrame | None:
+    """Return what `read_state` reads of a frame that `encode_state` has written, without the datagram."""
+    turning, moving = _numbers(frame)
+    return _state(*_ATTITUDE.rounded(turning), *_POSITION.rounded(moving))
+
+
+def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the fields of ATTITUDE_QUATERNION and of LOCAL_POSITION_NED."""
     time_us, position, velocity, attitude, rate = frame
     time_boot_ms = time_us // 1000
-    return [
-        _ATTITUDE.encode(codec, (time_boot_ms, *ned_frd_from_enu_flu(attitude), *frd_from_flu(rate))),
-        _POSITION.encode(codec, (time_boot_ms, *ned_from_enu(position), *ned_from_enu(velocity))),
-    ]
+    position, velocity, attitude, rate = ned_frd_state(position, velocity, attitude, rate)
+    return (time_boot_ms, *attitude, *rate), (time_boot_ms, *position, *velocity)
 
 
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
@@ -89,19 +102,21 @@ def _state(
     if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
         return None
     norm = sqrt(squared)
-    return StateFrame(
-        attitude_ms * 1000,
-        ned_from_enu((x, y, z)),
-        ned_from_enu((vx, vy, vz)),
-        ned_frd_from_enu_flu((q1 / norm, q2 / norm, q3 / norm, q4 / norm)),
-        frd_from_flu((rollspeed, pitchspeed, yawspeed)),
-    )
+    attitude = (q1 / norm, q2 / norm, q3 / norm, q4 / norm)
+    state = ned_frd_state((x, y, z), (vx, vy, vz), attitude, (rollspeed, pitchspeed, yawspeed))
+    return StateFrame(attitude_ms * 1000, *state)
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
     time_us, controls, armed = command
-    mode = MODE_CUSTOM | MODE_HIL | (MODE_ARMED if armed else 0)
-    return _ACTUATORS.encode(codec, (time_us, LOCKSTEP_FLAG, *controls, mode))
+    return _ACTUATORS.encode(codec, (time_us, LOCKSTEP_FLAG, *controls, _ARMED if armed else _DISARMED))
+
+
+def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
+    """Return what `read_actuators` reads of a command that `encode_actuators` has written, without the datagram."""
+    time_us, controls, armed = command
+    mode = _ARMED if armed else _DISARMED
+    return _command(*_ACTUATORS.rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
 
 
 def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:

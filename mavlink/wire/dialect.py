@@ -152,12 +152,17 @@ class Codec:
         """Return the next frame with this payload, without trailing zeros."""
         if not payload[-1]:
             payload = payload.rstrip(b"\0") or b"\0"
-        sequence, seal = self._sequence, self.seal
-        self._sequence = (sequence + 1) % 256
+        seal = self.seal
         flags = 0 if seal is None else SIGNED
-        covered = bytes((len(payload), flags, 0, sequence)) + self._source_bytes + message_id + payload
+        covered = bytes((len(payload), flags, 0, self.next_sequence())) + self._source_bytes + message_id + payload
         frame = _MARKER + covered + crc16(covered + crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
         return frame if seal is None else frame + seal(frame)
+
+    def next_sequence(self) -> int:
+        """Return the sequence number of the next frame, and count on."""
+        sequence = self._sequence
+        self._sequence = (sequence + 1) % 256
+        return sequence
 
     def decode(self, datagram: bytes) -> list[Message]:
         """Return the messages of a datagram of whole frames."""

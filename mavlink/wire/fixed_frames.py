@@ -11,6 +11,8 @@ from typing import Any
 
 from colibri.mavlink.wire.dialect import CRC_BYTES, CRC_START, HEADER_BYTES, MARKER, Codec, crc16, definition_of
 
+_HEADER = Struct("<4s3B3s").pack
+
 
 class FixedFrame:
     """A message up to one of its fields; `size` is the frame's length."""
@@ -19,8 +21,7 @@ class FixedFrame:
         """Lay out the first fields of message `name`, in wire order, separated by spaces; the rest is zero.
 
         "controls[4]" is the first four numbers of an array. "fields_updated:H" has another size, by its `struct`
-        letter:
-        trailing zero bytes are not sent.
+        letter: trailing zero bytes are not sent.
 
         Raises:
             ValueError: The dialect has other fields there.
@@ -28,7 +29,7 @@ class FixedFrame:
         definition = definition_of(name)
         numbers = "".join(_formats(definition, fields))
         payload = Struct("<" + numbers)
-        self._pack = payload.pack
+        self._pack, self._unpack = payload.pack, payload.unpack
         self._unpack_from = Struct(f"<4sB2s3s{numbers}H").unpack_from
         self._begins = bytes((MARKER, payload.size, 0, 0))
         self._id = definition.id.to_bytes(3, "little")
@@ -37,7 +38,15 @@ class FixedFrame:
         self.size = self._crc_at + CRC_BYTES
 
     def encode(self, codec: Codec, numbers: Sequence[Any]) -> bytes:
-        return codec.framed(self._pack(*numbers), self._id, self._crc_extra)
+        payload = self._pack(*numbers)
+        if codec.seal is not None or not payload[-1]:
+            return codec.framed(payload, self._id, self._crc_extra)
+        frame = _HEADER(self._begins, codec.next_sequence(), *codec.source, self._id) + payload
+        return frame + crc16(frame[1:] + self._crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
+
+    def rounded(self, numbers: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the numbers as a receiver reads them."""
+        return self._unpack(self._pack(*numbers))
 
     def read(self, datagram: bytes, at: int, source: bytes) -> tuple[Any, ...] | None:
         """Return the numbers of the frame at byte `at`; `None` unless it is an intact, unsigned one of `source`."""

@@ -20,7 +20,7 @@ class HostileWire(InMemory):
 
     def __init__(self, burst: int = 0, fuzzers: tuple[Fuzzer, Fuzzer] | None = None) -> None:
         self._burst, self._fuzzers, self._now_us = burst, fuzzers, 0
-        super().__init__(FRAME_US, Feedback.STATE)
+        super().__init__(FRAME_US, Feedback.STATE, traffic=lambda *_: None)  # every frame is a datagram then
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
         return self._among(datagrams, 1)

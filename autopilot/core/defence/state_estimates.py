@@ -31,7 +31,7 @@ class StateEstimates:
         """Return the state at a frame, or unless `now` the one before; None as long as there never was one."""
         guard, source = self._defence.guard, self._source
         if not self.blind:
-            worked, known = guard(table.ESTIMATOR, lambda: (True, self._estimated(frame, now)), lambda: (False, None))
+            worked, known = guard(table.ESTIMATOR, self._estimated, _failed, frame, now)
             if worked:
                 self._inertial, self._missed = None, 0
                 return known
@@ -40,11 +40,11 @@ class StateEstimates:
         last = None if source.estimate is None else source.estimate.frame
         return guard(table.STANDBY, lambda: self._carry_on(frame), lambda: last)
 
-    def _estimated(self, frame: Frame, now: bool) -> StateFrame | None:
+    def _estimated(self, frame: Frame, now: bool) -> tuple[bool, StateFrame | None]:
         """Have the estimator do all work of a frame within it: what it raises belongs to this frame."""
         self._source.receive(frame)
         self._source.advance()
-        return self._source.state() if now else self._source.last
+        return True, self._source.state() if now else self._source.last
 
     def _carry_on(self, frame: SensorFrame) -> StateFrame | None:
         estimate, self._source.sensed = self._source.estimate, frame
@@ -72,3 +72,7 @@ class StateEstimates:
             )
         self._source.estimate = estimate
         return known
+
+
+def _failed() -> tuple[bool, StateFrame | None]:
+    return False, None
