@@ -83,9 +83,9 @@ class Commands:
         if relative == 1.0:
             return Refusal("speed refused: only absolute ones can be set", UNSUPPORTED)
         if speed == _DEFAULT_SPEED:
-            self._pilot.fly_at(None)
+            self._pilot.speed_m_s = None
         elif self.motion.may_fly_at(speed):
-            self._pilot.fly_at(speed)
+            self._pilot.speed_m_s = speed
         elif speed != _SAME_SPEED:
             return denied("speed", f"{speed:g} m/s")
         return None

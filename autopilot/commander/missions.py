@@ -23,7 +23,12 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Missions:
-    """The mission of one vehicle, checked against its fence; `changes` counts uploads."""
+    """The mission of one vehicle, and the plans around it.
+
+    Attributes:
+        outside, below: Why items lead outside the fence or below the ground; empty if they do not.
+        changes: Number of uploads.
+    """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
         self._home = home
@@ -31,21 +36,13 @@ class Missions:
         self._lines = lines
         self._behaviour = behaviour
         self._executor = MissionExecutor()
-        self._outside = self._below = ""
+        self.outside = self.below = ""
         self._reached: list[int] = []
         self.changes = 0
 
     @property
     def has_mission(self) -> bool:
         return bool(self._executor.items)
-
-    @property
-    def leaves_fence(self) -> bool:
-        return bool(self._outside)
-
-    @property
-    def leads_below_ground(self) -> bool:
-        return bool(self._below)
 
     def adopt(self, behaviour: Behaviour) -> None:
         self._behaviour = behaviour
@@ -79,8 +76,8 @@ class Missions:
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
         """Continue the current item after a restart."""
         behaviour = self._behaviour
-        self._executor.adopt(
-            Defaults(max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m)
+        self._executor.defaults = Defaults(
+            max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
         )
         return MissionTask(self._executor, self, turns, legs)
 
@@ -124,16 +121,16 @@ class Missions:
 
     def _check_mission(self) -> None:
         """Warn of items outside the fence or below the ground; legs between items are not checked."""
-        home, items, said = self._home, self._executor.items, (self._outside, self._below)
+        home, items, said = self._home, self._executor.items, (self.outside, self.below)
         found = list(places(items, home.position_enu_m, home.origin))
         outside = ((seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place)))
         flown = ((seq, place) for seq, place in found if items[seq].command != mav.MAV_CMD_NAV_LAND)
         below = ((seq, refusal.reason) for seq, place in flown if (refusal := home.refusal(place[2])))
-        self._outside, self._below = (
+        self.outside, self.below = (
             f"item {seq} of the mission: {reason}" if reason else ""
             for seq, reason in (next(outside, (0, "")), next(below, (0, "")))
         )
-        for text in (self._outside, self._below):
+        for text in (self.outside, self.below):
             if text and text not in said:
                 self._lines.say(WARNING, text)
 

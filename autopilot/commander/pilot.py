@@ -250,9 +250,6 @@ class Pilot:
         self._follow(_SAVED_BY[action], "")
         self._engage(self.state.mode)
 
-    def fly_at(self, speed_m_s: float | None) -> None:
-        self.speed_m_s = speed_m_s
-
     def happened(self, event: Event) -> None:
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led

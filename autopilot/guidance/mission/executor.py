@@ -84,7 +84,7 @@ class MissionExecutor:
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
         self.defaults = defaults
-        self._items: tuple[MissionItem, ...] = ()
+        self.items: tuple[MissionItem, ...] = ()
         self.progress = Progress()
         self._order: Order = _HOLD
         self._speed_m_s: float | None = None
@@ -98,25 +98,18 @@ class MissionExecutor:
         self.load(items)
 
     @property
-    def items(self) -> tuple[MissionItem, ...]:
-        return self._items
-
-    @property
     def active(self) -> bool:
         return self.progress.state == ACTIVE
 
     def load(self, items: Sequence[MissionItem]) -> None:
         """Replace the plan; an active mission restarts."""
         flying = self.active
-        self._items = tuple(items)
+        self.items = tuple(items)
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
 
-    def adopt(self, defaults: Defaults) -> None:
-        self.defaults = defaults
-
     def start(self) -> Refusal | None:
-        if not self._items:
+        if not self.items:
             return Refusal("mission: there is none")
         if self.progress.state == COMPLETE:
             self._reset()
@@ -133,7 +126,7 @@ class MissionExecutor:
             return ()
         seq = self.progress.seq
         self._leave()
-        if not item_flown or self._items[seq].command != mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+        if not item_flown or self.items[seq].command != mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             self._show(seq, PAUSED)
             return ()
         self._advance()
@@ -143,10 +136,10 @@ class MissionExecutor:
 
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
         """Go to an item, -1 for the current one; `reset` resets the jumps."""
-        if not self._items:
+        if not self.items:
             return Refusal("mission: there is none")
         seq = self.progress.seq if seq == -1 else seq
-        if not 0 <= seq < len(self._items):
+        if not 0 <= seq < len(self.items):
             return Refusal(f"mission: there is no item {seq}")
         if reset:
             self._jumps.clear()
@@ -182,7 +175,7 @@ class MissionExecutor:
         )
 
     def resume(self, record: MissionRecord) -> None:
-        if not 0 <= record.seq < len(self._items):
+        if not 0 <= record.seq < len(self.items):
             return
         self._order, self._speed_m_s, self._jumps = order_of(record.order), record.speed_m_s, dict(record.jumps)
         self._leave()
@@ -192,13 +185,13 @@ class MissionExecutor:
             return
         order = order_of(record.order_before)
         self._context = ItemContext(record.mission_context, record.defaults, order, record.speed_m_s)
-        phases = list(phases_of(self._items[record.seq], self._context))
+        phases = list(phases_of(self.items[record.seq], self._context))
         self._phases = phases[max(len(phases) - record.phases, 0) :]
         self._since_us, self._fresh = record.since_us, record.fresh
 
     def _fly(self, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> bool:
         seq = self.progress.seq
-        item = self._items[seq]
+        item = self.items[seq]
         if self._phases is None:
             self._context = ItemContext(mission_context, self.defaults, self._order, self._speed_m_s)
             self._phases = list(phases_of(item, self._context))
@@ -256,10 +249,10 @@ class MissionExecutor:
     def _advance(self) -> None:
         self._leave()
         seq = self.progress.seq + 1
-        if seq < len(self._items):
+        if seq < len(self.items):
             self._show(seq, ACTIVE)
         else:
-            self._show(len(self._items) - 1, COMPLETE)
+            self._show(len(self.items) - 1, COMPLETE)
 
     def _leave(self) -> None:
         self._phases = None

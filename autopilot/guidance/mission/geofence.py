@@ -5,9 +5,9 @@ inside all inclusion zones of one group (parameter 2), and outside all exclusion
 placeholders.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import hypot, inf, isfinite, isnan
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -60,14 +60,6 @@ def check_fence(items: Sequence[MissionItem]) -> int:
 FENCE_RULES = Rules(check_fence_item, check_fence)
 
 
-class Zone(Protocol):
-    """An area of the ground."""
-
-    def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return the depth inside, m; negative outside."""
-        ...
-
-
 class Disc(NamedTuple):
     """The inside of a circle."""
 
@@ -76,6 +68,7 @@ class Disc(NamedTuple):
     radius_m: float
 
     def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return the depth inside, m; negative outside."""
         return self.radius_m - hypot(east_m - self.east_m, north_m - self.north_m)
 
 
@@ -102,22 +95,20 @@ class Polygon:
         return nearest if np.count_nonzero(crossed) % 2 else -nearest
 
 
-class Geofence:
-    """A fence in ENU, m."""
+Zone: TypeAlias = Disc | Polygon
 
-    def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
-        self.max_height_m = max_height_m
-        self.return_point_enu_m: tuple[float, float] | None = None
+
+class Geofence:
+    """A fence in ENU, m; return points are accepted, and ignored."""
+
+    def __init__(self, items: Sequence[MissionItem], origin: Geodetic) -> None:
         self._groups: dict[float, list[Zone]] = {}
         self._exclusions: list[Zone] = []
         for zone in _zones(items):
             self._add(zone[0], [_place(item, origin) for item in zone])
 
     def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
-        if item.command == RETURN_POINT:
-            self.return_point_enu_m = places[0]
-            return
-        if item.command in CIRCLES and item.p1 == 0.0:
+        if item.command == RETURN_POINT or (item.command in CIRCLES and item.p1 == 0.0):
             return
         zone: Zone = Polygon(places) if item.command in POLYGONS else Disc(*places[0], item.p1)
         if item.command in INCLUSIONS:
@@ -130,19 +121,11 @@ class Geofence:
         east, north, up = position_enu_m
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
-        margin = self.max_height_m - up
-        if self._groups:
-            groups: Mapping[float, list[Zone]] = self._groups
-            margin = min(margin, max(min(zone.depth_m(east, north) for zone in zones) for zones in groups.values()))
-        return min(margin, *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
-
-    def inside(self, position_enu_m: Vector) -> bool:
-        return self.margin_m(position_enu_m) >= -EDGE_M
+        groups = (min(zone.depth_m(east, north) for zone in zones) for zones in self._groups.values())
+        return min(max(groups, default=inf), *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
-        if position_enu_m[2] > self.max_height_m + EDGE_M:
-            return Refusal(f"higher than the {self.max_height_m:g} m of the geofence")
-        return None if self.inside(position_enu_m) else Refusal("outside the geofence")
+        return None if self.margin_m(position_enu_m) >= -EDGE_M else Refusal("outside the geofence")
 
 
 class AroundHome(NamedTuple):

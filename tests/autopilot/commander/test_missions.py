@@ -72,25 +72,25 @@ def test_an_item_outside_the_fence_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
     cockpit.load(MISSION, PLAN[0], item("NAV_WAYPOINT", place=(9.0, 0.0, 10.0)))
-    assert cockpit.missions.leaves_fence
+    assert cockpit.missions.outside
     assert cockpit.said("item 1 of the mission: outside the geofence")
     cockpit.missions.moved_origin()
     assert not cockpit.said("item 1")
     cockpit.load(FENCE)
-    assert not cockpit.missions.leaves_fence
+    assert not cockpit.missions.outside
 
 
 def test_an_item_below_the_ground_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     low, high = item("NAV_WAYPOINT", place=(9.0, 0.0, -4.0)), item("NAV_WAYPOINT", place=(9.0, 0.0, 0.0))
     cockpit.load(MISSION, PLAN[0], high, low)
-    assert cockpit.missions.leads_below_ground
+    assert cockpit.missions.below
     assert cockpit.said("item 2 of the mission: 4.0 m below the ground")
     cockpit.load(MISSION, PLAN[0], high, item("NAV_LAND", place=(9.0, 0.0, -4.0)))
-    assert not cockpit.missions.leads_below_ground
+    assert not cockpit.missions.below
     cockpit.home.move((0.0, 0.0, -4.0), 0.0)
     cockpit.load(MISSION, high)
-    assert not cockpit.missions.leads_below_ground, "as low as home"
+    assert not cockpit.missions.below, "as low as home"
 
 
 def test_the_home_fence_follows_home_and_parameters() -> None:

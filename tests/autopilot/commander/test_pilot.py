@@ -167,9 +167,9 @@ def test_a_failed_rotor_prevents_mode_changes_and_arming(mode: Mode) -> None:
 
 def test_a_requested_speed_is_limited_and_ends_with_the_flight() -> None:
     cockpit = in_the_air()
-    cockpit.pilot.fly_at(3.0)
+    cockpit.pilot.speed_m_s = 3.0
     assert cockpit.pilot.context().behaviour.limits.speed_m_s == 3.0
-    cockpit.pilot.fly_at(99.0)
+    cockpit.pilot.speed_m_s = 99.0
     assert cockpit.pilot.context().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.max_speed_m_s
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.speed_m_s is None

@@ -31,51 +31,49 @@ def polygon(command: int, vertices: list[tuple[float, float]], **changes: Any) -
     return [item(command, east, north, float(len(vertices)), **changes) for east, north in vertices]
 
 
-def fence(*items: MissionItem, max_height_m: float = inf) -> Geofence:
+def fence(*items: MissionItem) -> Geofence:
     assert all(FENCE_RULES.check_item(each) == ACCEPTED for each in items)
     assert FENCE_RULES.check_plan(items) == ACCEPTED
-    return Geofence(items, DEFAULT_ORIGIN, max_height_m=max_height_m)
+    return Geofence(items, DEFAULT_ORIGIN)
 
 
 def test_no_fence_holds_nothing_back() -> None:
     assert fence().margin_m((1e6, -1e6, 1e5)) == inf
-    assert fence().inside((0.0, 0.0, 0.0))
-    assert not fence().inside((nan, 0.0, 0.0))
-    assert not fence().inside((0.0, 0.0, inf))
+    assert fence().refusal((0.0, 0.0, 0.0)) is None
+    assert fence().refusal((nan, 0.0, 0.0)) is not None
+    assert fence().refusal((0.0, 0.0, inf)) is not None
 
 
 def test_margins() -> None:
-    around = fence(*polygon(IN, SQUARE), *polygon(OUT, HOLE), item(DISC_OUT, 6.0, 6.0, 1.0), max_height_m=30.0)
+    around = fence(*polygon(IN, SQUARE), *polygon(OUT, HOLE), item(DISC_OUT, 6.0, 6.0, 1.0))
     for place, margin in [
         ((-5.0, 0.0, 0.0), 3.0),
         ((-9.0, 0.0, 0.0), 1.0),
         ((0.0, 0.0, 0.0), -2.0),
         ((6.0, 6.5, 0.0), -0.5),
         ((13.0, 14.0, 0.0), -5.0),
-        ((-6.0, 0.0, 29.0), 1.0),
-        ((-6.0, 0.0, 33.0), -3.0),
+        ((-6.0, 0.0, 1e4), 4.0),
     ]:
         assert around.margin_m(place) == pytest.approx(margin, abs=0.02)
-        assert around.inside(place) == (margin > 0.0)
+        assert (around.refusal(place) is None) == (margin > 0.0)
 
 
 def test_what_is_refused_is_told() -> None:
-    around = fence(item(DISC_IN, 0.0, 0.0, 5.0), max_height_m=30.0)
+    around = fence(item(DISC_IN, 0.0, 0.0, 5.0))
     assert around.refusal((0.0, 0.0, 10.0)) is None
     assert around.refusal((0.0, 6.0, 10.0)) == Refusal("outside the geofence")
-    assert around.refusal((0.0, 0.0, 31.0)) == Refusal("higher than the 30 m of the geofence")
     assert around.refusal((nan, 0.0, 0.0)) is not None
 
 
 def test_groups_of_inclusions() -> None:
     """Inside all zones of a group, of one group at least."""
     together = fence(item(DISC_IN, 0.0, 0.0, 5.0), item(DISC_IN, 6.0, 0.0, 5.0))
-    assert together.inside((3.0, 0.0, 0.0))
-    assert not together.inside((-1.0, 0.0, 0.0))
+    assert together.refusal((3.0, 0.0, 0.0)) is None
+    assert together.refusal((-1.0, 0.0, 0.0)) is not None
     either = fence(item(DISC_IN, 0.0, 0.0, 5.0, p2=1.0), item(DISC_IN, 20.0, 0.0, 5.0, p2=nan))
-    assert either.inside((-1.0, 0.0, 0.0))
-    assert either.inside((21.0, 0.0, 0.0))
-    assert not either.inside((10.0, 0.0, 0.0))
+    assert either.refusal((-1.0, 0.0, 0.0)) is None
+    assert either.refusal((21.0, 0.0, 0.0)) is None
+    assert either.refusal((10.0, 0.0, 0.0)) is not None
 
 
 def test_a_circle_of_no_radius_is_none() -> None:
@@ -84,9 +82,8 @@ def test_a_circle_of_no_radius_is_none() -> None:
     assert around.margin_m((-5.0, 0.0, 0.0)) == pytest.approx(5.0, abs=0.02)
 
 
-def test_where_to_return() -> None:
-    assert fence(item(BACK, 3.0, -4.0)).return_point_enu_m == pytest.approx((3.0, -4.0), abs=0.02)
-    assert fence().return_point_enu_m is None
+def test_return_points_are_accepted_and_ignored() -> None:
+    assert fence(item(BACK, 3.0, -4.0)).margin_m((1e6, -1e6, 1e5)) == inf
 
 
 @pytest.mark.parametrize("vertices", [SQUARE, HORSESHOE, HOUR_GLASS])
