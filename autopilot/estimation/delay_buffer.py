@@ -29,9 +29,6 @@ class DelayBuffer:
         self.first = 0
         self.waiting: deque[Waiting] = deque()
 
-    def is_full(self) -> bool:
-        return len(self.waiting) == len(self.samples)
-
     def put(self, before: Reading, after: Reading, interval_s: float, measured: Waiting) -> None:
         if interval_s > _BRIDGED_S:
             before = before._replace(force_good=False, rate_good=False)

@@ -173,7 +173,7 @@ class Estimator:
             self._published_us = self.filter_us = frame.time_us
         else:
             buffer = self._buffer
-            if buffer.is_full():
+            if len(buffer.waiting) == len(buffer.samples):
                 self._take(frame.time_us)
             buffer.put(before, self._reading, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
             self._take_until(frame.time_us)

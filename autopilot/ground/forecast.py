@@ -34,22 +34,16 @@ class Forecaster:
     def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
         plan, squared = how.predicted, how.planned_squared
         if plan is not None and squared is not None and self._columns is not None:
+            begin = np.array((*state.position_enu_m, *state.velocity_enu_m_s))
             mass_kg = self._mass_kg if isnan(how.mass_kg) else how.mass_kg
-            return self._integrated(state, plan, squared, self._columns, mass_kg)
+            thrusts_n = matvec(squared, self._full_thrust_n)
+            motion = _motion(begin, plan, self._columns, thrusts_n, mass_kg, self._gravity_m_s2, self._interval_s)
+            psi, yaw_rate = plan[1:, self._columns.psi], plan[1:, self._columns.yaw_rate]
+            return self._points(motion[:, 0:3], motion[:, 3:6], motion[:, 6:9], psi, yaw_rate)
         if references is None or len(references.position_enu_m) < POINTS:
             return ()
         columns = references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2
         return self._points(*columns, references.yaw_rad, references.yaw_rate_rad_s)
-
-    def _integrated(
-        self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns, mass_kg: float
-    ) -> tuple[Forecast, ...]:
-        """Integrate thrust and gravity; drag is negligible over the horizon."""
-        begin = np.array((*state.position_enu_m, *state.velocity_enu_m_s))
-        thrusts_n = matvec(squared, self._full_thrust_n)
-        motion = _motion(begin, plan, columns, thrusts_n, mass_kg, self._gravity_m_s2, self._interval_s)
-        psi, yaw_rate = plan[1:, columns.psi], plan[1:, columns.yaw_rate]
-        return self._points(motion[:, 0:3], motion[:, 3:6], motion[:, 6:9], psi, yaw_rate)
 
     def _points(self, p: Array, v: Array, a: Array, yaw: Array, rate: Array) -> tuple[Forecast, ...]:
         last = len(p) - 1
@@ -77,7 +71,7 @@ def _motion(
     gravity_m_s2: float,
     interval_s: float,
 ) -> Array:
-    """Return position, velocity and acceleration, ENU, (n, 9), by thrust along body z; `plan` has an initial row."""
+    """Return position, velocity and acceleration, ENU, (n, 9), without drag; `plan` has an initial row."""
     motion = np.zeros((thrusts_n.shape[0], 9))
     speeds, places = np.zeros(3), np.zeros(3)  # their sums; what they are multiplied by comes after
     for k in range(thrusts_n.shape[0]):

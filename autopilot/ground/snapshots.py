@@ -9,7 +9,6 @@ from colibri.autopilot.commander.rules.modes import ROWS, Mode, custom_mode
 from colibri.autopilot.control.interface import (
     FALLBACK_CODES,
     STATUS_CODES,
-    AttitudeDemand,
     Decision,
     Horizon,
     PlanColumns,
@@ -168,7 +167,9 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
     thrust = (c1 * c1 + c2 * c2 + c3 * c3 + c4 * c4) / len(controls)
     attitude = quaternion_from_euler(*decision.attitude_reference)
     if guidance.horizon is None:
-        return Setpoint(attitude=attitude, rate_flu_rad_s=rates_of(guidance.attitude), thrust=thrust)
+        # for small tilt the rates of the angles are those of the body
+        rates = NOWHERE if guidance.attitude is None else first(guidance.attitude.angle_rates_rad_s)
+        return Setpoint(attitude=attitude, rate_flu_rad_s=rates, thrust=thrust)
     h = guidance.horizon
     return Setpoint(
         position_enu_m=first(h.position_enu_m),
@@ -180,11 +181,6 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
         rate_flu_rad_s=NOWHERE,
         thrust=thrust,
     )
-
-
-def rates_of(demand: AttitudeDemand | None) -> Vector:
-    """Return demanded rates, rad/s, which are the body's for small tilt."""
-    return NOWHERE if demand is None else first(demand.angle_rates_rad_s)
 
 
 def first(column: Array) -> Vector:

@@ -59,9 +59,6 @@ class Number(NamedTuple):
             group=group,
         )
 
-    def applied(self, value: Value) -> Value:
-        return value if isinstance(value, int) else value * self.scale
-
 
 def read(tree: Mapping[str, Any], path: Path) -> Any:
     """Return the value at `path`, or raise KeyError."""
@@ -85,7 +82,8 @@ def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], 
     """Return the tree with all changed values; unchanged numbers keep 64 bits."""
     for number in numbers:
         if values[number.name] != defaults[number.name]:
-            tree = _with(tree, number.path, number.applied(values[number.name]))
+            value = values[number.name]
+            tree = _with(tree, number.path, value if isinstance(value, int) else value * number.scale)
     return tree
 
 

@@ -56,11 +56,7 @@ def track(name: str, text: str | None = None) -> Track:
 def track_names() -> list[str]:
     """Return the names of all tracks: Colibri's own, then those of other packages."""
     own = [*THESIS_TRACKS, *OPTIONS]
-    return own + [name for name in _installed_names() if name not in own]
-
-
-def _installed_names() -> list[str]:
-    return sorted({entry.name for entry in entry_points(group=GROUP)})
+    return own + sorted({entry.name for entry in entry_points(group=GROUP)}.difference(own))
 
 
 def _load_installed(name: str) -> Any:
@@ -112,26 +108,20 @@ def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, s
         if not equals and item and number == 0 and kind.lone:
             key, equals, value = kind.lone, "=", item
         if not equals or not key or not value:
-            raise TrackError(f"track {name}: options are KEY=VALUE[,KEY=VALUE…], not {text!r}: {_keys(kind)}")
+            choices = ", ".join(kind.__struct_fields__)
+            raise TrackError(f"track {name}: options are KEY=VALUE[,KEY=VALUE…], not {text!r}: choose {choices}")
         if key in given:
             raise TrackError(f"track {name}: {key} is given twice")
         given[key] = value
     return given
 
 
-def _keys(kind: type[TrackOptions]) -> str:
-    return f"choose {', '.join(kind.__struct_fields__)}"
-
-
 def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given: dict[str, str]) -> str:
     what, _, key = reason.rstrip("`").partition(" - at `$.")
     if key not in fields:
         return what
-    words = [word for kind in (fields[key].type, *get_args(fields[key].type)) for word in _words(kind)]
+    kinds = (fields[key].type, *get_args(fields[key].type))
+    words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
     if what.startswith("Invalid enum value"):
         what = f"choose {', '.join(words)}{'' if fields[key].type == YawChoice else ', or a number'}"
     return f"{key}={given[key]}: {what}"
-
-
-def _words(kind: Any) -> tuple[Any, ...]:
-    return get_args(kind) if get_origin(kind) is Literal else ()

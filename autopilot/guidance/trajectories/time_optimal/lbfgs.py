@@ -41,7 +41,8 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
     values = deque([point.value], maxlen=_MEMORY)
     for _ in range(iterations):
-        found = _searched(function, point, _direction(point.gradient, pairs), 1.0 if pairs else _first(point))
+        length = 1.0 if pairs else 1.0 / max(norm(point.gradient), 1.0)
+        found = _searched(function, point, _direction(point.gradient, pairs), length)
         if found is None and not pairs:
             break
         if found is None:
@@ -55,10 +56,6 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
             break
         values.append(point.value)
     return point.x
-
-
-def _first(point: _Point) -> float:
-    return 1.0 / max(norm(point.gradient), 1.0)
 
 
 def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
