@@ -74,7 +74,7 @@ class Missions:
         return self.task_again()
 
     def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
-        """Continue the current item after a restart."""
+        """Continue a mission after a restart, with the current item's turns and remaining legs."""
         behaviour = self._behaviour
         self._executor.defaults = Defaults(
             max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m

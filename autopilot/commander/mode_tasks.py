@@ -37,7 +37,7 @@ TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 
 
 class TaskRecord(NamedTuple):
-    """A task for the checkpoint: restarting order, track start, turns, and remaining legs."""
+    """State of a task for the checkpoint: the order that restarts it, track start, turns flown, remaining legs."""
 
     order: OrderRecord | None = None
     began_us: int | None = None
@@ -80,7 +80,7 @@ class ModeTasks:
         references: References,
         first: Track | None,
     ) -> None:
-        """`attitude` is None without attitude setpoints; `first` is flown from time 0."""
+        """`attitude` is None for a law without attitude setpoints; `first` is a track flown from time 0."""
         self._missions = missions
         self._attitude = attitude
         self._gravity_m_s2 = vehicle.gravity_m_s2

@@ -141,7 +141,7 @@ class Pilot:
     ) -> None:
         """Restore the state after a restart; a vehicle that came down stays on the ground.
 
-        A `seamless` restart took no time and keeps the reference.
+        `again` returns the task that continues a mode. A `seamless` restart took no time and keeps the reference.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
@@ -239,7 +239,7 @@ class Pilot:
         return refusal
 
     def save(self, action: Action) -> None:
-        """Execute a failsafe's action."""
+        """Execute a failsafe's action, chosen by the supervisor."""
         if not self.state.armed:
             return
         if action is Action.TERMINATE:
@@ -257,7 +257,7 @@ class Pilot:
             self._engage(self.state.mode)
 
     def touch_down(self) -> None:
-        """Register a landing from another detector."""
+        """Register a landing reported by another detector, and stop the rotors."""
         self.ground.land(self.sensed.now_us)
         self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 

@@ -53,7 +53,7 @@ _STEPS = 4
 
 
 class Found(NamedTuple):
-    """Bias change, m/s² FLU, variance of each axis, (m/s²)², and the filter's errors, ENU."""
+    """Detected bias, m/s² FLU, its variance along each axis, and corrections of the filter, ENU."""
 
     bias_m_s2: Array
     variance: float
@@ -75,7 +75,7 @@ class AccelerometerWatch:
         find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
     def look(self, time_us: int, state: list[float], velocity: Kind, barometer: Barometer) -> Found | None:
-        """Check a fix; `state` (10,) is nominal, before the test."""
+        """Check a fix; `state` (10,) is the filter's nominal state before the test."""
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()
@@ -160,7 +160,7 @@ def find_bias(
 
 @compiled
 def _drifted(rows: Array, begin: int) -> Array:
-    """Integrate the filter's velocity, m ENU."""
+    """Integrate the filter's velocity from fix `begin` on, m ENU."""
     drifted = np.zeros((len(rows) - begin, 3))
     for k in range(1, len(drifted)):
         row = begin + k
@@ -175,7 +175,7 @@ def _drifted(rows: Array, begin: int) -> Array:
 def _is_seen(
     rows: Array, first: int, begin: int, last: int, moved: Array, drifted: Array, height_variance: float
 ) -> bool:
-    """Check the barometer against position errors `moved` (n, 3); rows `begin` to `last` precede the fault."""
+    """Check that the barometer shows the position errors `moved` (n, 3); rows `begin` to `last` precede the fault."""
     rest = 0.0
     for k in range(begin, last + 1):
         rest += (rows[k, HEIGHT] - drifted[k - begin, 2]) / (last + 1 - begin)
@@ -189,7 +189,7 @@ def _is_seen(
 
 @compiled
 def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
-    """Check the lateral specific force; rows `begin` to `last` precede the fault."""
+    """Check that the lateral specific force shows the bias; rows `begin` to `last` precede the fault."""
     now, before = np.zeros(2), np.zeros(2)
     for k in range(first + 1, len(rows)):
         now += _felt(rows, k, gravity)
@@ -215,7 +215,7 @@ def _felt(rows: Array, k: int, gravity: float) -> Array:
 
 @compiled
 def _turned(rows: Array, first: int) -> Array:
-    """Return ∫R dt, (n, 3, 3)."""
+    """Return ∫R dt from the first rejected fix to each later one, (n, 3, 3)."""
     A = np.zeros((len(rows) - first, 3, 3))
     for k in range(1, len(A)):
         dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
@@ -225,7 +225,7 @@ def _turned(rows: Array, first: int) -> Array:
 
 @compiled
 def _between(rows: Array, k: int) -> Array:
-    """Return the mean rotation since the previous fix."""
+    """Return the mean rotation from body to earth since the previous fix, (3, 3)."""
     R = np.empty((2, 3, 3))
     for j in range(2):
         w, x, y, z = rows[k - j, ATTITUDE : ATTITUDE + 4]
@@ -236,7 +236,7 @@ def _between(rows: Array, k: int) -> Array:
 
 @compiled
 def _centred(columns: Array) -> Array:
-    """Subtract and return the means of columns."""
+    """Subtract the means of columns (n, 3) in place, and return them."""
     mean = np.zeros(3)
     for row in columns:
         mean += row
@@ -248,7 +248,7 @@ def _centred(columns: Array) -> Array:
 
 @compiled
 def _fitted(A: Array, d: Array) -> tuple[Array, float]:
-    """Minimise |d + A b|²; AᵀA is nearly a multiple of the identity."""
+    """Return b that minimises |d + A b|², and A's spread, s²; AᵀA is nearly a multiple of the identity."""
     spread = 0.0
     for k in range(len(A)):
         for i in range(3):

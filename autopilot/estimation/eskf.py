@@ -184,7 +184,7 @@ class Filter:
         predict(self.x, self.P, samples, row, self._packed_noise, self._gravity)
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
-        """Fuse a fix measured `after_s` after the filter's time."""
+        """Fuse a fix measured `after_s` after the filter's time; return a reason if any part is rejected."""
         x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
         z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
         claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
@@ -204,7 +204,7 @@ class Filter:
         return None if accepted else Reason.INNOVATION
 
     def reset_accel_bias(self, found: Found, time_us: int) -> None:
-        """Correct the bias, and the errors since its change."""
+        """Correct the bias, and the position and velocity errors since its change."""
         x, P = self.x, self.P
         x[:3] += found.position_m
         x[3:6] += found.velocity_m_s
@@ -217,7 +217,7 @@ class Filter:
         self.accel_bias_us = time_us
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
-        """Inflate the covariance after a fault that turned the field."""
+        """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` in `since_s`."""
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
         update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
@@ -267,5 +267,5 @@ def noise_of(sensors: Sensors) -> Noise:
 
 
 def _excess(claimed_m: float, described: float) -> float:
-    """Return the excess of a reported variance, rounded to cm on the wire."""
+    """Return the excess of a reported variance, rounded to cm on the wire, over the described one."""
     return max(0.0, square(max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0)) - described) if isfinite(claimed_m) else 0.0

@@ -40,9 +40,9 @@ class Noise(NamedTuple):
 
     Attributes:
         force, rate: (m/s²)²/Hz and (rad/s)²/Hz.
-        gyro_bias, accel_bias: (rad/s²)²/Hz and (m/s³)²/Hz.
-        gps_drift: Gauss-Markov variances, m², ENU.
-        baro_offset, hard_iron: m²/s and gauss²/s.
+        gyro_bias, accel_bias: Of the walks, (rad/s²)²/Hz and (m/s³)²/Hz.
+        gps_drift: Variances of the Gauss-Markov drift, m², ENU.
+        baro_offset, hard_iron: Of the walks, m²/s and gauss²/s.
     """
 
     force: float
@@ -155,7 +155,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
 
 @compiled
 def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
-    """Multiply P by the transition matrix from the left."""
+    """Multiply P by the transition matrix from the left: half turn, velocity, half turn."""
     for column in range(ERRORS):
         g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
         t0, t1, t2 = P[6, column], P[7, column], P[8, column]

@@ -58,7 +58,7 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 def fuse_fix(
     x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
 ) -> None:
-    """Fuse velocity, place and height of a fix in turn; `fix` (6,) is place and velocity, outputs are in this order."""
+    """Fuse velocity, place, height of a fix in turn, outputs in this order; `fix` (6,) is place and velocity, ENU."""
     nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
     nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])
     nis[2] = fuse_height(x, P, fix[:3], after_s, variances[2], gates[2], y[5:])
@@ -74,7 +74,7 @@ def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gat
 
 @compiled
 def fuse_field(x: Array, P: Array, measured: Array, field: Array, variance: float, gate: float, y: Array) -> float:
-    """Fuse a magnetic field, gauss FLU; the earth's is ENU."""
+    """Fuse a magnetic field, gauss FLU, with the earth's `field`, gauss ENU."""
     H = np.zeros((3, ERRORS))
     body = _in_body(x, field)
     _put_cross(H, body)
@@ -96,7 +96,7 @@ def fuse_rest(
     field_variance: float,
     y: Array,
 ) -> float:
-    """Fuse specific force, m/s², and magnetic field, gauss, FLU, at rest jointly."""
+    """Fuse specific force, m/s², and magnetic field, gauss, FLU, at rest jointly; y (6,) is in sigmas."""
     H = np.zeros((6, ERRORS))
     up = _in_body(x, np.array([0.0, 0.0, gravity]))
     body = _in_body(x, field)
@@ -120,7 +120,7 @@ def inflate_covariance(P: Array, first: int, count: int, variance: float) -> Non
 
 @compiled
 def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, dip_rad: float) -> bool:
-    """Check strength and dip of a magnetic field, minus the vehicle's own."""
+    """Check a magnetic field, gauss FLU, minus the vehicle's own, for strength and dip of the earth's, ENU."""
     up = _in_body(x, np.array([0.0, 0.0, 1.0]))
     own, earth, along = 0.0, 0.0, 0.0
     for i in range(3):

@@ -33,12 +33,13 @@ _HORIZONTAL_POSITION = mav.ESTIMATOR_POS_HORIZ_ABS | mav.ESTIMATOR_PRED_POS_HORI
 
 
 class Health(NamedTuple):
-    """Usable parts of the estimate: angles, velocity to 1 m/s, position to 5 m, sensors.
+    """Usable parts of the estimate: roll and pitch to 10°, yaw to 15°, velocity to 1 m/s, position to 5 m.
 
     Attributes:
-        dead_reckoning: Without GPS, position drifts.
+        dead_reckoning: Without GPS, position and velocity drift.
         gps_glitch: Fixes are received but rejected.
         accel_bias, gyro_bias: False for a while after a reset.
+        not_accepted: Other sensors without valid values.
     """
 
     attitude: bool

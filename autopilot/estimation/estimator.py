@@ -203,7 +203,7 @@ class Estimator:
         )
 
     def resume(self, record: bytes, time_us: int) -> bool:
-        """Restore a record; a frame without an answer is received again."""
+        """Restore a record; return whether it fits. A frame without an answer is received again."""
         kept, buffer = of_bytes(EstimatorRecord, record), self._buffer
         if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != buffer.samples.shape:
             return False

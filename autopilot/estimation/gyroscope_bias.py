@@ -15,7 +15,7 @@ _MAX_TURN_RAD = 0.3
 
 
 def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:
-    """Return angle error, rad, and duration, s, of the field."""
+    """Return the field's angle error, rad, and its duration, s, for a gyroscope fault."""
     velocity, field = filter_.velocity, filter_.magnetometer.kind
     if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
         return None

@@ -14,7 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class _Matter(NamedTuple):
-    """A condition of health, with texts."""
+    """A condition of health, with texts for its end and return."""
 
     well: Callable[[Health], bool]
     ceased: str
@@ -70,7 +70,7 @@ class HealthWatch:
 
 
 def not_known(health: Health) -> str:
-    """Return inaccurate parts as text."""
+    """Return the parts too inaccurate to fly, as text."""
     return ", ".join(reason for known, reason in _UNKNOWN if not known(health))
 
 

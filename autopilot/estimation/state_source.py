@@ -93,7 +93,7 @@ class StateSource:
 
     @property
     def last(self) -> StateFrame | None:
-        """Latest state, without further work."""
+        """Latest state, without processing the queued frame."""
         if self._given is not None:
             return self._given
         return None if self.estimate is None else self.estimate.frame
@@ -108,7 +108,7 @@ class StateSource:
             self._estimating.settle()
 
     def has_gps(self, now_us: int) -> bool:
-        """GPS is always available with state feedback."""
+        """Whether there is a recent 3D fix; always with state feedback."""
         if self._make is None:
             return True
         fix = self.fix

@@ -15,7 +15,7 @@ class Failures:
     """Forwards faults to the plant, and its results back."""
 
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        """`relays`: whether the plant accepts faults; sensor faults require sensor feedback."""
+        """`relays` tells whether the plant accepts faults; sensor faults require sensor feedback."""
         self._relays = relays
         self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []

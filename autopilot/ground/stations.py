@@ -163,7 +163,7 @@ class Stations:
         return self._heartbeat.station_us
 
     def expect_station(self, now_us: int) -> None:
-        """Count a ground station as lost from now on, after a restart."""
+        """Count a ground station, connected before a restart, as lost from now on."""
         self._heartbeat.expect(now_us)
 
     def update(self, snapshot: Snapshot) -> None:
@@ -176,7 +176,7 @@ class Stations:
         self._follow.update(snapshot.origin)
 
     def go_on(self) -> None:
-        """Send at least the mode."""
+        """Send at least the mode if a snapshot fails."""
         mode, armed = self._pilot.state
         self._heartbeat.go_on(custom_mode(mode), armed=armed)
 

@@ -100,7 +100,7 @@ class AttitudeReference:
         return tilt_command(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
     def from_setpoint(self, setpoint: AttitudeSetpoint) -> AttitudeCommand:
-        """Attitude takes precedence over rates, of which yaw's is fed forward."""
+        """Convert a setpoint: attitude takes precedence over rates, of which only yaw's is then fed forward."""
         thrust_n = nan if isnan(setpoint.thrust) else self.thrust_for_stick(setpoint.thrust)
         p, q, r = (0.0 if isnan(rate) else rate for rate in setpoint.rate_flu_rad_s)
         if setpoint.attitude is None:
@@ -108,7 +108,7 @@ class AttitudeReference:
         return attitude_command(setpoint.attitude, thrust_n, r)
 
     def thrust_for_stick(self, stick: float) -> float:
-        """Return 0, hover in the middle, or maximum, N, as ground stations for PX4 expect."""
+        """Convert a stick, 0..1, to thrust, N; half hovers, as ground stations for PX4 expect."""
         if stick <= STICK_MIDDLE:
             return self.weight_n * max(stick, 0.0) / STICK_MIDDLE
         part = (min(stick, 1.0) - STICK_MIDDLE) / (1.0 - STICK_MIDDLE)
@@ -120,12 +120,12 @@ class AttitudeReference:
 
 
 def tilt_command(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> AttitudeCommand:
-    """Angles, rad, at the present heading."""
+    """Command roll and pitch, rad, at the present heading."""
     return AttitudeCommand(TILT, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
 
 
 def attitude_command(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> AttitudeCommand:
-    """Yaw is reached more slowly than the thrust direction."""
+    """Command an attitude; yaw is reached more slowly than the thrust direction."""
     (_, _, x), (_, _, y), (_, _, z) = rotation_matrix(attitude)
     return AttitudeCommand(ATTITUDE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
 

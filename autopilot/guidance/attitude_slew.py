@@ -36,7 +36,7 @@ class AttitudeCommand(NamedTuple):
     Attributes:
         vector: TILT: phi, theta, rad, and 0. ATTITUDE: thrust direction, ENU. RATE: p, q, r, rad/s.
         yaw_rate_rad_s: TILT: turn rate. ATTITUDE: feed-forward.
-        thrust_n: nan carries the weight at any tilt.
+        thrust_n: nan stands for the thrust that carries the weight at any tilt.
     """
 
     kind: int
@@ -56,7 +56,7 @@ def slew_on(
     rates: Array,
     thrusts: Array,
 ) -> None:
-    """Fill angles and rates, (n, 3), and thrusts, (n,), from their first rows."""
+    """Fill angles phi, theta, psi and rates, (n, 3), and thrusts, N, (n,), starting from their first rows."""
     kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
@@ -133,7 +133,7 @@ def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) ->
 
 @compiled
 def limit_tilt(angles: Array, rates: Array, max_tilt_rad: float) -> None:
-    """Limit the tilt, and remove rates beyond it."""
+    """Limit the tilt of phi, theta, and remove the rates that lead beyond it, in place."""
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
     if c * ct >= cos(max_tilt_rad):
         return

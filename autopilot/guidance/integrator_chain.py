@@ -125,7 +125,7 @@ def advance(
 
 @compiled
 def is_near(motion: Array, target: Array, within: float) -> bool:
-    """Compare position to jerk, (4, 3)."""
+    """Whether position to jerk, ENU, (4, 3), are within a distance of a target's."""
     for order in range(motion.shape[0]):
         scale = _JERK_SCALE if order == _JERK else 1.0
         for i in range(3):
@@ -136,7 +136,7 @@ def is_near(motion: Array, target: Array, within: float) -> bool:
 
 @compiled
 def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, wanted: Array, snap: Array) -> None:
-    """Write the snap: x and y share their limits."""
+    """Write the snap, (3,): x and y share their limits, z has its own."""
     vertically = limits.sink_m_s if motion[0, 2] > target[0, 2] else limits.climb_m_s
     jerk = limits.jerk_m_s3
     _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), wanted, snap)
@@ -176,7 +176,7 @@ def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wante
 
 @compiled
 def _approach(distance: float, stopping: float, max_speed: float, gain: float) -> tuple[float, float]:
-    """Return the speed at `distance`, and its derivative."""
+    """Return the speed towards a place at `distance`, and its derivative with distance."""
     near = stopping / gain**2
     if distance <= near:
         speed, slope = gain * distance, gain

@@ -55,11 +55,11 @@ def is_below(height_m: float, state: VehicleState) -> bool:
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
-    """Guess from a low and still first state."""
+    """Guess from the first state: low and still."""
     still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
 
 
 def is_clear(landing: Landing, state: VehicleState, ground_m: float) -> bool:
-    """Whether a vehicle is above or below its last standing height."""
+    """Whether a vehicle in flight is well above or below its last standing height."""
     return landing.since_us is None and abs(state.position_enu_m[2] - ground_m) > _CLEAR_M

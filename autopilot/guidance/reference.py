@@ -49,7 +49,7 @@ class Target(NamedTuple):
     """Target at each instant: position to snap, ENU, (n, 5, 3); yaw, rate, acceleration, (n, 3).
 
     Attributes:
-        kinds: Binding derivatives.
+        kinds: Binding derivative of x, y and z.
         turns: Whether yaw binds; otherwise its rate.
     """
 
@@ -72,7 +72,7 @@ def moving_with(state: VehicleState) -> Reference:
 
 
 def slowed(reference: Reference, speed: float) -> Reference:
-    """Scale derivatives to time passing at `speed`."""
+    """Scale the derivatives to time that passes at `speed`."""
     powers = np.array([[1.0], [speed], [speed * speed], [speed * speed * speed]])
     return Reference(reference.motion * powers, reference.heading * np.array([1.0, speed]))
 
@@ -99,7 +99,7 @@ def lead(
 ) -> tuple[Horizon, Reference]:
     """Return the references, and the chain's state at the second instant.
 
-    A `waited` reference was extrapolated.
+    A reference that `waited` was extrapolated, so it may be farther from the target.
     """
     bound = target.turns and target.kinds == ALL_BOUND
     if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
@@ -123,7 +123,7 @@ def _integers(kinds: tuple[Kind, Kind, Kind]) -> Integers:
 
 
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
-    """Return the target in the reference's full turn."""
+    """Return the target, with yaw in the reference's full turn."""
     heading = target.heading
     turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
     if turns:
@@ -137,7 +137,7 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
 def lead_along(
     reference: Reference, plan: Horizon, limits: Limits, interval_s: float, *, waited: bool = False
 ) -> tuple[Horizon, Reference]:
-    """`lead` for a plan, without slow arrays once reached."""
+    """Lead along a plan; once it is reached, without the slow arrays of a target."""
     if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0]), waited=waited):
         return lead(reference, target_of(plan), limits, interval_s, waited=waited)
     turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
@@ -156,7 +156,7 @@ def stays(reference: Reference, after: Reference) -> bool:
 
 
 def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:
-    """A target may jump, a reference may not."""
+    """Whether the reference has reached a target; a target may jump, a reference may not."""
     reached = _CARRIED if waited else _REACHED
     yaw, rate = reference.heading.tolist()
     if max(abs(yaw - nearest_turn(float(heading[0]), yaw)), abs(rate - float(heading[1]))) >= reached:

@@ -133,12 +133,12 @@ _ANSWERS = "Only answers ground stations that request it: changes nothing."
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
-    """Return also parameters that ground stations expect from PX4."""
+    """Return the behaviour's parameters, and those that ground stations expect from PX4."""
     return [*(row.parameter() for row in ROWS), *_answers(system_id)]
 
 
 def behaviour(parameters: Parameters) -> Behaviour:
-    """Unchanged numbers keep 64 bits."""
+    """Return the behaviour by the parameters; unchanged numbers keep 64 bits."""
     changed: dict[str, Any] = {}
     for row in ROWS:
         value = parameters[row.name]

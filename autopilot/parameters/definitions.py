@@ -45,7 +45,7 @@ class Numbers:
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
-        """Return profile and vehicle, or raise ImpossibleError."""
+        """Return profile and vehicle with these values, or raise ImpossibleError."""
         profile, vehicle = self._profile, self._vehicle
         table = changed(self._table, self._law, values, self.defaults)
         if table is not self._table:

@@ -42,7 +42,7 @@ class Number(NamedTuple):
     decimals: int = 3
 
     def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
-        """Bounds widen to include the default."""
+        """Return the parameter; its bounds widen to include the default."""
         value = read(tree, self.path)
         kind = Kind.INT if isinstance(value, int) else Kind.REAL
         default = value if kind == Kind.INT else value / self.scale
@@ -118,7 +118,7 @@ def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
 
 
 def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> list[Number]:
-    """Name undescribed numbers by prefix and keys, shortened until they fit."""
+    """Return undescribed numbers, named by prefix and keys, shortened until they fit."""
     taken: set[str] = set()
     numbers = []
     for path in paths(tree):

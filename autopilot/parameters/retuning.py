@@ -125,7 +125,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly near hover, and far from it."""
+    """Fly two control samples near hover, and two far from it."""
     references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):

@@ -84,7 +84,7 @@ class Client:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _keep(self, write: Callable[[AutopilotLog], None]) -> None:
-        """With ground stations, a failed log does not end the flight."""
+        """Write to the log; with ground stations, a failed log does not end the flight."""
         if self._log is None:
             return
         try:

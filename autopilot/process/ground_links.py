@@ -26,7 +26,7 @@ _GONE_AFTER_S = 3.5
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
-    """Open all, or raise LinkError; networks require signing or `insecure`."""
+    """Open all links, or raise LinkError; networks require signing or `insecure`."""
     check_reach(urls, signed=signed, insecure=insecure)
     links: list[GroundLink] = []
     try:
@@ -102,7 +102,7 @@ class GroundLinks:
                 self._forget(stations, number, address)
 
     def _in_turn(self) -> Iterator[Received]:
-        """Alternate between links, so that a flooded one does not block others."""
+        """Yield from the links in turn, so that a flooded one does not block others."""
         while any(self._waiting):
             for number, waiting in enumerate(self._waiting):
                 if not waiting:
@@ -119,7 +119,7 @@ class GroundLinks:
         stations.hub.close(number, address)
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
-        """Failures are lost datagrams."""
+        """Send each datagram; failures are lost datagrams."""
         self._allowance.begin()
         for number, address, datagram in outbox:
             try:

@@ -132,14 +132,14 @@ class AutopilotLog:
         self.topics.close()
 
     def _begin_anew(self) -> None:
-        """The plant's time has restarted."""
+        """Start a new flight, because the plant's time has restarted."""
         self.topics.close()
         self._status_us, self._thinning = -1, Thinning()
         self._fallback = None
         self._begins = True
 
     def _write_input(self, step: Step, datagram: bytes | None) -> None:
-        """Write the inputs of a replay; states follow from the truth."""
+        """Write the inputs of a replay; frames with only a state follow from the truth."""
         time_us, controls, armed = step.command
         if self._begins:
             self._begins = False
@@ -178,14 +178,14 @@ class AutopilotLog:
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
 
     def _check_row(self, check: Check) -> tuple[float, ...]:
-        """Absent measurements are nan."""
+        """Return the row of `FILTER`; absent measurements are nan."""
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
         return (check.time_us / 1e6, *check.state, *check.covariance, *counts)
 
 
 def log_in(folder: Path, setup: Setup) -> AutopilotLog:
-    """The file is created with the first frame."""
+    """Return the log of a folder; its file is created with the first frame."""
     log = AutopilotLog(FileLog(lambda: SharedLog(folder / FILE, log.beginning())), setup)
     return log
 
@@ -200,7 +200,7 @@ def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
 
 
 def _first(references: Horizon) -> tuple[float, ...]:
-    """Return position, velocity, acceleration, yaw and yaw rate."""
+    """Return position, velocity, acceleration, yaw and yaw rate of the first reference."""
     position, velocity, acceleration, _, _, yaw, yaw_rate, _ = references
     p, v, a = position.item, velocity.item, acceleration.item
     return (p(0), p(1), p(2), v(0), v(1), v(2), a(0), a(1), a(2), yaw.item(0), yaw_rate.item(0))

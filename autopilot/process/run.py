@@ -64,7 +64,7 @@ def _end(spec: AutopilotSpec, frame_interval_us: int) -> AutopilotEnd:
 
 
 def _flier(spec: AutopilotSpec, vehicle: Vehicle) -> FlierEnd:
-    """Simulators have PX4's rotor order."""
+    """Return the end for a simulator with PX4's rotor order."""
     rotors, order = vehicle.rotors, vehicle.rotors.numbering()
     return FlierEnd(
         system_id=spec.system_id,

@@ -71,7 +71,7 @@ class StateFolder:
         return None if kept is None else History(kept, self._read_plans())
 
     def keep(self, record: Checkpoint) -> bool:
-        """Return whether the record fitted."""
+        """Save the flight's state; return whether it fitted."""
         return self._flight is None or self._flight.write(to_bytes(record))
 
     def save_plans(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
@@ -79,7 +79,7 @@ class StateFolder:
             _replace(self._path / PLANS, to_bytes(dict(plans)))
 
     def parameter_path(self) -> Path:
-        """Each control law and vehicle has a file."""
+        """Return the parameter file, one for each control law and vehicle."""
         assert self._path is not None, "called only where something is kept"
         return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
 
@@ -150,7 +150,7 @@ class StateFolder:
             raise GroundError(f"signing key {path}: {error}") from error
 
     def _read_timestamp(self) -> int:
-        """Signatures must not repeat a timestamp."""
+        """Return the last timestamp, because signatures must not repeat one."""
         if self._path is None:
             return 0
         path = self._path / TIMESTAMP
@@ -165,7 +165,7 @@ class StateFolder:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write atomically; ignore errors."""
+    """Write a file atomically; ignore errors."""
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

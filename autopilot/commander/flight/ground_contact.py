@@ -11,7 +11,7 @@ from colibri.mavlink.services.statustext import INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
-    """Simulated times, 0 before the first, and the number of armings."""
+    """Simulated times of the last arming, take-off and landing, 0 before the first, and the number of armings."""
 
     armed_us: int = 0
     takeoff_us: int = 0
@@ -20,7 +20,7 @@ class FlightTimes(NamedTuple):
 
 
 class GroundRecord(NamedTuple):
-    """Attributes of `GroundContact`."""
+    """Ground contact for a restart; the fields are attributes of `GroundContact`."""
 
     standing: bool
     idles: bool

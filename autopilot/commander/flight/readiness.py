@@ -1,4 +1,4 @@
-"""Readiness to arm."""
+"""Readiness to arm: the arming checks and failures in flight."""
 
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -6,7 +6,7 @@ from colibri.mavlink.services.statustext import EMERGENCY
 
 
 class Readiness:
-    """Arming checks, failed rotor and failed software part, as text or empty; `descends` is the last resort."""
+    """Readiness of one vehicle; failures are texts, empty if none, and `descends` is true under the last-resort law."""
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines

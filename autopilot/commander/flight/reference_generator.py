@@ -61,7 +61,7 @@ class ReferenceGenerator:
         self.set(at_rest(vehicle))
 
     def wait(self, waited_s: float, path_speed: float) -> None:
-        """Move the reference back by lost path time."""
+        """Move the reference back by the path time lost in the last sample."""
         self._path_speed = path_speed
         if waited_s != 0.0 and self._ahead is not None:
             following = Horizon(*(column[1:2] for column in self._ahead))

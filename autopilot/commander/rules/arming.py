@@ -19,7 +19,7 @@ _SURELY_LEVEL = 0.1
 
 
 class ArmingInputs(NamedTuple):
-    """Inputs of the arming checks; `charge` and `thrust_stick` are 0..1, texts are reasons or empty."""
+    """Inputs of the arming checks; `charge` and `thrust_stick` are 0..1, texts are reasons, empty if all is well."""
 
     state: VehicleState | None
     standing: bool

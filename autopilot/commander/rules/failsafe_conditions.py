@@ -25,13 +25,13 @@ _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
 
 
 class FailsafeInputs(NamedTuple):
-    """Inputs of the conditions.
+    """Inputs of the conditions; times are simulated, µs.
 
     Attributes:
         missed_us: Last frame before a gap.
         setpoint: The companion's latest, of any age.
-        listening_us: Start of listening for clients.
-        fence: Margin of a place, m.
+        listening_us: Start of listening for clients, by default the restart.
+        fence: Returns a place's distance inside every fence, m.
         decided: Diagnostics while the control law is active.
         late: Whether the declared solve time exceeds a control sample.
         rotor_lost: Failed rotor, 0..3.
@@ -65,7 +65,7 @@ class Conditions:
         self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
-        """Return when each condition began; `held` ones were lost before."""
+        """Return when each holding condition began; `held` ones were lost before."""
         before, self._since_us = self._since_us, {}
         found: dict[Condition, int] = {}
         for condition, silent_since in SILENT_SINCE.items():
@@ -109,7 +109,7 @@ def position_known(estimate: Estimate | None, limits: Limits) -> bool:
 
 
 def resting_place(state: VehicleState, pace: Pace) -> Vector:
-    """Return the position after braking, m, ENU."""
+    """Return the position after braking as hard as allowed, m, ENU."""
     (x, y, z), (vx, vy, vz) = state.position_enu_m, state.velocity_enu_m_s
     speed = hypot(vx, vy)
     along_s = stopping_m(speed, pace.acceleration_m_s2, pace.jerk_m_s3) / speed if speed > 0.0 else 0.0

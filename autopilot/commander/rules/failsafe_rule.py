@@ -38,7 +38,7 @@ class Flight(NamedTuple):
 
     @property
     def rank(self) -> Action:
-        """Action that the mode performs anyway."""
+        """Action that the mode performs anyway: returning includes holding, landing includes returning."""
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 

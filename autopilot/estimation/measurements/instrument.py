@@ -51,7 +51,7 @@ class Instrument(Protocol):
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None: ...
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
-        """Fuse a value; return the reason of a rejection."""
+        """Fuse a value at the filter's time; return the reason of a rejection."""
 
     def typical(self) -> Value:
         """Return a value at rest, to load compiled code."""

@@ -126,7 +126,7 @@ def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _quaternion(R: NDArray[np.float64]) -> Quaternion:
-    """Convert by the largest component (Shepperd)."""
+    """Convert a rotation matrix by its largest component (Shepperd)."""
     trace = float(np.trace(R))
     squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
     largest = int(np.argmax(squares))

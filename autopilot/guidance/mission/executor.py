@@ -57,11 +57,11 @@ class MissionRecord(NamedTuple):
     """Progress of a mission for a restart.
 
     Attributes:
-        jumps: Remaining, by item.
+        jumps: Remaining jumps, by item.
         mission_context: At the start of the item, like `defaults` and `order_before`.
-        phases: Remaining.
+        phases: Remaining phases of the item.
         fresh: Whether the phase began in the last step.
-        jumped: Whether the last jump was without flight since.
+        jumped: Whether there was no flight since the last jump.
     """
 
     seq: int

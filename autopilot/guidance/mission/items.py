@@ -142,18 +142,18 @@ def check_height(item: MissionItem) -> int:
 
 
 def is_here(item: MissionItem) -> bool:
-    """Ground stations send 0, 0 without a place."""
+    """Whether an item has no place; ground stations send 0, 0."""
     return (item.x == 0 and item.y == 0) or NOT_GIVEN in (item.x, item.y)
 
 
 def place_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> Vector:
-    """Return ENU, m."""
+    """Return the place of an item, m, ENU."""
     x, y, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
     return (x, y, height_of(item, home_enu_m, origin))
 
 
 def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
-    """Return z of ENU, m; by default home's."""
+    """Return the height of an item, z of ENU, m; by default home's."""
     if not isfinite(item.z):
         return home_enu_m[2]
     return item.z - origin.altitude_m if item.frame in _ABOVE_SEA else home_enu_m[2] + item.z

@@ -31,7 +31,7 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """Numbers of items without."""
+    """Numbers for items that leave them out."""
 
     acceptance_m: float = 0.5
     takeoff_height_m: float = 2.5

@@ -110,7 +110,7 @@ class HeightLoop:
         self._offset_m_s2 = 0.0
 
     def thrust_n(self, reference: Reference, context: TaskContext) -> float:
-        """Return thrust, N."""
+        """Return the thrust, N, to the height of `reference`."""
         height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
         state = context.state
         height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
@@ -123,7 +123,7 @@ class HeightLoop:
 
 
 def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
-    """Return reference and target of a climb, or of a given height."""
+    """Return reference and target of a climb, or of a height if given; horizontally at the vehicle."""
     kind = Kind.VELOCITY if height_m is None else Kind.POSITION
     place = (*context.place[:2], context.place[2] if height_m is None else height_m)
     target = still_target(place, context.yaw_rad, context.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))

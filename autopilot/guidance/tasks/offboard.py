@@ -38,7 +38,7 @@ class OffboardTask(EndlessTask):
 
 
 def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
-    """Bind each axis by its lowest given derivative."""
+    """Return a setpoint's target: each axis is bound by its lowest given derivative."""
     target = still_target(context.place, context.yaw_rad, context.samples)
     velocity = allowed_velocity(setpoint.velocity_m_s, context)
     ahead_s = (context.now_us - setpoint.time_us) * 1e-6 + context.interval_s * np.arange(context.samples)

@@ -151,7 +151,7 @@ class TaskSequence:
 
     @property
     def left(self) -> tuple[int, ...]:
-        """Remaining legs, then those of a nested sequence."""
+        """Remaining legs with the current one, then those of a nested sequence."""
         inner = self.task.left if isinstance(self.task, TaskSequence) else ()
         return (len(self._ahead) + (self.task is not None), *inner)
 
@@ -184,7 +184,7 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        """`planner_for_law` has the law's preview interval."""
+        """`planner_for_law` is for a law with another preview interval."""
         self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law
@@ -213,7 +213,7 @@ def landing(order: Land) -> TaskSequence:
 
 
 def homeward(context: TaskContext) -> TaskSequence:
-    """Climb if home is far, fly there, land; the geofence does not restrict it."""
+    """Climb if home is far, fly there, land; the geofence does not restrict a return."""
     x, y, z = context.home_enu_m
     down = landing(Land((x, y, z)))
     if hypot(x - context.place[0], y - context.place[1]) <= context.behaviour.return_radius_m:

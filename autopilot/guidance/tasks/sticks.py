@@ -61,7 +61,7 @@ class PositionTask(EndlessTask):
 
 
 def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
-    """Return east and north, m/s; full sticks have equal speed in any direction."""
+    """Return the velocity east and north, m/s; full sticks have equal speed in any direction."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
     behaviour = context.behaviour
     speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
@@ -83,6 +83,6 @@ def without_play(sticks: Sticks) -> Sticks:
 
 
 def dead(stick: float) -> float:
-    """Remove the dead zone, -1..1."""
+    """Remove the dead zone from a deflection, -1..1."""
     beyond = max(abs(stick) - _DEADZONE, 0.0) / (1.0 - _DEADZONE)
     return beyond if stick > 0.0 else -beyond

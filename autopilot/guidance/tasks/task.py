@@ -61,7 +61,7 @@ class TaskContext(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Target, limits and pace by position and yaw."""
+    """Motion by position and yaw: target, limits and pace."""
 
     target: Target
     limits: Limits
@@ -82,7 +82,7 @@ class PlannedMotion(NamedTuple):
 
 
 class AttitudeMotion(NamedTuple):
-    """Motion by attitude and thrust; it lifts off, sinks, or has an unreliable velocity (`drifts`)."""
+    """Motion by attitude and thrust, and whether it lifts off, sinks, or lacks a reliable velocity (`drifts`)."""
 
     demand: AttitudeDemand
     reference: Reference

@@ -37,12 +37,12 @@ class CsvTable:
 
     @property
     def yaw_rad(self) -> Array | None:
-        """Unwrapped, (n,)."""
+        """Column yaw, unwrapped, (n,)."""
         yaw = self.values.get("yaw")
         return None if yaw is None else np.unwrap(np.radians(yaw))
 
     def times(self, min_step_s: float) -> Array:
-        """Return t, s, from 0 in steps of at least `min_step_s`."""
+        """Return column t, s, which must start at 0 and increase by at least `min_step_s`."""
         times_s = self.values["t"]
         if times_s[0] != 0.0:
             raise self.error(0, "t", f"the first time must be 0, not {times_s[0]:g}")
@@ -52,7 +52,7 @@ class CsvTable:
         return times_s
 
     def check_duration(self, column: str, times_s: Array) -> None:
-        """Raise a TrackFileError if a row is too late."""
+        """Raise a TrackFileError for `column` if a row is reached too late."""
         for row in np.flatnonzero(times_s > MAX_DURATION_S)[:1]:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 

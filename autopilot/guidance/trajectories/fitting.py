@@ -98,14 +98,14 @@ def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> t
 
 
 def _widened(excess: Array, neighbours: int) -> Array:
-    """Return the maximum with neighbours, (n,)."""
+    """Return the maximum over each leg and its neighbours on both sides, (n,)."""
     neighbours = min(neighbours, len(excess))
     widened: Array = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
     return widened
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track above the floor, and its dips."""
+    """Return the track held above the floor, and its original dips."""
     track = through(waypoints)
     dips = found = _dips(track, waypoints, floor_m)
     heights = np.empty((0, 2))

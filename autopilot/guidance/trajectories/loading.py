@@ -49,7 +49,7 @@ def load_track(
 def track_through(
     waypoints: Waypoints, vehicle: Vehicle, profile: Profile, floor_m: float | None = None
 ) -> LoadedTrack:
-    """`load_track` for waypoints."""
+    """Return the track through waypoints, adapted as in `load_track`."""
     reach = Reach(vehicle, profile, exact_drag=waypoints.fastest)
     try:
         fitted, changed = (fastest if waypoints.fastest else fit)(waypoints, reach, _floor(vehicle, floor_m))

@@ -46,7 +46,7 @@ def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
 
 
 def minimal_knots(elements: Array, points: Array) -> Array:
-    """Return the optimal derivatives, (n, order, axes)."""
+    """Return the optimal derivatives at `points` (n, axes), order 0 first, (n, order, axes)."""
     knots = np.zeros((len(points), elements.shape[2], points.shape[1]))
     knots[:, 0] = points
     if len(points) > 2:
@@ -55,7 +55,7 @@ def minimal_knots(elements: Array, points: Array) -> Array:
 
 
 def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
-    """Hermite interpolation of derivatives `knots`, (n, order, axes)."""
+    """Return Hermite's interpolation of the derivatives `knots`, order 0 first, (n, order, axes)."""
     _, order, axes = knots.shape
     durations = np.diff(times_s)
     both = np.concatenate([knots[:-1], knots[1:]], axis=1)
@@ -65,7 +65,7 @@ def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
 
 
 def from_ends(order: int) -> Array:
-    """Return the matrix from end derivatives to coefficients."""
+    """Return the matrix from derivatives at 0, then at 1, to coefficients."""
     columns = range(2 * order)
     at_0 = [[float(factorial(k)) if power == k else 0.0 for power in columns] for k in range(order)]
     at_1 = [[float(perm(power, k)) for power in columns] for k in range(order)]
@@ -91,7 +91,7 @@ def powers(durations: Array, order: int) -> Array:
 
 
 def elements(durations: Array, stiffness: Array) -> Array:
-    """Return each segment's form, (segments, end, order, end, order)."""
+    """Return each segment's cost as a form of end derivatives, (segments, end, order, end, order)."""
     order = len(stiffness) // 2
     scale = np.tile(powers(durations, order), 2)
     forms = stiffness * scale[:, :, None] * scale[:, None, :] / powers(durations, 2 * order)[:, -1:, None]
@@ -109,7 +109,7 @@ def _free_derivatives(elements: Array, points: Array) -> Array:
 
 
 def balanced(elements: Array, forces: Array) -> Array:
-    """Solve for the inner derivatives by block elimination, (n - 2, order - 1, axes)."""
+    """Solve curvature · derivatives = `forces` for the inner points by block elimination, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
     coupling = after[:-1, 0, 1:, 1, 1:]

@@ -42,7 +42,7 @@ class Planner:
         return Horizon._make([column[ahead] for column in self.table])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
-        """Extrapolate from the grid instant before `time_us`."""
+        """Return a horizon between instants `grid_us` apart, extrapolated from the one before."""
         if self._ahead and self._ahead[:2] == (time_us, grid_us):
             return self._ahead[2]
         past_us = time_us % grid_us
@@ -53,7 +53,7 @@ class Planner:
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        """Differences need the sample before."""
+        """Tabulate a block and its horizon; differences need the sample before."""
         first, lead = block * self._length, min(block, 1)
         samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
         interval_s = self.preview.interval_us * 1e-6
@@ -99,7 +99,7 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
 
 
 def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
-    """Return yaw along the velocity and its derivatives; held at standstill."""
+    """Return yaw along the horizontal velocity, its rate and acceleration; held at standstill."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
     moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
     direction = atan2(TaylorSeries(np.where(moving, vy, 0.0)), TaylorSeries(np.where(moving, vx, 0.0)))
@@ -119,7 +119,7 @@ def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
 
 
 def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
-    """Unknown values repeat the previous, or the first one."""
+    """Return continuous yaw; unknown values repeat the previous known one, or the first."""
     if not known.any():
         return np.zeros_like(yaw)
     latest = np.maximum.accumulate(np.where(known, np.arange(len(yaw)), np.argmax(known)))

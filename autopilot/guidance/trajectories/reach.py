@@ -48,14 +48,14 @@ class Demand:
     falls: bool = False
 
     def excess(self, margin: float) -> Array:
-        """Return the ratio to the limit with `margin`, (n,)."""
+        """Return the ratio to the limit with `margin` of the range reserved, (n,)."""
         if self.falls:
             return (self.limit + margin * self.span) / np.maximum(self.values, _SMALL_N)
         excess: Array = self.values / (self.limit - margin * self.span)
         return excess
 
     def beyond(self, margin: float) -> Array:
-        """Return the excess in parts of the range, < 0 if feasible, (n,)."""
+        """Return the excess in parts of the range with `margin` reserved, (n,); < 0 if feasible."""
         too_much = self.limit - self.values if self.falls else self.values - self.limit
         beyond: Array = too_much / self.span + margin
         return beyond
@@ -86,7 +86,7 @@ class Reach:
     """The limits of one vehicle under one profile."""
 
     def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
-        """`exact_drag`: by actual thrust and tilt, not by hover; beyond 10 m/s they differ by newtons."""
+        """`exact_drag` uses actual thrust and tilt instead of hover's; beyond 10 m/s they differ by newtons."""
         self._exact_drag = exact_drag
         self._vehicle = vehicle
         self._airframe = airframe_of(vehicle)
@@ -112,7 +112,7 @@ class Reach:
         return charge_ah
 
     def demands(self, motion: Motion, charge_ah: float) -> list[Demand]:
-        """Return the demands; limits are after `charge_ah` was taken."""
+        """Return the demands of a motion; limits are after `charge_ah` was taken from the battery."""
         _, a, j, s = motion
         mass = self._airframe.mass_kg
         pulled = self._pulled(motion)
@@ -181,7 +181,7 @@ def exact_motion(track: Track) -> Motion:
 
 
 def mean_motion(track: Track) -> Motion:
-    """Average over the response time of a control law, which rounds steps off."""
+    """Return the motion by differences over the response time of a control law, which rounds steps off."""
     t, apart = times(track), _RESPONSE_SAMPLES
     around = INTERVAL_S * np.arange(-2 * apart, len(t) + 2 * apart)
     p = position(track, np.clip(around, 0.0, track.duration_s))

@@ -69,7 +69,7 @@ def _load_installed(name: str) -> Any:
 
 
 def _tried(name: str, options: TrackOptions) -> Track:
-    """Check the track of another package."""
+    """Return the track of another package, checked for finite coordinates at the start."""
     try:
         given = options.track()
         found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
@@ -101,7 +101,7 @@ def read_options(name: str, kind: type[TrackOptions], text: str | None) -> Track
 
 
 def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
-    """Split options; a value alone is the lone option."""
+    """Split options; the first may be a value alone, for the lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
         key, equals, value = item.partition("=")

@@ -19,7 +19,7 @@ _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Times from 0, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped."""
+    """Times from 0, s, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped, or along the path."""
 
     times_s: Array
     motion_enu: Array
@@ -36,7 +36,7 @@ def read_samples(path: Path, text: str | None = None) -> Samples:
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
-    """Compare columns by the trapezoidal rule."""
+    """Compare columns by the trapezoidal rule, for positions with the end correction."""
     x, v, a = np.moveaxis(motion, 1, 0)
     goes = np.diff(x, axis=0) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     for columns, change, rate, rounding, unit in (

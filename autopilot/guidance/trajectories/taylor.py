@@ -86,12 +86,12 @@ class TaylorSeries:
 
 
 def held(t: TaylorSeries, value: TaylorSeries | float) -> TaylorSeries:
-    """Return a constant as a series."""
+    """Return a constant as a series at the times of `t`."""
     return value if isinstance(value, TaylorSeries) else 0.0 * t + value
 
 
 def in_series(formula: Callable[[TaylorSeries], Any]) -> Callable[[TaylorSeries], Any]:
-    """Wrap a formula: constants become series."""
+    """Wrap a formula of time so that constants become series."""
 
     def series(t: TaylorSeries) -> Any:
         value = formula(t)
@@ -109,7 +109,7 @@ def cos(x: TaylorSeries) -> TaylorSeries:
 
 
 def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
-    """Return the direction, rad; 0 at x = y = 0. Solves (x² + y²) θ' = x y' - y x'."""
+    """Return the direction of (x, y), rad, 0 at x = y = 0, from (x² + y²) θ' = x y' - y x'."""
     squared = (x * x + y * y).coefficients
     turning = (x * y.padded_rate() - y * x.padded_rate()).coefficients
     theta = np.zeros_like(squared)
@@ -122,7 +122,7 @@ def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
 
 
 def _sin_cos(x: TaylorSeries) -> tuple[TaylorSeries, TaylorSeries]:
-    """Solve s' = c x' and c' = -s x'."""
+    """Compute both from s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
     s[0], c[0] = elementwise.sin(a[0]), elementwise.cos(a[0])

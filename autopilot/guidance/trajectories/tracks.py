@@ -147,7 +147,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
         return x, x * cos(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
-        """Relative to -90° it stays within ±180°."""
+        """Return yaw along (cos α, cos 2α): relative to -90° it stays within ±180°, so it never wraps."""
         alpha = self._alpha(t)
         return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
 
@@ -156,7 +156,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Counter-clockwise from the east."""
+    """Circle around the origin, counter-clockwise from the east."""
 
     radius: Length = 2.0
     speed: Speed = 2.0
@@ -219,7 +219,7 @@ OPTIONS: dict[str, type[TrackOptions]] = {
 
 
 def through(waypoints: Waypoints, heights: Array | None = None, between: Array | None = None) -> Track:
-    """Return the minimum-snap track, also passing `heights`, (n, 2), and points `between`, (n, 4), by time."""
+    """Return the minimum-snap track, also passing `heights` (t, z), (n, 2), and `between` (t, x, y, z), (n, 4)."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import SNAP, minimise  # slow to load: most do without
 
     times_s = waypoints.times_s
@@ -239,7 +239,7 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
 
 
 def sampled(samples: Samples) -> Track:
-    """Quintic interpolation, with continuous acceleration."""
+    """Return the track by quintic interpolation, with continuous acceleration."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import interpolate
 
     places = interpolate(samples.times_s, samples.motion_enu)
@@ -269,7 +269,7 @@ def _in_time(rows: Array, others: Array | None) -> Array:
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
-    """Return a derivative of the position, ENU, (n, 3)."""
+    """Return a derivative of the position, ENU, (n, 3), at rest after the end."""
     time = track.clock(np.asarray(t, dtype=np.float64), derivative)
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 

@@ -70,7 +70,7 @@ def read_waypoints(
 
 
 def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:
-    """Return times, s; the first and last leg are at half speed."""
+    """Return times at points, s, (n,); the first and last leg are at half speed."""
     legs_s = _legs(points_enu_m, speed_m_s)
     legs_s[[0, -1]] *= 2.0
     return np.concatenate([[0.0], np.cumsum(legs_s)])

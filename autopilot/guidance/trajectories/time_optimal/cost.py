@@ -37,7 +37,7 @@ class FlightCost:
     """
 
     def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
-        """`given` are waypoints, ENU; each leg has `pieces`; `margin` of each range is reserved."""
+        """`given` are waypoints, ENU; each leg has `pieces`; `margin` of each range is reserved for the control law."""
         self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
         self._reach, self._given, self._pieces = reach, given, pieces
         self._margin = margin
@@ -47,7 +47,7 @@ class FlightCost:
         self._share[[0, -1]] *= 0.5
 
     def variables(self, legs_s: Array, points: Array) -> Array:
-        """Return unbounded variables."""
+        """Convert leg times, s, and all points, (legs pieces + 1, 3), to unbounded variables."""
         chosen = np.arange(len(points)) % self._pieces > 0
         return np.concatenate([_root(legs_s), points[chosen].ravel()])
 
@@ -96,7 +96,7 @@ class FlightCost:
         return low * low + (excess * excess).sum(axis=0).reshape(low.shape), slope
 
     def _slope(self, states: Array, beyond: Array, excess: Array) -> Array:
-        """Return the slope of the squared excess, (4, n, 3)."""
+        """Return the slope of the squared excess with velocity to snap, (4, n, 3)."""
         moved = np.repeat(states[:, None], 3 * SNAP, axis=1)
         slope = np.empty_like(states)
         for order, step in enumerate(_STEPS):
@@ -109,7 +109,7 @@ class FlightCost:
         return slope
 
     def _beyond(self, states: Array) -> Array:
-        """Return each excess, (demands, n)."""
+        """Return the excess over each limit for velocity to snap, (demands, n)."""
         demands = self._reach.demands(Motion(*states), self.charge_ah)
         return np.stack([demand.beyond(self._margin) for demand in demands])
 
@@ -136,14 +136,14 @@ class _Slopes:
         self.of_points += (at_knots - _at_knots(reaction))[:, 0]
 
     def _applied(self, ends: Array) -> Array:
-        """Multiply elements by end derivatives."""
+        """Multiply each element by end derivatives, (pieces, 8, 3)."""
         forms = self._forms.reshape(-1, 2 * SNAP, 2 * SNAP)
         applied: Array = (forms[:, :, :, None] * ends[:, None]).sum(axis=2)
         return applied
 
 
 def _sampling() -> Array:
-    """Return the matrix from end derivatives to samples, (5 samples, 8)."""
+    """Return the matrix from end derivatives to samples of position to snap, (5 samples, 8)."""
     tau = np.arange(_INTERVALS + 1.0) / _INTERVALS
     rows = np.zeros((SNAP + 1, len(tau), 2 * SNAP))
     for order in range(SNAP + 1):
@@ -155,12 +155,12 @@ def _sampling() -> Array:
 
 
 def _at_ends(knots: Array) -> Array:
-    """Knots (pieces + 1, 4, 3) to ends (pieces, 8, 3)."""
+    """Convert knots, (pieces + 1, 4, 3), to piece ends, (pieces, 8, 3)."""
     return np.concatenate([knots[:-1], knots[1:]], axis=1)
 
 
 def _at_knots(ends: Array) -> Array:
-    """Sum ends at the knots."""
+    """Sum piece ends, (pieces, 8, 3), at the knots, (pieces + 1, 4, 3)."""
     knots = np.zeros((len(ends) + 1, SNAP, 3))
     knots[:-1] += ends[:, :SNAP]
     knots[1:] += ends[:, SNAP:]
@@ -174,7 +174,7 @@ def _total(values: Array, pieces_axis: int) -> Array:
 
 
 def _duration(root: Array) -> tuple[Array, Array]:
-    """Return durations > 0 and their slopes."""
+    """Return positive durations, s, and their slopes; 1 s at 0."""
     below = 1.0 / ((0.5 * np.minimum(root, 0.0) - 1.0) * np.minimum(root, 0.0) + 1.0)
     above = (0.5 * np.maximum(root, 0.0) + 1.0) * np.maximum(root, 0.0)
     longer = root > 0.0

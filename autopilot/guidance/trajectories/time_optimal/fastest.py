@@ -52,7 +52,7 @@ def _wanted_pieces(legs: int) -> int:
 
 
 def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array, points: Array) -> tuple[Array, Array]:
-    """Optimise; the battery's state is that of the previous flight."""
+    """Return better leg times and points; the battery's state is that of the previous flight."""
     pieces = (len(points) - 1) // len(legs_s)
     cost = FlightCost(reach, waypoints.points_enu_m, pieces, waypoints.margin)
     cost.floor_m = floor_m + _CLEARANCE_M if pieces > 1 else -inf

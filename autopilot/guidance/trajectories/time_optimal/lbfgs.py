@@ -28,7 +28,7 @@ class _Point(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """Step, gradient change, product."""
+    """A step, the change of the gradient, and their product."""
 
     step: Array
     change: Array
@@ -36,7 +36,7 @@ class _Pair(NamedTuple):
 
 
 def minimise(function: Function, x: Array, iterations: int, tolerance: float) -> Array:
-    """Return a minimum; stops at improvements below `tolerance` of the value."""
+    """Return a minimum, (n,); stop at improvements below `tolerance` of the value."""
     point = _Point(x, *function(x))
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
     values = deque([point.value], maxlen=_MEMORY)
@@ -59,7 +59,7 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
 
 
 def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
-    """Two-loop recursion."""
+    """Return the search direction by the two-loop recursion."""
     direction, weights = -gradient, []
     for step, change, product in reversed(pairs):
         weights.append(dot(step, direction) / product)
@@ -73,7 +73,7 @@ def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
 
 
 def _searched(function: Function, start: _Point, direction: Array, length: float) -> _Point | None:
-    """Bisect for the weak Wolfe conditions."""
+    """Bisect along a direction for the weak Wolfe conditions."""
     slope = dot(start.gradient, direction)
     low, high, best = 0.0, inf, None
     for _ in range(_TRIALS if slope < 0.0 else 0):
