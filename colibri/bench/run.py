@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,14 +21,12 @@ from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import CHANNELS, serving_figures
 from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
 from colibri.bench.speed import CONTROL_S, LINKS, Peer, Report, rate_figures
-from colibri.bench.stages import BLOCKS, STAGES, stage_figures
+from colibri.bench.stages import BLOCKS, stage_figures
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
-_SERVED = {"p50 µs": "p50", "p99 µs": "p99", "messages a second": "messages_hz"}
-_SPREAD = ("min", "median", "max")
-_QUANTILES = {"p50": "p50", "p99": "p99"}
+_SPREAD, _QUANTILES = ("min", "median", "max"), ("p50", "p99")
 
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
@@ -36,7 +34,7 @@ def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
     if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
         fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")
     if args.out:
-        _check_writable(args.out)
+        _write(args.out)
     if args.against:
         colibri_of(args.against)
     figures: dict[str, Any] = {"settings": _settings(args)}
@@ -55,8 +53,10 @@ def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
         }
         figures |= {name: measure() for name, measure in measures.items() if name in wanted}
     if args.out:
-        _write(figures, args.out)
-    _print(figures)
+        _write(args.out, json.dumps(figures, indent=2, ensure_ascii=False) + "\n")
+    console = Console()
+    for table in _tables(figures):
+        console.print(table)
     return 0
 
 
@@ -90,55 +90,34 @@ def _progress(parts: int) -> Iterator[Report]:
         yield report
 
 
-def _print(figures: Mapping[str, Any]) -> None:
-    console = Console()
-    settings = figures["settings"]
-    if "stages" in figures:
-        for table in _stage_tables(figures["stages"]):
-            console.print(table)
-    if "flights" in figures:
-        title = f"{figures['flights']['track']}, profile {PROFILE}, times real time (min, median, max)"
-        rows = {
-            f"{frames_hz} Hz: {name}": figure
-            for frames_hz, rate in figures["flights"]["rates_hz"].items()
-            for name, figure in rate.items()
-        }
-        console.print(_spread(f"{title}, {settings['runs']} runs", rows))
-    if "sensors" in figures:
-        for table in _sensor_tables(figures["sensors"], settings["runs"]):
-            console.print(table)
-    if "simulators" in figures:
+def _tables(figures: Mapping[str, Any]) -> Iterator[Table]:
+    """Yield the tables of each part that was measured."""
+    runs = f"{figures['settings']['runs']} runs"
+    if stages := figures.get("stages"):
+        horizons = {horizon: measured["us"] for horizon, measured in stages["horizons"].items()}
+        yield _by_horizon(f"{stages['track']}, profile {PROFILE}: stages of a control step, p50 / p99 µs", horizons)
+        yield _by_horizon("QP by solver, p50 / p99 µs, part solved", stages["solvers"])
+        yield _columns("link, µs", stages["link"], _QUANTILES)
+    if flights := figures.get("flights"):
+        rates = flights["rates_hz"].items()
+        rows = {f"{frames_hz} Hz: {name}": figure for frames_hz, rate in rates for name, figure in rate.items()}
+        title = f"{flights['track']}, profile {PROFILE}, times real time (min, median, max), {runs}"
+        yield _columns(title, rows, _SPREAD)
+    if sensors := figures.get("sensors"):
+        yield _columns("step of the estimator, µs", sensors["estimator_us"], _QUANTILES)
+        title = f"{sensors['track']}, profile {PROFILE}, frames at 250 Hz, times real time, {runs}"
+        yield _columns(title, sensors["real_time_factor"], _SPREAD)
+    if simulators := figures.get("simulators"):
         title = "the plant as a simulator, from an autopilot's command to the next frame, µs"
-        console.print(_columns(title, figures["simulators"]["exchange_us"], _QUANTILES))
-    if "ground" in figures:
-        for table in _ground_tables(figures["ground"]):
-            console.print(table)
-    if "commands" in figures:
-        rows = figures["commands"]
-        columns = (*_SPREAD, "goal", *(("other", "ratio") if "ratio" in next(iter(rows.values())) else ()))
-        console.print(_columns(f"whole commands, {settings['runs']} runs", rows, {name: name for name in columns}))
-
-
-def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
-    horizons = stages["horizons"]
-    of = {
-        horizon: {stage.name: measured["us"][stage.name] for stage in STAGES} for horizon, measured in horizons.items()
-    }
-    yield _by_horizon(f"{stages['track']}, profile {PROFILE}: stages of a control step, p50 / p99 µs", of)
-    yield _by_horizon("QP by solver, p50 / p99 µs, part solved", stages["solvers"])
-    yield _columns("link, µs", stages["link"], _QUANTILES)
-
-
-def _sensor_tables(sensors: Mapping[str, Any], runs: int) -> Iterator[Table]:
-    yield _columns("step of the estimator, µs", sensors["estimator_us"], _QUANTILES)
-    title = f"{sensors['track']}, profile {PROFILE}, frames at 250 Hz, times real time, {runs} runs"
-    yield _spread(title, sensors["real_time_factor"])
-
-
-def _ground_tables(ground: Mapping[str, Any]) -> Iterator[Table]:
-    title = f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame"
-    yield _columns(title, {f"{channels} connected": figure for channels, figure in ground["serve"].items()}, _SERVED)
-    yield _columns("control step at real time, µs", ground["control_step_us"], _QUANTILES)
+        yield _columns(title, simulators["exchange_us"], _QUANTILES)
+    if ground := figures.get("ground"):
+        title = f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame"
+        rows = {f"{channels} connected": figure for channels, figure in ground["serve"].items()}
+        yield _columns(title, rows, ("p50", "p99", "messages_hz"), ("p50 µs", "p99 µs", "messages a second"))
+        yield _columns("control step at real time, µs", ground["control_step_us"], _QUANTILES)
+    if commands := figures.get("commands"):
+        others = ("other", "ratio") if "ratio" in next(iter(commands.values())) else ()
+        yield _columns(f"whole commands, {runs}", commands, (*_SPREAD, "goal", *others))
 
 
 def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
@@ -153,18 +132,16 @@ def _of_stage(figure: Mapping[str, float]) -> str:
     return times if figure.get("solved", 1.0) == 1.0 else f"{times}, {100.0 * figure['solved']:.0f} %"
 
 
-def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
-    return _columns(title, rows, {name: name for name in _SPREAD})
-
-
-def _columns(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str]) -> Table:
-    table = _table(title, list(columns))
-    for name, figure in rows.items():
-        table.add_row(name, *(_number(figure[key]) for key in columns.values()))
+def _columns(
+    title: str, rows: Mapping[str, Mapping[str, float]], names: Sequence[str], headings: Sequence[str] = ()
+) -> Table:
+    table = _table(title, headings or names)
+    for row, figure in rows.items():
+        table.add_row(row, *(_number(figure[name]) for name in names))
     return table
 
 
-def _table(title: str, columns: list[str]) -> Table:
+def _table(title: str, columns: Iterable[str]) -> Table:
     table = Table(title=title, title_justify="left")
     table.add_column("")
     for column in columns:
@@ -176,17 +153,10 @@ def _number(value: float) -> str:
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
 
 
-def _check_writable(path: Path) -> None:
-    """Fail before minutes of measurement."""
+def _write(path: Path, text: str = "") -> None:
+    """Write a text; without one only check for permission, rather than after minutes of measurement."""
     try:
-        with path.open("a", encoding="utf-8"):
-            pass
-    except OSError as error:
-        fail(f"cannot write {path}: {error.strerror}")
-
-
-def _write(figures: Mapping[str, Any], path: Path) -> None:
-    try:
-        path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        with path.open("w" if text else "a", encoding="utf-8") as file:
+            file.write(text)
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")

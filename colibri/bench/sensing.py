@@ -1,13 +1,14 @@
 """Cost of sensors: a step of the estimator, and flights on sensors and on the state."""
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
-from colibri.bench.speed import Report, Samples, real_time_factor, summarised
+from colibri.bench.speed import Report, real_time_factor, sampled, summarised
 from colibri.bench.stages import summary
 from colibri.bench.variants import plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -40,14 +41,12 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
         ALWAYS: summary(_timed(profile, frames, lambda _time_us: True)),
         IN_FLIGHT: summary(_timed(profile, frames, lambda time_us: time_us % CONTROL_US == 0)),
     }
-    samples: Samples = {}
-    for run in range(runs):
-        for link in LINKS:
-            for feedback in Feedback:
-                name = f"{link}, {feedback}"
-                report(f"{name}, {run + 1} of {runs}")
-                factor = real_time_factor(plan_of(profile, folder, duration_s, link, feedback))
-                samples.setdefault(name, []).append(factor)
+    plans = {
+        f"{link}, {feedback}": plan_of(profile, folder, duration_s, link, feedback)
+        for link in LINKS
+        for feedback in Feedback
+    }
+    samples = sampled(runs, report, {name: partial(real_time_factor, plan) for name, plan in plans.items()})
     return {
         "track": TRACK,
         "estimator_us": steps,

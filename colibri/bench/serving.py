@@ -4,6 +4,7 @@ import socket
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,7 +15,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.bench.speed import Report
+from colibri.bench.speed import Report, sampled
 from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -32,6 +33,7 @@ CHANNELS = (0, 1, 2, 4, 8)
 KINDS = (GCS, SDK)
 STATIONS = 2
 ALONE, WATCHED = "alone", f"{STATIONS} stations"
+_WATCHING = {ALONE: 0, WATCHED: STATIONS}
 
 _MIN_FRAMES = 4
 """Frames until all code is loaded."""
@@ -43,12 +45,13 @@ def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int
     for channels in CHANNELS:
         report(f"serving {channels} ground stations")
         serve[str(channels)] = served(plan, channels)
-    steps: dict[str, list[Figures]] = {ALONE: [], WATCHED: []}
-    for run in range(runs):
-        for name, flown in steps.items():
-            report(f"control steps, {name}, {run + 1} of {runs}")
-            flown.append(control_steps_us(plan, STATIONS if name == WATCHED else 0))
-    return {"track": TRACK, "serve": serve, "control_step_us": {name: _median(flown) for name, flown in steps.items()}}
+    measures = {name: partial(control_steps_us, plan, stations) for name, stations in _WATCHING.items()}
+    steps = sampled(runs, lambda name: report(f"control steps, {name}"), measures)
+    middle = {
+        name: {key: sorted(figures[key] for figures in flown)[runs // 2] for key in flown[0]}
+        for name, flown in steps.items()
+    }
+    return {"track": TRACK, "serve": serve, "control_step_us": middle}
 
 
 def served(plan: FlightPlan, channels: int) -> Figures:
@@ -80,21 +83,13 @@ def served(plan: FlightPlan, channels: int) -> Figures:
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
     """Fly as two processes at real time with connected ground stations."""
     with ExitStack() as stack:
-        ports = [stack.enter_context(_listening()).getsockname()[1] for _ in range(stations)]
-        links = tuple(f"udpout:127.0.0.1:{port}" for port in ports)
+        sockets = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(stations)]
+        for sock in sockets:  # takes datagrams, and ignores them
+            sock.bind(("127.0.0.1", 0))
+        links = tuple(f"udpout:127.0.0.1:{sock.getsockname()[1]}" for sock in sockets)
         watched = replace(plan, spec=replace(plan.spec, speed=1.0, gcs=links))
         try:
             fly_processes(watched)
         except FlightError as error:
             fail(str(error), EXIT_FAILED)
         return summary(read_recording(watched).control_step_us[1:].tolist())
-
-
-def _listening() -> socket.socket:
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.bind(("127.0.0.1", 0))
-    return sock
-
-
-def _median(flown: list[Figures]) -> Figures:
-    return {name: sorted(figures[name] for figures in flown)[len(flown) // 2] for name in flown[0]}

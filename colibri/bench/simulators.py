@@ -8,7 +8,7 @@ from typing import Any, cast
 from colibri.bench.speed import Report
 from colibri.bench.stages import summary
 from colibri.common.process.lifecycle import Stop
-from colibri.common.process.status import Status
+from colibri.common.process.status import Silent
 from colibri.common.spec import from_values
 from colibri.common.types import Address
 from colibri.mavlink.links.link import Endpoint
@@ -39,15 +39,6 @@ class _Never(Stop):
 
     def __bool__(self) -> bool:
         return False
-
-
-class _Silent(Status):
-    """Prints no status."""
-
-    def __init__(self) -> None:
-        super().__init__("", as_json=False)
-
-    def say(self, event: str, text: str, **facts: Any) -> None: ...
 
 
 class _Answers(Endpoint):
@@ -99,9 +90,9 @@ def _times_us(whom: str, air: dict[str, str], duration_s: float) -> list[float]:
     spec = from_values(PlantSpec, options | air)
     link = _Answers((_of_px4 if whom == PX4 else _of_ardupilot)(frames + 2))
     if whom == PX4:
-        px4_server.run(spec, link, _Silent(), _Never())
+        px4_server.run(spec, link, Silent(), _Never())
     else:
-        ardupilot_server.run(spec, cast(UdpLink, link), _Silent(), _Never())
+        ardupilot_server.run(spec, cast(UdpLink, link), Silent(), _Never())
     return link.times_us
 
 

@@ -1,9 +1,10 @@
 """Real-time factors at several frame rates, beside a peer if there is one."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from colibri.autopilot.control.profile import Profile
 from colibri.bench.variants import TRACK, plan_of, with_intervals
@@ -13,6 +14,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError
 
 Report: TypeAlias = Callable[[str], None]
+T = TypeVar("T")
 Samples: TypeAlias = dict[str, list[float]]
 
 CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
@@ -38,20 +40,29 @@ def rate_figures(
     report("warm up")
     plan = plan_of(profile, folder, _WARM_UP_S, "memory")
     fly_plan(plan)
-    samples: dict[int, Samples] = {frames_hz: {} for frames_hz in CONTROL_S}
-    for run in range(runs):
-        for frames_hz, control_s in CONTROL_S.items():
-            chosen = with_intervals(profile, frame_s=1.0 / frames_hz, control_s=control_s)
-            flown = samples[frames_hz]
-            for link in LINKS:
-                report(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
-                flown.setdefault(link, []).append(real_time_factor(plan_of(chosen, folder, duration_s, link)))
-            if peer is not None:
-                report(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
-                factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_MAX_S))
-                flown.setdefault(peer.name, []).append(factor)
-    rates = {str(frames_hz): _with_ratios(flown, peer) for frames_hz, flown in samples.items()}
+    measures: dict[str, Callable[[], float]] = {}
+    for frames_hz, control_s in CONTROL_S.items():
+        chosen = with_intervals(profile, frame_s=1.0 / frames_hz, control_s=control_s)
+        for link in LINKS:
+            plan = plan_of(chosen, folder, duration_s, link)
+            measures[f"{frames_hz} Hz, {link}"] = partial(real_time_factor, plan)
+        if peer is not None:
+            factor = partial(peer.real_time_factor, frames_hz, min(duration_s, _PEER_MAX_S))
+            measures[f"{frames_hz} Hz, {peer.name}"] = factor
+    samples = sampled(runs, report, measures)
+    names = (*LINKS, peer.name) if peer else LINKS
+    rates = {str(hz): _with_ratios({name: samples[f"{hz} Hz, {name}"] for name in names}, peer) for hz in CONTROL_S}
     return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}
+
+
+def sampled(runs: int, report: Report, measures: Mapping[str, Callable[[], T]]) -> dict[str, list[T]]:
+    """Take each measure in turn, run after run, so that other load weighs on all of them."""
+    samples: dict[str, list[T]] = {name: [] for name in measures}
+    for run in range(runs):
+        for name, measure in measures.items():
+            report(f"{name}, {run + 1} of {runs}")
+            samples[name].append(measure())
+    return samples
 
 
 def summarised(values: Iterable[float]) -> dict[str, float]:

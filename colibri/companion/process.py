@@ -13,7 +13,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track, track_th
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
-from colibri.common.process.status import Status
+from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
@@ -117,7 +117,7 @@ def fly(args: Namespace) -> int:
         wire.link.close()
         fail(str(error))
     companion.peer.sign_with(signing)
-    status = _Quiet() if args.quiet else Status("companion", as_json=False)
+    status = Silent() if args.quiet else Status("companion", as_json=False)
     if plan.note:
         status.say("note", plan.note)
     with occupied(args.out):
@@ -212,15 +212,6 @@ class _Log:
             self._summary.add(row)
             self._writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
         companion.rows.clear()
-
-
-class _Quiet(Status):
-    """Prints no status."""
-
-    def __init__(self) -> None:
-        super().__init__("", as_json=False)
-
-    def say(self, event: str, text: str, **facts: Any) -> None: ...
 
 
 def _signing(path: Path | None) -> Signing | None:

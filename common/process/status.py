@@ -26,6 +26,15 @@ class Status:
             _print(sys.stderr, f"{self._name}: {text}")
 
 
+class Silent(Status):
+    """Reports nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("", as_json=False)
+
+    def say(self, event: str, text: str, **facts: Any) -> None: ...
+
+
 def _print(stream: TextIO, line: str) -> None:
     """Print a line; if the reader has gone, discard all further output: `Stop` detects the parent's end."""
     try:

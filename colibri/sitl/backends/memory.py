@@ -1,14 +1,13 @@
 """Plant and autopilot in this process, without sockets and clock."""
 
 from time import perf_counter
-from typing import Any
 
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.step import answer
 from colibri.autopilot.process.ground import Ground
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.errors import Error
-from colibri.common.process.status import Status
+from colibri.common.process.status import Silent
 from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
@@ -100,7 +99,7 @@ class MemoryAutopilot:
         spec = self._spec
         try:
             self._conductor = _MemoryConductor()
-            self._ground = Ground(spec, *spec.load(), _Silence("", as_json=False), self._conductor)
+            self._ground = Ground(spec, *spec.load(), Silent(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
         self.autopilot = self._ground.autopilot
@@ -165,9 +164,3 @@ class _MemoryConductor:
         self.to_stations = step_message
 
     def close(self) -> None: ...
-
-
-class _Silence(Status):
-    """Prints no events."""
-
-    def say(self, event: str, text: str, **facts: Any) -> None: ...
