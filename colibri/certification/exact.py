@@ -3,7 +3,6 @@
 From the solver only P and the multipliers are used, as written decimals: the loop is rebuilt in fractions.
 """
 
-from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -31,25 +30,20 @@ def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False
         return 0.0
     ratio, stage = exactly(proof.ratio), loop.stage if weighted else 0
     matrices = (decrease(loop, A, P, multipliers, forms, ratio, stage) for A in loop.distinct().vertices)
-    return min([positive_margin(P), *_margins(matrices)])
+    return min([positive_margin(P), *map(positive_margin, matrices)])
 
 
 def limit_margin(loop: UncertainLoop, proof: Proof) -> float:
     """Return the least margin of the limits over the set V <= 1."""
     P = _fractions(proof.P)
-
-    def bordered(row: AnyArray) -> AnyArray:
-        return np.vstack([np.column_stack([P, row]), np.append(row, _ONE)])
-
-    return min(_margins(map(bordered, loop.limits)))
+    bordered = (np.vstack([np.column_stack([P, row]), np.append(row, _ONE)]) for row in loop.limits)
+    return min(map(positive_margin, bordered))
 
 
 def supply_margin(loop: UncertainLoop, proof: Proof) -> float:
     """Return the decrease at V = 1 minus the largest increase by a disturbance."""
-    multipliers = _fractions(proof.multipliers)
     constants = np.append(supply(loop, _fractions(proof.sizes)).constants, _ONE)
-    added = multipliers @ constants
-    return float(1 - exactly(proof.ratio) - added)
+    return float(1 - exactly(proof.ratio) - _fractions(proof.multipliers) @ constants)
 
 
 def positive_margin(M: AnyArray) -> float:
@@ -79,10 +73,6 @@ def is_positive(M: AnyArray) -> bool:
     weights = np.array([1 << int(shift.max() - each) for each in shift], dtype=object)
     diagonal = np.diag(product)
     return bool((abs(product) @ weights < 2 * diagonal * weights).all())
-
-
-def _margins(matrices: Iterable[AnyArray]) -> Iterable[float]:
-    return map(positive_margin, matrices)
 
 
 def _mirrored(loop: UncertainLoop, P: AnyArray, multipliers: AnyArray, forms: AnyArray) -> bool:

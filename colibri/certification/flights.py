@@ -47,24 +47,21 @@ class Flyer(Protocol):
 class AttitudeLaw(CertifiedLaw, Protocol):
     """A law of the attitude, to be certified and flown."""
 
-    @property
-    def what(self) -> str: ...
-
-    @property
-    def not_proven(self) -> tuple[str, ...]: ...
-
-    @property
-    def axes(self) -> tuple[str, str, str]: ...
-
-    @property
-    def conditions(self) -> Conditions: ...
-
-    @property
-    def terminal_weight(self) -> Array:
-        """Of the law's plans, (12, 12)."""
+    what: str
+    axes: tuple[str, str, str]
+    not_proven: tuple[str, ...]
+    conditions: Conditions
+    terminal_weight: Array
+    """Of the law's plans, (12, 12)."""
+    thrust_n: tuple[float, float, float]
+    """Hover between both ends of the profile's range."""
+    thrust_part: float = 1.0
+    """Part of the scale for the thrust."""
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
         """Return the range of the thrust at a scale of the ranges."""
+        (low, hover, high), part = self.thrust_n, self.thrust_part * scale
+        return hover - part * (hover - low), hover + part * (high - hover)
 
     def ranges(self, numbers: AttitudeNumbers) -> str: ...
 

@@ -15,7 +15,7 @@ from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
 from colibri.certification.attitude import AttitudeNumbers, Kinematic, attitude_loop
 from colibri.certification.certificate import Entry
-from colibri.certification.flights import Conditions, Flyer, Momentum
+from colibri.certification.flights import AttitudeLaw, Conditions, Flyer, Momentum
 from colibri.certification.loop import AnyArray, Number, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
@@ -27,8 +27,8 @@ _DIGITS = 10
 """Precision of chosen numbers: short ones keep exact arithmetic short."""
 
 
-class LqrAttitude:
-    """The LQR of a profile's attitude; `thrust_n` is hover between both ends of the profile's range."""
+class LqrAttitude(AttitudeLaw):
+    """The LQR of a profile's attitude."""
 
     what = "LQR of the attitude of lpv-mpc"
     axes = ("φ", "θ", "ψ")
@@ -41,7 +41,7 @@ class LqrAttitude:
         lag = rotor_lag(vehicle, self.interval_s)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self.mpc = AttitudeMpc(settings.attitude, vehicle, lag, solver, self.interval_s, lambda: 0.0)
-        self.body = body_of(vehicle)
+        self.body, self.terminal_weight = body_of(vehicle), self.mpc.problem.terminal_weight
         capacity_ah = vehicle.battery.capacity_ah if vehicle.battery else 0.0
         self._max_squared = square(BatteryModel(vehicle).max_common_speed(conditions.charge_part * capacity_ah))
         outer_loop = OuterLoop(settings.guidance, vehicle, lag, self.interval_s, self.mpc.horizon)
@@ -51,10 +51,6 @@ class LqrAttitude:
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
         return attitude_loop(numbers, number, of_euler_angles)
-
-    @property
-    def terminal_weight(self) -> Array:
-        return self.mpc.problem.terminal_weight
 
     def ranges(self, numbers: AttitudeNumbers) -> str:
         phi, theta = np.degrees(2.0 * np.arctan(numbers.angles))
@@ -67,10 +63,6 @@ class LqrAttitude:
 
     def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
         return _LqrFlyer(entry.numbers, held, rng)
-
-    def thrusts_n(self, scale: float) -> tuple[float, float]:
-        low, hover, high = self.thrust_n
-        return hover - scale * (hover - low), hover + scale * (high - hover)
 
     def numbers_at(self, scale: float) -> AttitudeNumbers:
         vehicle, problem, body = self._vehicle, self.mpc.problem, self.body

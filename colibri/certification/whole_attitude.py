@@ -5,7 +5,6 @@ sample. Its derivative at rest, level, in hover, is the certified gain; its smal
 remainder.
 """
 
-from functools import cached_property
 from itertools import product
 from math import exp, pi, radians, sin, sqrt
 from typing import Any
@@ -20,7 +19,7 @@ from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, Who
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, WholeMpc
 from colibri.certification.attitude import MIRRORS, AttitudeNumbers, Kinematic, attitude_loop
 from colibri.certification.certificate import Entry
-from colibri.certification.flights import Conditions, Flyer, Momentum
+from colibri.certification.flights import AttitudeLaw, Conditions, Flyer, Momentum
 from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
@@ -34,8 +33,6 @@ _ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
 _STEP = 1e-4
 """Step of a derivative, rad, rad/s and N m."""
-_THRUST_PART = 0.5
-"""Range of the thrust over that of the profile; the rest is the rotors' for moments."""
 _SPARED = 0.2
 """Part of the thrust's squared speed that moments leave to every rotor."""
 _HELD_RAD = radians(20.0)
@@ -47,7 +44,7 @@ _ETA_SPARE = 1e-9
 _PREDICTED = 16
 
 
-class WholeAttitude:
+class WholeAttitude(AttitudeLaw):
     """The unconstrained attitude law of a profile; C as in `AttitudeNumbers`."""
 
     what = "unconstrained attitude law of whole-lpv-mpc"
@@ -58,6 +55,7 @@ class WholeAttitude:
         "that the gain is within its bound between a grid of attitudes and thrusts",
         "a thrust that changes",
     )
+    thrust_part = 0.5  # the rest is the rotors' for moments
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
         self._settings, self._vehicle, self.conditions = read_settings(table, WholeLpvMpcSettings), vehicle, conditions
@@ -65,33 +63,22 @@ class WholeAttitude:
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
         solver = QpSolver(qp.solver, qp.tolerance, qp.max_iterations)
         mpc = WholeMpc(plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0)
-        self._terminal, self._from_wrench = mpc.terminal_on_hold, mpc.from_wrench
-        self._to_wrench = self._law.tracker.allocation
+        self._from_wrench, self._to_wrench = mpc.from_wrench, self._law.tracker.allocation
+        of_state = np.zeros((len(mpc.terminal_on_hold), STATES + INPUTS))
+        of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
+        of_state[DEVIATIONS:, _MOMENTS] = self._from_wrench[:, 1:]
+        self.terminal_weight = of_state.T @ mpc.terminal_on_hold @ of_state
         self._horizon = sum(self._settings.plan.blocks)
         capacity_ah = vehicle.battery.capacity_ah if vehicle.battery else 0.0
         self._charge_ah = conditions.charge_part * capacity_ah
         self.max_squared = square(self._law.tracker.battery.max_common_speed(self._charge_ah))
         self._min_squared = square(self._law.tracker.lag.min_speed)
-        self._hover_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, self._hover_n).round(_GAIN_DIGITS)])
+        hover_n, span_n = vehicle.body.mass_kg * vehicle.gravity_m_s2, float(self._to_wrench[0].sum())
+        self.thrust_n = (self._min_squared * span_n, hover_n, self.max_squared * span_n)
+        self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, hover_n).round(_GAIN_DIGITS)])
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
         return attitude_loop(numbers, number, of_error)
-
-    @cached_property
-    def terminal_weight(self) -> Array:
-        S = self._terminal
-        from_moments = self._from_wrench[:, 1:]
-        of_state = np.zeros((len(S), STATES + INPUTS))
-        of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
-        of_state[DEVIATIONS:, _MOMENTS] = from_moments
-        weight: Array = of_state.T @ S @ of_state
-        return weight
-
-    def thrusts_n(self, scale: float) -> tuple[float, float]:
-        span_n, part = float(self._to_wrench[0].sum()), _THRUST_PART * scale
-        least, most = self._min_squared * span_n, self.max_squared * span_n
-        return self._hover_n - part * (self._hover_n - least), self._hover_n + part * (most - self._hover_n)
 
     def ranges(self, numbers: AttitudeNumbers) -> str:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
@@ -107,10 +94,8 @@ class WholeAttitude:
         return _WholeFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
-        momentum, from_moments = (
-            self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed,
-            self._from_wrench[:, 1:],
-        )
+        momentum = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed
+        from_moments = self._from_wrench[:, 1:]
         level = thrusts_n[:, None] * self._from_wrench[:, 0]
 
         def of_moments(moments: Array, changes: Array) -> tuple[Array, Array]:
@@ -195,7 +180,7 @@ class WholeAttitude:
         return np.stack(columns, axis=2)
 
     def _unsure(self, thrusts_n: tuple[float, float]) -> Array:
-        grid = product(np.linspace(-_HELD_RAD, _HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self._hover_n))
+        grid = product(np.linspace(-_HELD_RAD, _HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self.thrust_n[1]))
         differs = [np.abs(self._gain(phi, thrust_n) - self.commanded) for phi, thrust_n in grid]
         unsure: Array = (_BETWEEN * np.max(differs, axis=0)).round(_GAIN_DIGITS)
         return unsure

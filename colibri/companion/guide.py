@@ -13,11 +13,11 @@ from colibri.common.rotations import tilt_deg
 from colibri.companion.identification import steps
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
-from colibri.companion.setpoint_forms import first, message_of, row_of
+from colibri.companion.setpoint_forms import message_of, row_of
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.stack import Response
 from colibri.companion.stacks.thrust_curve import Thrust
-from colibri.companion.steering.law_pilot import Asked, LawPilot
+from colibri.companion.steering.law_pilot import Asked, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
 from colibri.companion.steering.smooth_start import smoothly_started
@@ -80,7 +80,7 @@ class Companion:
         self._law_error = ""
         self._pace = Pace()
         self._stopped = self._brakes = self._on_way = self._has_flown = False
-        self._failing: list[str] = ["clock"]
+        self.failing: list[str] = ["clock"]
         self.ended: Ended | None = None
         self.limit: Limit | None = None
         self.errors = TrackErrors()
@@ -99,17 +99,13 @@ class Companion:
         return self._predictor.thrust_scale
 
     @property
-    def failing(self) -> list[str]:
-        return self._failing
-
-    @property
     def waits_for(self) -> list[str]:
         if self.phase is Phase.CONNECTING:
             return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
         if self.phase is not Phase.CHECKING:
             return []
-        if self._failing or self._settings.dry_run or self._settings.may_arm:
-            return self._failing
+        if self.failing or self._settings.dry_run or self._settings.may_arm:
+            return self.failing
         return ["all is checked: waits for a vehicle that flies, in a mode that holds or takes setpoints"]
 
     def stop(self, why: str) -> None:
@@ -182,7 +178,7 @@ class Companion:
 
     def _look(self, now_us: int) -> None:
         if self.phase is Phase.CHECKING:
-            self._failing = failing(self._check_facts(now_us))
+            self.failing = failing(self._check_facts(now_us))
         elif self.phase in (Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING) and self.limit is None:
             facts = self._flight_facts(now_us)
             self.limit = exceeded(facts, self._settings.limits, self._box)
@@ -198,7 +194,7 @@ class Companion:
             gives_up_s=inf if self._settings.dry_run else self._settings.gives_up_s,
             mode=report.mode,
             modes=self._orders.own_modes(self.phase),
-            failing=len(self._failing) + self._settings.dry_run,
+            failing=len(self.failing) + self._settings.dry_run,
             connected=self.peer.connected and self._thrust is not None,
             armed=report.armed or self._orders.disarms,
             airborne=report.airborne,
@@ -252,7 +248,7 @@ class Companion:
             self._pilot.hold()
             self._brakes = why is Condition.FINISHED
         elif phase is Phase.ENDED:
-            self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self._failing)
+            self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self.failing)
 
     def _may_hand_over(self, now_us: int) -> bool:
         """At the end of a track wait until the vehicle is slow."""
@@ -306,7 +302,7 @@ class Companion:
             return []
         kind, target = self._settings.setpoints, self.peer.target
         name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
-        return [self.peer.encode(name, *fields)]
+        return [self.peer.client.encode(name, *fields)]
 
     def _with_step(self, asked: Asked, now_us: int) -> Asked:
         p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))

@@ -116,7 +116,7 @@ def fly(args: Namespace) -> int:
     except Error as error:
         wire.link.close()
         fail(str(error))
-    companion.peer.sign_with(signing)
+    companion.peer.client.sign_with(signing)
     status = Silent() if args.quiet else Status("companion", as_json=False)
     if plan.note:
         status.say("note", plan.note)
@@ -163,7 +163,7 @@ class _Wire:
 
 def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> Home:
     peer = VehiclePeer()
-    peer.sign_with(signing)
+    peer.client.sign_with(signing)
     seeker, began_s = HomeSeeker(peer), perf_counter()
     while seeker.home is None:
         now_s = perf_counter() - began_s

@@ -5,11 +5,11 @@ from typing import Any
 
 from colibri.autopilot.control.interface import FALLBACK_CODES
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
-from colibri.common.types import Array, Vector
+from colibri.common.types import Array
 from colibri.companion.log import LogRow
 from colibri.companion.settings import SetpointKind
 from colibri.companion.steering import response as model
-from colibri.companion.steering.law_pilot import Asked
+from colibri.companion.steering.law_pilot import Asked, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.conversation import Encoded
 from colibri.mavlink.client.setpoints import attitude_target, position_target
@@ -68,8 +68,3 @@ def row_of(
         *(*predictor.disturbance[:3].tolist(), FALLBACK_CODES[fallback], int(sent)),
     )
     return LogRow(*numbers)
-
-
-def first(rows: Array) -> Vector:
-    x, y, z = rows[0].tolist()
-    return (x, y, z)

@@ -1,7 +1,7 @@
 """The vehicle at the other end of a link: bytes and time in, bytes and timed states out."""
 
 from collections import deque
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from colibri.companion.stacks.recognition import recognised
 from colibri.companion.stacks.stack import Stack
@@ -13,7 +13,6 @@ from colibri.mavlink.client.parameters import ReadParameter
 from colibri.mavlink.client.report import VehicleReport
 from colibri.mavlink.client.states import HANDLES, StateAssembler, TimedState
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Message, mav
-from colibri.mavlink.wire.signing import Signing
 
 OWN_SYSTEM, OWN_COMPONENT = 1, mav.MAV_COMP_ID_ONBOARD_COMPUTER
 _HEARTBEAT_EVERY_US = 500_000
@@ -39,7 +38,7 @@ class VehiclePeer:
 
     def __init__(self, stack: Stack | None = None) -> None:
         own = mav.MAV_TYPE_ONBOARD_CONTROLLER
-        self._client = Client(OWN_SYSTEM, OWN_COMPONENT, kind=own, heartbeat_every_us=_HEARTBEAT_EVERY_US)
+        self.client = Client(OWN_SYSTEM, OWN_COMPONENT, kind=own, heartbeat_every_us=_HEARTBEAT_EVERY_US)
         self.report = VehicleReport()
         self.clock = VehicleClock()
         self.stack = stack
@@ -74,11 +73,11 @@ class VehiclePeer:
         """Send a command until it is acknowledged, unless one of this name is pending."""
         under_way = self._orders.get(name)
         if under_way is None or under_way.result is not None:
-            self._orders[name] = self._client.begin(Command(self.target, number, *params, repeat=_COMMANDS))
+            self._orders[name] = self.client.begin(Command(self.target, number, *params, repeat=_COMMANDS))
 
     def clear(self) -> None:
         for name in [name for name, order in self._orders.items() if order.result is None]:
-            self._client.cancel(self._orders.pop(name))
+            self.client.cancel(self._orders.pop(name))
 
     def state_rate_hz(self, now_us: int) -> float:
         return float(sum(1 for at_us in self._arrivals_us if now_us - at_us <= _SECOND_US))
@@ -88,17 +87,10 @@ class VehiclePeer:
         delays = sorted(self._delays_us)
         return 1e-6 * delays[len(delays) // 2] if delays else 0.0
 
-    def sign_with(self, signing: Signing | None) -> None:
-        """Sign outgoing messages, and drop incoming ones without a valid signature."""
-        self._client.sign_with(signing)
-
-    def encode(self, name: str, *fields: Any) -> bytes:
-        return self._client.encode(name, *fields)
-
     def receive(self, datagram: bytes, now_us: int) -> list[ReceivedState]:
         received = []
-        for message in self._client.receive(datagram, now_us):
-            vehicle = self._client.vehicle
+        for message in self.client.receive(datagram, now_us):
+            vehicle = self.client.vehicle
             self.system = 0 if vehicle is None else vehicle.system
             if self.system == message.source[0]:
                 state = self._take(message, now_us)
@@ -108,13 +100,13 @@ class VehiclePeer:
 
     def poll(self, now_us: int) -> list[bytes]:
         if self.system == 0:
-            return self._client.poll(now_us)
+            return self.client.poll(now_us)
         self._recognise(now_us)
         self._renew_streams(now_us)
-        frames = self._client.poll(now_us)
+        frames = self.client.poll(now_us)
         asked = self.clock.request(now_us)
         if asked is not None:
-            frames.append(self._client.encode("TIMESYNC", *asked))
+            frames.append(self.client.encode("TIMESYNC", *asked))
         return frames
 
     @property
@@ -168,7 +160,7 @@ class VehiclePeer:
         self.stack = stack
         by_bits = stack.integers_by_bits
         self._parameters = [
-            self._client.begin(ReadParameter(self.target, name, by_bits=by_bits, repeat=_PARAMETERS))
+            self.client.begin(ReadParameter(self.target, name, by_bits=by_bits, repeat=_PARAMETERS))
             for name in stack.parameters
         ]
 
@@ -182,6 +174,6 @@ class VehiclePeer:
         wanted_hz = max(streams[name] for name in HANDLES & streams.keys())
         if self.state_rate_hz(now_us) < _ENOUGH_OF_A_STREAM * wanted_hz:
             self._streams = [
-                self._client.begin(set_message_interval(self.target, name, 1e6 / rate_hz, repeat=_COMMANDS))
+                self.client.begin(set_message_interval(self.target, name, 1e6 / rate_hz, repeat=_COMMANDS))
                 for name, rate_hz in streams.items()
             ]

@@ -33,21 +33,19 @@ def interface_checks(subject: Subject) -> Iterator[Row]:
     law = subject.build()
     built = f"law = built({subject.of_law})"
     see = subject.script(f"{built}; print(law.preview)", "built")
-    yield judged(AREA, "control_interval_us, preview", _rhythm_wrong(law), _rhythm(law), see)
+    rhythm = f"{law.control_interval_us / 1000:g} ms; {law.preview[1]} references"
+    yield judged(AREA, "control_interval_us, preview", _rhythm_wrong(law), rhythm, see)
     speed, failure = _initial_wrong(subject, law)
     see = subject.script(f"{built}; law.initial({speed!r})", "built")
     yield judged(AREA, "initial at any rotor speed", failure, f"{len(_speeds(subject))} speeds", see)
     see = subject.script(f"{built}; print(dir(law))", "built")
-    yield judged(AREA, "optional members in whole groups", _halves(law), _has(law), see)
+    found = ", ".join(protocol.members[0] for protocol in OPTIONAL if has(law, protocol)) or "none"
+    yield judged(AREA, "optional members in whole groups", _halves(law), found, see)
     yield _settings(subject)
 
 
 def has(law: Controller[Any], protocol: Protocol) -> bool:
     return all(hasattr(law, member) for member in protocol.members)
-
-
-def _rhythm(law: Controller[Any]) -> str:
-    return f"{law.control_interval_us / 1000:g} ms; {law.preview[1]} references"
 
 
 def _rhythm_wrong(law: Controller[Any]) -> str:
@@ -72,10 +70,6 @@ def _initial_wrong(subject: Subject, law: Controller[Any]) -> tuple[float, str]:
         except Exception as error:
             return speed, f"initial({speed:g}) raised {in_words(error)}"
     return 0.0, ""
-
-
-def _has(law: Controller[Any]) -> str:
-    return ", ".join(protocol.members[0] for protocol in OPTIONAL if has(law, protocol)) or "none"
 
 
 def _halves(law: Controller[Any]) -> str:

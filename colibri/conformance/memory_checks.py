@@ -83,16 +83,8 @@ def _twice(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Take
         yield at, before, step.again(law, _given(step))[1].rotor_speeds
 
 
-def _anew(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Taken:
-    """Repeat by a new law, whose compiled parts are not loaded."""
-    return _chained(subject, [steps])
-
-
-def _in_turn(subject: Subject, steps: list[FlownStep], others: list[FlownStep]) -> Taken:
-    return _chained(subject, [steps, others])
-
-
-def _chained(subject: Subject, flights: list[list[FlownStep]]) -> Taken:
+def _chained(subject: Subject, *flights: list[FlownStep]) -> Taken:
+    """Repeat flights in turn by a new law, whose compiled parts are not loaded."""
     law, memories = subject.build(), [_given(flight[0]) for flight in flights]
     for at, steps in enumerate(zip_longest(*flights)):
         for number, step in enumerate(steps):
@@ -132,13 +124,13 @@ _TRIALS = (
     ),
     Trial(
         "the flight again by a law built anew",
-        _anew,
+        lambda subject, steps, _: _chained(subject, steps),
         "m = s[0].memory; print([(m := (r := a.again(law, m))[0], a.rotor_speeds.tolist(), "
         "r[1].rotor_speeds.tolist())[1:] for a in s][{k}])",
     ),
     Trial(
         "two flights in turn by one law",
-        _in_turn,
+        _chained,
         "a, b = s[{k}], s[-1]; print(a.rotor_speeds.tolist(), b.again(law, b.memory)[1].rotor_speeds.tolist(), "
         "a.again(law, a.memory)[1].rotor_speeds.tolist())",
     ),

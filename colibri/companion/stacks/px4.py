@@ -10,7 +10,6 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
 OFFBOARD, HOLD, LAND = PX4_MODES["Offboard"], PX4_MODES["Hold"], PX4_MODES["Land"]
-STEADY = frozenset({HOLD.custom, PX4_MODES["Takeoff"].custom})
 _HOVER = 0.5
 _RATES_REACHED_S = 2.0
 
@@ -29,7 +28,7 @@ PX4 = Stack(
     offboard=OFFBOARD,
     hold=HOLD,
     last_resort=LAND,
-    steady=STEADY,
+    steady=frozenset({HOLD.custom, PX4_MODES["Takeoff"].custom}),
     streams={
         "ODOMETRY": 100.0,
         "ATTITUDE_QUATERNION": 50.0,

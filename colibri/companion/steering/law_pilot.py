@@ -80,7 +80,7 @@ class LawPilot:
     ) -> None:
         self._profile, self._clock, self._law = profile, clock, law
         self._airframe, self._track = vehicle, track
-        self._build(response)
+        self.adopt(response)
         self._instants = instants(self._loop.preview, self._loop.control_interval_us)
         self._planner = Planner(track, profile.references, self._instants.preview)
         self._behaviour = Behaviour(limits=APPROACH)
@@ -97,19 +97,11 @@ class LawPilot:
         motion.carry(carried, np.ones(1), np.zeros((1, 4)), _NO_DISTURBANCE, 1.0, self._motion)
 
     @property
-    def law(self) -> str:
-        return type(self._loop.controller).__name__
-
-    @property
     def start_enu_m(self) -> Vector:
-        x, y, z = self._planner.horizon(0).position_enu_m[0].tolist()
-        return (x, y, z)
+        return first(self._planner.horizon(0).position_enu_m)
 
     def adopt(self, response: Response) -> None:
-        """Rebuild the law for another response."""
-        self._build(response)
-
-    def _build(self, response: Response) -> None:
+        """Build the law for a response."""
         self._response = response
         self._vehicle = turning_no_faster(self._airframe, response)
         self._loop = ControlLoop(slowed(self._profile, response), self._vehicle, self._clock, self._law)
@@ -127,12 +119,10 @@ class LawPilot:
 
     def fly_track(self) -> None:
         """Go to the track from the present reference, and along it."""
-        first = self._planner.horizon(0)
-        x, y, z = first.position_enu_m[0].tolist()
-        yaw_rad = float(first.yaw_rad[0])
+        start, yaw_rad = self.start_enu_m, float(self._planner.horizon(0).yaw_rad[0])
         self._task = TaskSequence(
-            lambda context: TakeoffTask(z, None, context),
-            lambda context: ApproachTask(GoTo((x, y, z), yaw_rad), context),
+            lambda context: TakeoffTask(start[2], None, context),
+            lambda context: ApproachTask(GoTo(start, yaw_rad), context),
             lambda context: TrackTask(self._planner, self._track.duration_s, context.now_us),
         )
 
@@ -171,23 +161,23 @@ class LawPilot:
         thrust = 0.5 * (before_n + motion.thrust_n(self._rotors, self._motion))
         reached = after
         if self._lags:
-            reached, thrust = self._without_lag(x, speeds), motion.thrust_n(speeds, self._motion)
+            at_speed = np.concatenate((x[: motion.ROTORS.start], speeds))
+            reached, thrust = self._carried(at_speed, speeds), motion.thrust_n(speeds, self._motion)
         now, then = y[model.RATE].tolist(), reached[motion.RATE].tolist()
         p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
         return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
 
-    def _without_lag(self, x: Array, speeds: Array) -> Array:
-        return self._carried(np.concatenate((x[: motion.ROTORS.start], speeds)), speeds)
-
     def _carried(self, x: Array, speeds: Array) -> Array:
-        interval_s = np.array([self.interval_us * 1e-6])
-        return motion.carry(x, interval_s, speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
+        interval_s, battery = np.array([self.interval_us * 1e-6]), self._vehicle.battery
+        voltage_v = 1.0 if battery is None else open_voltage_v(battery, self._loop.charge_ah)
+        return motion.carry(x, interval_s, speeds[None], _NO_DISTURBANCE, voltage_v, self._motion)
 
     def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
         """Replace the references' heading by the vehicle's own, turning at its rate."""
-        turns = _yaw_rate_of(state.euler, state.rate_flu_rad_s)
-        yaw = np.asarray(state.euler[2] + turns * self._ahead_s, dtype=np.float64)
+        (phi, theta, psi), (_, q, r) = state.euler, state.rate_flu_rad_s
+        turns = (sin(phi) * q + cos(phi) * r) / max(cos(theta), _MIN_UPRIGHT)  # THESIS [2.7]
+        yaw = np.asarray(psi + turns * self._ahead_s, dtype=np.float64)
         return horizon._replace(
             yaw_rad=yaw, yaw_rate_rad_s=np.full_like(yaw, turns), yaw_acceleration_rad_s2=np.zeros_like(yaw)
         )
@@ -206,11 +196,6 @@ class LawPilot:
         task = self._flown
         return (time_us - task.began_us) * 1e-6 if isinstance(task, TrackTask) else -1.0
 
-    @property
-    def _voltage_v(self) -> float:
-        battery = self._vehicle.battery
-        return 1.0 if battery is None else open_voltage_v(battery, self._loop.charge_ah)
-
     def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, Vector | None]:
         generator = self._generator
         assert generator.reference is not None, "it was begun"
@@ -226,10 +211,7 @@ class LawPilot:
         wanted = self._task.update(context)
         assert isinstance(wanted, Motion | PlannedMotion), "no task of these asks for attitudes"
         horizon = generator.lead(context, wanted)
-        if not isinstance(wanted, PlannedMotion):
-            return horizon, None
-        x, y, z = wanted.horizon.position_enu_m[0].tolist()
-        return horizon, (x, y, z)
+        return horizon, first(wanted.horizon.position_enu_m) if isinstance(wanted, PlannedMotion) else None
 
 
 def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
@@ -251,10 +233,10 @@ def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
     return turned.replace("rotors.lag", {"time_constant_up_s": behind_s, "time_constant_down_s": behind_s})
 
 
-def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
-    """Return the rate of the heading, rad/s: THESIS [2.7]."""
-    phi, theta, _ = euler
-    return (sin(phi) * rate[1] + cos(phi) * rate[2]) / max(cos(theta), _MIN_UPRIGHT)
+def first(rows: Array) -> Vector:
+    """Return the first row of (n, 3)."""
+    x, y, z = rows[0].tolist()
+    return (x, y, z)
 
 
 def _frame(time_us: int, y: Array) -> StateFrame:
