@@ -25,19 +25,9 @@ class Errors(NamedTuple):
         return float(self.error[part] @ np.linalg.solve(self.covariance[part, part], self.error[part]))
 
 
-class Bounds(NamedTuple):
-    """Bounds of the mean over independent flights."""
-
-    lower: float
-    upper: float
-
-    def hold(self, mean: float) -> bool:
-        return self.lower <= mean <= self.upper
-
-
-def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
+def bounds(numbers: int, flights: int, level: float = 0.95) -> tuple[float, float]:
     """Return bounds of the mean of χ² with `numbers` degrees of freedom over `flights`."""
     from scipy.special import chdtri  # slow to load, and scipy.stats, which has it too, slower: a report does without
 
     lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
-    return Bounds(lower / flights, upper / flights)
+    return lower / flights, upper / flights

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colibri.analysis.consistency import NAVIGATION, Errors
 from colibri.analysis.logs import RecordingError, Rows, at_times, read_blocks, read_series
@@ -65,17 +64,10 @@ class Estimation(NamedTuple):
         }
 
 
-class _Common(NamedTuple):
-    """Masks of the rows of a topic, (n,), and of the truth, (p,), at common instants."""
-
-    said: NDArray[np.bool_]
-    true: NDArray[np.bool_]
-
-
 def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estimation:
     """Compare estimate and filter of a flight, from `start_s` on, with the truth."""
     errors = _read_errors(plan, log, start_s)
-    if not errors.size and not _common(log, ESTIMATE, -np.inf).said.any():
+    if not errors.size and not any(_beside_truth(log, ESTIMATE, -np.inf)):
         raise RecordingError("the flight ended before there was an estimate")
     sensors = plan.vehicle.sensors
     kinds = tuple(kinds_of(sensors)) if sensors else ()
@@ -86,37 +78,30 @@ def read_estimation(plan: FlightPlan, log: TopicReader, start_s: float) -> Estim
 
 def _read_errors(plan: FlightPlan, log: TopicReader, start_s: float) -> Array:
     """Return errors of position and attitude, and distance to the reference, (7, n)."""
-    common = _common(log, ESTIMATE, start_s)
-    errors, lags, first = np.empty((7, np.count_nonzero(common.said))), read_lags(log), 0
-    for said, true in _beside_truth(log, ESTIMATE, common):
-        at = slice(first, first + len(said))
-        errors[:3, at] = (said[:, 1:4] - true[:, 7:10]).T
-        angles = zip(said[:, 7:11].tolist(), true[:, 10:14].tolist(), strict=True)
-        errors[3:6, at] = np.array([_angles_off(estimated, real) for estimated, real in angles]).T
-        reference = position(plan.track, path_times(said[:, 0], lags))
-        errors[6, at] = np.linalg.norm(said[:, 1:4] - reference, axis=1)
-        first = at.stop
-    return errors
+    parts, lags = [np.empty((7, 0))], read_lags(log)
+    for said, true in _beside_truth(log, ESTIMATE, start_s):
+        attitudes = zip(said[:, 7:11].tolist(), true[:, 10:14].tolist(), strict=True)
+        angles = np.array([_angles_off(estimated, real) for estimated, real in attitudes])
+        off_m = np.linalg.norm(said[:, 1:4] - position(plan.track, path_times(said[:, 0], lags)), axis=1)
+        parts.append(np.vstack([(said[:, 1:4] - true[:, 7:10]).T, angles.T, off_m]))
+    return np.concatenate(parts, axis=1)
 
 
 def _read_checks(log: TopicReader, start_s: float, columns: list[int]) -> Array:
     """Return the NEES of each check, and some of its columns, (1 + columns, m)."""
     parts = [np.empty((1 + len(columns), 0))]
-    for checks, truth in _beside_truth(log, FILTER, _common(log, FILTER, start_s)):
+    for checks, truth in _beside_truth(log, FILTER, start_s):
         nees = [_errors(check, true).nees() for check, true in zip(checks, truth, strict=True)]
         parts.append(np.vstack([nees, checks[:, columns].T]))
     return np.concatenate(parts, axis=1)
 
 
-def _common(log: TopicReader, topic: Topic, start_s: float) -> _Common:
+def _beside_truth(log: TopicReader, topic: Topic, start_s: float) -> Iterator[tuple[Array, Array]]:
+    """Yield blocks of a topic and of the truth at the same instants, from `start_s` on."""
     (said_s,), (true_s,) = (read_series(log, each, "t") for each in (topic, TRUTH))
     late = said_s >= start_s
-    return _Common(late & at_times(said_s, true_s), at_times(true_s, said_s[late]))
-
-
-def _beside_truth(log: TopicReader, topic: Topic, common: _Common) -> Iterator[tuple[Array, Array]]:
-    truth = Rows(log, TRUTH, common.true)
-    for said in read_blocks(log, topic, common.said):
+    truth = Rows(log, TRUTH, at_times(true_s, said_s[late]))
+    for said in read_blocks(log, topic, late & at_times(said_s, true_s)):
         yield said, truth.take(len(said))
 
 

@@ -204,7 +204,7 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
     margin_s = _TIME_MARGIN * (end_s - begin_s)
     axes.set_xlim(begin_s - margin_s, end_s + margin_s)
     axes.set_ylabel(panel.quantity)
-    axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
+    axes.yaxis.set_label_coords(-_LABEL_IN / (axes.get_position().width * _WIDTH_IN), 0.5)
     axes.grid(**GRID)
     axes.yaxis.set_major_locator(round_ticks(6))
     axes.ticklabel_format(axis="y", scilimits=_PLAIN, useMathText=True)  # longer labels would reach that of the axis
@@ -217,10 +217,6 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
 def round_ticks(intervals: int) -> MaxNLocator:
     """Return a locator of round numbers, which have short labels."""
     return MaxNLocator(intervals, steps=[1, 2, 5, 10])
-
-
-def _width_in(axes: Axes) -> float:
-    return axes.get_position().width * _WIDTH_IN
 
 
 def line_style(style: Style) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from colibri.analysis.logs import RecordingError, log_of
 from colibri.analysis.lost import Lost, lost
 from colibri.analysis.recording import FlightReader, Samples, TableWriter
-from colibri.analysis.report import Report, encoded_report, report
-from colibri.analysis.series.flight_series import FlightSeries, read_flight
+from colibri.analysis.report import Report, encoded_report, report, write_report
+from colibri.analysis.series.flight_series import read_flight
 from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import FAILURE, failure_text
 from colibri.flights.fly import fly_plan
@@ -82,19 +82,25 @@ def report_of(
     *others: Callable[[Samples], None],
 ) -> Report:
     flight = read_flight(FlightReader(plan, log), *others)
-    return report(plan, log, summary, flight, _lost(plan, flight, failure))
+    gone = lost(plan, flight) if failure is None else Lost(float(flight.t[-1]), failure)
+    return report(plan, log, summary, flight, gone)
 
 
-def keep_flight(plan: FlightPlan, summary: Summary, *others: Callable[[Samples], None]) -> Report:
-    """Write `flight.csv` and `report.json` of a completed flight."""
-    return _write_outcome(plan, summary, None, *others)
+def keep_flight(
+    plan: FlightPlan, summary: Summary | None, *others: Callable[[Samples], None], failure: str | None = None
+) -> Report:
+    """Write `flight.csv` and `report.json` of a flight."""
+    with (plan.out / TABLE).open("wb") as file:
+        found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file).add, *others)
+    write_report(found, plan.out / REPORT)
+    return found
 
 
 def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | None:
     """Write the table of an incomplete flight, and its report if `why` is known."""
     with suppress(RecordingError, LogFormatError, OSError):
         if why is not None:
-            return _write_outcome(plan, None, why)
+            return keep_flight(plan, None, failure=why)
         with (plan.out / TABLE).open("wb") as file:
             read_flight(FlightReader(plan), TableWriter(file).add)
     return None
@@ -110,16 +116,3 @@ def files_of(plan: FlightPlan, report: Report | None, log: TopicReader) -> Itera
             writer.add(part)
         yield TABLE, table.getvalue()
         yield REPORT, encoded_report(report)
-
-
-def _write_outcome(
-    plan: FlightPlan, summary: Summary | None, failure: str | None, *others: Callable[[Samples], None]
-) -> Report:
-    with (plan.out / TABLE).open("wb") as file:
-        found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file).add, *others)
-    (plan.out / REPORT).write_bytes(encoded_report(found))
-    return found
-
-
-def _lost(plan: FlightPlan, flight: FlightSeries, failure: str | None) -> Lost | None:
-    return lost(plan, flight) if failure is None else Lost(float(flight.t[-1]), failure)
