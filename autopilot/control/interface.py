@@ -104,9 +104,9 @@ class Fallback(StrEnum):
 
 
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
-"""How logs and telemetry write the status of a QP: 0 is solved, -1 no QP."""
+"""QP status in logs and telemetry: 0 is solved, -1 without a QP."""
 FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
-"""How they write a fallback: -1 is none."""
+"""Fallback in logs and telemetry; -1 without one."""
 
 
 class Active(NamedTuple):

@@ -68,7 +68,7 @@ class QpSolver:
         self._optimum: Callable[[Qp], _Optimum] = (
             _Daqp(options) if name == _DAQP else _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)
         )
-        self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
+        self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # completes lazy imports before any flight
 
     def solve(self, qp: Qp) -> QpResult:
         try:
@@ -77,7 +77,7 @@ class QpSolver:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if optimum.x is None:
             return QpResult(why_none(qp), None, optimum.iterations)
-        x = np.array(optimum.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
+        x = np.array(optimum.x, dtype=np.float64)  # a copy: some solvers return read-only arrays
         if self._residual(*qp, x, _some(optimum.z), _some(optimum.z_box)) > MAX_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None, optimum.iterations)
         return QpResult(QpStatus.SOLVED, x, optimum.iterations)

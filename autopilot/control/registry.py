@@ -38,7 +38,7 @@ class BuildError(ControllerError, ForeignError):
 
 
 Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
-"""(the profile's table for this controller, the vehicle to control, clock) -> control law."""
+"""(table of the profile, vehicle, clock) -> control law."""
 
 
 def controller_names() -> list[str]:

@@ -28,8 +28,8 @@ _WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way 
 _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
-"""Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
-it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
+"""Standard deviations of the residual, in parts of a rotor's hover thrust and moments: set by errors of the model (mass,
+drag, gusts, weak rotors), far above sensor noise; drag makes moments mostly about z."""
 
 
 class Signature(NamedTuple):
@@ -153,16 +153,16 @@ def _take_in(
     memory: Packed,
 ) -> tuple[int, float]:
     """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence."""
-    it, of = memory[0], numbers[0]
-    speeds_before, before = it.speeds.copy(), it.motion.copy()
-    put(_followed(speeds_before, controls, open_v, of.lag, battery), it.speeds)
+    kept, known = memory[0], numbers[0]
+    speeds_before, before = kept.speeds.copy(), kept.motion.copy()
+    put(_followed(speeds_before, controls, open_v, known.lag, battery), kept.speeds)
     R = rotation_matrix(attitude)
     for i in range(3):
-        it.motion[i], it.motion[3 + i], it.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
+        kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
     if not counts:
-        it.evidence[:] = 0.0
+        kept.evidence[:] = 0.0
         return 0, 0.0
-    return _add_evidence(it, before, speeds_before, of.signature, of.interval_s)
+    return _add_evidence(kept, before, speeds_before, known.signature, known.interval_s)
 
 
 @compiled
@@ -176,7 +176,7 @@ def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag,
 
 @compiled
 def _add_evidence(
-    memory: Memory, before: Array, speeds_before: Array, of: Signature, interval_s: float
+    memory: Memory, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
 ) -> tuple[int, float]:
     """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value."""
     evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
@@ -184,21 +184,21 @@ def _add_evidence(
     h, h_rate = 0.0, 0.0
     for i in range(4):
         squared = 0.5 * (speeds_before[i] * speeds_before[i] + speeds[i] * speeds[i])
-        thrust_n[i] = of.full_thrust_n[i] * squared
-        h += of.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
-        h_rate += of.momentum[i] * (speeds[i] - speeds_before[i]) / interval_s
-    ix, iy, iz = of.inertia[0], of.inertia[1], of.inertia[2]
+        thrust_n[i] = rotors.full_thrust_n[i] * squared
+        h += rotors.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
+        h_rate += rotors.momentum[i] * (speeds[i] - speeds_before[i]) / interval_s
+    ix, iy, iz = rotors.inertia[0], rotors.inertia[1], rotors.inertia[2]
     p, q, r = 0.5 * (before[3] + now[3]), 0.5 * (before[4] + now[4]), 0.5 * (before[5] + now[5])
     residual, expected = np.zeros(4), np.zeros(4)
     for i in range(3):
-        acceleration = (now[i] - before[i]) / interval_s + (of.gravity_m_s2 if i == 2 else 0.0)
-        residual[0] += of.mass_kg * acceleration * 0.5 * (before[6 + i] + now[6 + i])
+        acceleration = (now[i] - before[i]) / interval_s + (rotors.gravity_m_s2 if i == 2 else 0.0)
+        residual[0] += rotors.mass_kg * acceleration * 0.5 * (before[6 + i] + now[6 + i])
     residual[1] = ix * (now[3] - before[3]) / interval_s - (iy - iz) * q * r + q * h
     residual[2] = iy * (now[4] - before[4]) / interval_s - (iz - ix) * p * r - p * h
     residual[3] = iz * (now[5] - before[5]) / interval_s - (ix - iy) * p * q + h_rate
     for row in range(4):
         for i in range(4):
-            expected[row] += of.effect[row, i] * thrust_n[i]
+            expected[row] += rotors.effect[row, i] * thrust_n[i]
         residual[row] -= expected[row]
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
@@ -207,14 +207,14 @@ def _add_evidence(
     for i in range(4):
         added = 0.0
         for row in range(4):
-            missing = of.effect[row, i] * thrust_n[i]
+            missing = rotors.effect[row, i] * thrust_n[i]
             weak, none = residual[row] + _WEAK * missing, residual[row] + missing
             if row > 0:
                 minimum, maximum = _INERT * expected[row], _AGILE * expected[row]
                 if minimum > maximum:
                     minimum, maximum = maximum, minimum
                 weak -= min(max(weak, minimum), maximum)
-            added += 0.5 * (weak * weak - none * none) / (of.variances[row] + noise[row])
+            added += 0.5 * (weak * weak - none * none) / (rotors.variances[row] + noise[row])
         evidence[i] = max(evidence[i] + min(added, MAX_EVIDENCE), 0.0)
         if evidence[i] > evidence[likeliest]:
             likeliest = i

@@ -15,7 +15,7 @@ MAX_INTERVAL_S = 0.02  # longest control interval for the landing: half a radian
 _CLEAR_M = 0.3  # least height for detection: touching ground looks like a rotor
 
 Laws: TypeAlias = tuple[ReducedAttitude, ...]
-"""Of a vehicle's attitude without each of its rotors, (4,)."""
+"""One law for the loss of each rotor, (4,)."""
 
 
 @lru_cache(maxsize=4)

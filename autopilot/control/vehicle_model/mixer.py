@@ -22,9 +22,11 @@ class Mixer:
         return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
     def wrench(self, speeds: Array) -> Array:
+        """Return U1..U4 (4,) of rotor speeds (4,)."""
         return matvec(self._allocation, speeds * speeds)
 
     def momentum(self, speeds: Array) -> float:
+        """Return the rotors' angular momentum h along body z, N m s."""
         return dot(self._momentum, speeds)
 
 

@@ -41,9 +41,8 @@ from colibri.plant.vehicle.description import Vehicle
 _RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
 _AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
 _SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
-"""At first, no rotor has more than so many shares of the thrust that must point along its axis, or than such a part of
-its share in hover: where little thrust is to be made, moments must not make much of it. A vehicle that stands, and does
-not know it, would be tipped over by the moments that it takes for a disturbance."""
+"""In the first steps each rotor is limited to `_SHARES` times its share of the required thrust, but at least `_ALWAYS`
+times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
 
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
 
@@ -202,7 +201,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         tracked, observed = memory.tracked, inputs.observed
         commands, after = self.tracker.actuate(tracked, observed, squared)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
-        phi, theta, psi = planning.first_angles(wanted.record)
+        phi, theta, psi = planning.first_angles(wanted.target)
         path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
         how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
         return Memory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
@@ -217,7 +216,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Return squared rotor speeds, the plan to continue, its age, and diagnostics."""
-        _, target, force, path = wanted
+        target, force, path = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())

@@ -22,8 +22,7 @@ _STILL_M_S = 1e-3
 class Wanted(NamedTuple):
     """The target of a plan."""
 
-    target: Target  # at each sample
-    record: Packed  # packed `target`
+    target: Packed  # the `Target`
     force: Array  # to align thrust with now, N, ENU, (3,)
     path: PathNow | None = None  # nominal speeds along the path, if free
 
@@ -40,13 +39,14 @@ class TargetBuilder:
         self._record = packed(
             Target(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(ROTORS))
         )
-        self._target = it = opened(self._record, Target)
-        self._near, self._flat = (it.position, it.velocity, it.acceleration), _flat_of(it)
+        self._target = target = opened(self._record, Target)
+        self._near = (target.position, target.velocity, target.acceleration)
+        self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
 
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
         (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
         feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
-        return Wanted(self._target, self._record, force)
+        return Wanted(self._record, force)
 
     def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return the target of references at the path times of the previous plan.
@@ -75,7 +75,7 @@ class TargetBuilder:
         part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
         bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
         force = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
-        return Wanted(target, self._record, force, PathNow(speeds, slopes, part, bounds))
+        return Wanted(self._record, force, PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
         """Return the vehicle's speed along the path, (1,); 1 at a standstill."""
@@ -91,7 +91,7 @@ class TargetBuilder:
         feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
         target.yaw_rad[:], target.end_squared[:] = angles[:, 2], flat.squared[-1]
         target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
-        return Wanted(target, self._record, flat.forces[0].copy())
+        return Wanted(self._record, flat.forces[0].copy())
 
 
 def _motion(samples: int) -> tuple[Array, Array, Array]:
@@ -102,7 +102,3 @@ def _flat(samples: int) -> Flat:
     return Flat(
         np.empty((samples, 3)), np.empty((samples, 3, 3)), np.empty((samples - 2, 3)), np.empty((samples - 1, ROTORS))
     )
-
-
-def _flat_of(target: Target) -> Flat:
-    return Flat(target.forces, target.attitudes, target.rates, target.squared)
