@@ -28,7 +28,7 @@ _WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way 
 _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
-"""Standard deviations of the residual, in parts of a rotor's hover thrust and moments: set by errors of the model (mass,
+"""Standard deviations of the residual, in parts of a rotor's hover thrust and moments, by errors of the model (mass,
 drag, gusts, weak rotors), far above sensor noise; drag makes moments mostly about z."""
 
 
