@@ -18,8 +18,8 @@ class Home:
         self.yaw_rad = 0.0
         self.chosen = False
 
-    def move(self, position_enu_m: Vector, yaw_rad: float) -> None:
-        self.position_enu_m, self.yaw_rad, self.chosen = position_enu_m, yaw_rad, True
+    def move(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
+        self.position_enu_m, self.yaw_rad, self.chosen = position_enu_m, yaw_rad, chosen
 
     def propose(self, position_enu_m: Vector, yaw_rad: float) -> None:
         if not self.chosen:
@@ -33,6 +33,3 @@ class Home:
     def move_origin(self, place: Geodetic) -> None:
         """Set the origin of the ENU frame; ENU coordinates keep their values."""
         self.origin = place
-
-    def resume(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool) -> None:
-        self.position_enu_m, self.yaw_rad, self.chosen = position_enu_m, yaw_rad, chosen

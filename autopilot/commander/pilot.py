@@ -144,7 +144,7 @@ class Pilot:
         `again` returns the task that continues a mode. A `seamless` restart took no time and keeps the reference.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
-        self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
+        self.home.move(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
         self.speed_m_s, self.lag_us = record.speed_m_s, record.lag_us
         ground = record.ground
         came_down = not seamless and not ground.standing and stands_at_first(vehicle, ground.height_m)

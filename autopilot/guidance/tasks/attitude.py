@@ -25,7 +25,7 @@ class TiltLoop:
     """Slews attitude and thrust by a generator."""
 
     def __init__(self, generator: AttitudeReference) -> None:
-        self._generator = generator
+        self.generator = generator
         self._memory: ReferenceMemory | None = None
 
     def forget(self) -> None:
@@ -33,10 +33,10 @@ class TiltLoop:
 
     def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
         if self._memory is None:
-            self._memory = self._generator.initial(context.state)
-        self._memory, demand = self._generator.step(self._memory, context.state, command)
+            self._memory = self.generator.initial(context.state)
+        self._memory, demand = self.generator.step(self._memory, context.state, command)
         # of a thrust of nan both are False: a vehicle that stands stays, one that flies does not sink
-        share = command.thrust_n / self._generator.weight_n
+        share = command.thrust_n / self.generator.weight_n
         return AttitudeMotion(demand, moving_with(context.state), lifts=share > _LIFTING, sinks=share < _SINKING)
 
 
@@ -45,14 +45,13 @@ class StabilizedTask(EndlessTask):
 
     def __init__(self, generator: AttitudeReference) -> None:
         self._tilt = TiltLoop(generator)
-        self._generator = generator
         self._stop = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
-        return self._tilt.by_command(self._generator.from_sticks(without_play(sticks)), context)
+        return self._tilt.by_command(self._tilt.generator.from_sticks(without_play(sticks)), context)
 
 
 class AltitudeTask(EndlessTask):
@@ -60,7 +59,6 @@ class AltitudeTask(EndlessTask):
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         self._tilt = TiltLoop(generator)
-        self._generator = generator
         self._stop = HoldTask()
         self._loop = HeightLoop(generator.weight_n, gravity_m_s2)
         self._height_m: float | None = None
@@ -70,7 +68,7 @@ class AltitudeTask(EndlessTask):
         if sticks is None:
             return self._stop.update(context)
         reference, lifting = self._climb(sticks, context)
-        command = self._generator.from_sticks(without_play(sticks))._replace(
+        command = self._tilt.generator.from_sticks(without_play(sticks))._replace(
             thrust_n=self._loop.thrust_n(reference, context)
         )
         motion = self._tilt.by_command(command, context)

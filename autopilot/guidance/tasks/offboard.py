@@ -21,7 +21,7 @@ class OffboardTask(EndlessTask):
     """Setpoints of a companion."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
-        self._attitude, self._tilt = attitude, TiltLoop(attitude) if attitude else None
+        self._tilt = TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
@@ -31,9 +31,9 @@ class OffboardTask(EndlessTask):
                 self._tilt.forget()
             self._hold = HoldTask()
             return Motion(position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits)
-        if isinstance(setpoint, AttitudeSetpoint) and self._attitude and self._tilt:
+        if isinstance(setpoint, AttitudeSetpoint) and self._tilt:
             self._hold = HoldTask()
-            return self._tilt.by_command(self._attitude.from_setpoint(setpoint), context)
+            return self._tilt.by_command(self._tilt.generator.from_setpoint(setpoint), context)
         return self._hold.update(context)
 
 
