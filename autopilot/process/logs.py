@@ -3,13 +3,12 @@
 from collections.abc import Iterable, Iterator, Mapping
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback, Horizon
-from colibri.autopilot.core.step import Step
+from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.estimation.estimate import Check, Estimate
 from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.measurements.table import kinds_of
@@ -34,9 +33,6 @@ from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
 from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
 from colibri.mavlink.ulog.status import Status, status_message
-
-if TYPE_CHECKING:
-    from colibri.autopilot.core.step import Received
 
 _FLYING = Status(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _STILL = (nan,) * 4
@@ -111,7 +107,7 @@ class AutopilotLog:
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
         self._begins = True
 
-    def recorded(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
+    def recorded(self, datagrams: Iterable[Received]) -> Iterator[Received]:
         """Record and yield datagrams; raise LogError after the last."""
         failed: LogError | None = None
         for received in datagrams:
