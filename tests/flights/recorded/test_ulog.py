@@ -162,22 +162,21 @@ def test_two_processes_write_one_file_with_the_same_numbers(on_state: Flown, tmp
 
 
 @pytest.mark.parametrize(
-    ("command", "options", "said"),
+    ("command", "said"),
     [
-        (info.main, [], "vehicle_local_position_groundtruth (0, "),
-        (params.main, [], "WHL_"),
-        (messages.main, [], "INFO: spiral, profile flight"),
+        (info.main, "vehicle_local_position_groundtruth (0, "),
+        (params.main, "WHL_"),
+        (messages.main, "INFO: spiral, profile flight"),
     ],
 )
 def test_px4s_commands_read_it(
     command: Callable[[], None],
-    options: list[str],
     said: str,
     either: Flown,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["ulog", str(either.folder / "flight.ulg"), *options])
+    monkeypatch.setattr(sys, "argv", ["ulog", str(either.folder / "flight.ulg")])
     command()
     shown = capsys.readouterr()
     assert said in shown.out
