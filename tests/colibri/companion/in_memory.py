@@ -10,6 +10,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
+from colibri.companion.supervision.ending import Ended
 from colibri.companion.supervision.phases import Phase
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
@@ -45,10 +46,7 @@ class Ride(Generic[Flown]):
     """A companion on a link of its own to a vehicle.
 
     Attributes:
-        sitl: The vehicle.
-        companion: The companion.
         trouble: What the link does; may be changed at any time.
-        law: The control law.
         sent: When and what the companion has sent, before the link.
         polls_every_us: How seldom the computer gets round to the companion.
     """
@@ -104,8 +102,10 @@ class Ride(Generic[Flown]):
             assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
             self.step()
 
-    def to_the_end(self, within_s: float) -> None:
+    def to_the_end(self, within_s: float) -> Ended:
         self.until(lambda: self.companion.ended is not None, within_s)
+        assert self.companion.ended
+        return self.companion.ended
 
 
 class Port:

@@ -17,9 +17,7 @@ def test_a_bad_link_loses_no_flight(seed: int) -> None:
         track = "lemniscate:lap=8" if seed % 2 else "spiral"
         settings = CompanionSettings(may_arm=True, duration_s=18.0)
         ride = Ride(sitl, track, settings, trouble=Trouble(delay_s=0.03, jitter_s=0.01, loss=0.05), seed=seed)
-        ride.to_the_end(80.0)
-        ended = ride.companion.ended
-        assert ended
+        ended = ride.to_the_end(80.0)
         assert ended.in_order, ended.why
         print(f"{track} seed {seed}: {ride.companion.errors.rmse_m():.4f} m, at most {ride.companion.errors.max_m:.4f}")  # noqa: T201
         assert ride.companion.errors.rmse_m() <= 0.15

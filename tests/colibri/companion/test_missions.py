@@ -133,9 +133,7 @@ def test_a_mission_is_flown_from_the_vehicles_home(tmp_path: Path) -> None:
         assert given.points_enu_m == pytest.approx(np.array(PLACES), abs=0.03)
         flown = track_through(given, load_vehicle("hummingbird"), load_profile("flight"), seeker.home.up_m).track
         ride = Ride(sitl, flown, CompanionSettings())
-        ride.to_the_end(40.0)
-        ended = ride.companion.ended
-        assert ended
+        ended = ride.to_the_end(40.0)
         assert ended.in_order, ended.why
         assert ride.companion.errors.rmse_m() < 0.05
         assert sitl.position == pytest.approx(PLACES[-1], abs=0.3)
