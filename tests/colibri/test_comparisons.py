@@ -7,22 +7,20 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
+import colibri
 from colibri.autopilot.control import loop
-from colibri.autopilot.control.interface import Decision, Preview
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.campaigns.definition import Point
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.engines.pool import Pool
 from colibri.cli.main import main
-from colibri.plant.vehicle.description import Vehicle
 from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
-from tests.support.campaigns import Here
+from tests.support.campaigns import Here, Hovers
 from tests.support.commands import Refused
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
@@ -147,20 +145,11 @@ def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: py
     assert json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["profile"]["name"] == "t2"
 
 
-class Raises:
-    control_interval_us = 10_000
-    preview = Preview(10_000, 1)
-
-    def __init__(self, _settings: object, vehicle: Vehicle, _clock: object) -> None:
-        self.speeds = np.full(4, vehicle.hover_speed)
-
-    def initial(self, _rotor_speed: float) -> None:
-        pass
-
-    def step(self, _memory: None, time_us: int, *_: object) -> tuple[None, Decision]:
+class Raises(Hovers):
+    def step(self, memory: None, time_us: int, state: colibri.VehicleState, references: object) -> Any:
         if time_us == 200_000:
             raise KeyError("gain")
-        return None, Decision(self.speeds, (0.0, 0.0, 0.0))
+        return super().step(memory, time_us, state, references)
 
 
 def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(

@@ -89,17 +89,6 @@ def test_each_package_has_one_base() -> None:
             assert base in above, f"{path}: {name}"
 
 
-def test_no_one_lists_errors_by_hand() -> None:
-    errors = exceptions()
-    for path, tree in sources():
-        for node in ast.walk(tree):
-            caught = node.type if isinstance(node, ast.ExceptHandler) else node
-            if not isinstance(caught, ast.Tuple | ast.BinOp):
-                continue
-            listed = [name for name in names(caught) if name in errors]
-            assert len(listed) < 2, f"{path}:{caught.lineno}: {listed}"
-
-
 def test_errors_in_flight_and_of_tests_have_a_second_base() -> None:
     assert issubclass(DecisionError, InFlightError)
     assert issubclass(IntegrationError, InFlightError)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import colibri
 from colibri.analysis.recording import COLUMNS
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flights import common_of, plan_point
@@ -105,11 +104,6 @@ def test_a_limit_is_both_sides() -> None:
     plan = plan_of(**case("limits", ("spiral", "600", "without"), ""))
     assert plan.vehicle.rotors.max_speed == plan.plant_vehicle.rotors.max_speed == 600.0
     assert plan.vehicle.battery is plan.plant_vehicle.battery is None
-
-
-def test_a_flight_is_that_of_the_command_line(short: Flown) -> None:
-    track, options = str(SHORT["track"]), {name: value for name, value in SHORT.items() if name != "track"}
-    assert colibri.fly(track, **options).sha256 == short.recording.trajectory_sha256
 
 
 def test_figures_of_merit(short: Flown) -> None:

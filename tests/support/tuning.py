@@ -24,6 +24,26 @@ TABLES: dict[str, Any] = {
     "objectives": {"rmse_m": "mean"},
 }
 
+FILE = """
+name = "short"
+trials = {trials}
+seeds = "1-4"
+prune_after = 0
+metrics = ["rmse_m"]
+[fly]
+duration = 0.2
+start = {{ x = 0.1, z = 2.0 }}
+turbulence = "moderate"
+[grid]
+track = ["hover"]
+[tune]
+"controllers.whole-lpv-mpc.weights.position" = {{ log-uniform = [1, 1000] }}
+"controllers.whole-lpv-mpc.weights.rate" = {{ log-uniform = [0.001, 1.0] }}
+[objectives]
+rmse_m = "mean"
+"""
+"""The same as a file, but for how many trials."""
+
 
 def planned(**tables: Any) -> Tuning:
     return tuning_of(TuningTables(**(TABLES | tables)))

@@ -2,7 +2,6 @@
 
 import json
 import tracemalloc
-from dataclasses import fields
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from hypothesis import strategies as st
 from colibri.analysis.estimation import read_estimation, rms
 from colibri.analysis.logs import Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.analysis.outcome import keep_flight
-from colibri.analysis.recording import COLUMNS, FlightReader, Recording, read_recording
+from colibri.analysis.recording import COLUMNS, FlightReader, read_recording
 from colibri.analysis.series import figure_series
 from colibri.analysis.series.figure_series import FigureSeries
 from colibri.analysis.series.flight_series import read_flight
@@ -76,29 +75,6 @@ def test_instants_are_the_same_to_the_microsecond() -> None:
         True,
     ]
     assert not at_times(instants_s, np.empty(0)).any()
-
-
-@pytest.mark.long
-def test_parts_joined_are_the_flight_to_the_bit(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_blocks(monkeypatch, ALL_ROWS)
-    whole, (as_one,) = read_recording(plan), FlightReader(plan)
-    assert np.array_equal(as_one.table, whole.table)
-    assert len(whole.table) == len(whole.slack) + 1 == FlightReader(plan).samples
-    for size in (A_BLOCK, SOME_ROWS):
-        in_blocks(monkeypatch, size)
-        assert len(list(FlightReader(plan))) > (4 if size == SOME_ROWS else 15)
-        again = read_recording(plan)
-        for name in (each.name for each in fields(Recording)):
-            assert np.array_equal(getattr(again, name), getattr(whole, name)), name
-
-
-@pytest.mark.long
-def test_report_and_table_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_blocks(monkeypatch, ALL_ROWS)
-    whole = kept(plan)
-    for size in (A_BLOCK, SOME_ROWS):
-        in_blocks(monkeypatch, size)
-        assert kept(plan) == whole
 
 
 def test_the_report_is_that_of_the_whole_table(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,17 +43,6 @@ def test_it_is_interrupted_and_goes_on_though_a_worker_is_killed(tmp_path: Path,
 
 
 @pytest.mark.long
-def test_it_is_killed_and_goes_on(tmp_path: Path, expected: tuple[str, str]) -> None:
-    out = tmp_path / "out"
-    with begin(out, "--workers", "2") as first:
-        rows(out, 5)
-        first.kill()
-    with begin(out, "--workers", "2", "--resume") as second:
-        assert second.wait(PATIENCE_S) == 0
-    assert tables_in(out) == expected
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("least", range(0, 40, 2))
 def test_it_is_killed_at_any_instant_and_goes_on(tmp_path: Path, expected: tuple[str, str], least: int) -> None:
     out = tmp_path / "out"

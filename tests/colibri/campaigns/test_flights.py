@@ -52,17 +52,6 @@ def test_a_key_multiplies_each_of_several_numbers_or_one() -> None:
     assert row.sha256 == colibri.fly("spiral", plant_vehicle=weak, **SHORT).sha256
 
 
-def test_profiles_laws_and_metrics_may_be_objects() -> None:
-    def sunk(flight: colibri.Flight) -> float:
-        return float(flight.samples["z"][0] - flight.samples["z"][-1])
-
-    profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 0.9})
-    (row,) = flown(fly=SHORT | {"profile": profile}, grid={"track": ["hover"], "controller": [Hovers]}, metrics=sunk)
-    flight = colibri.fly("hover", controller=Hovers, profile=profile, **SHORT)
-    assert (row.sha256, row.metrics) == (flight.sha256, (sunk(flight),))
-    assert sunk(flight) > 0.01
-
-
 def test_nothing_is_read_where_it_is_flown(tmp_path: Path) -> None:
     profile, wind = tmp_path / "own.toml", tmp_path / "wind.csv"
     profile.write_text(profile_text("flight"), encoding="utf-8")

@@ -6,13 +6,12 @@ time; and both as they fly, of which nothing is proven.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
 
 from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Diagnostics, VehicleState
-from colibri.autopilot.control.lpv_mpc import law as lpv_mpc
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.parts.vehicle_tracking import Tracked
@@ -28,7 +27,7 @@ from colibri.certification.lqr_attitude import LqrAttitude
 from colibri.certification.whole_attitude import WholeAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
-from colibri.common.types import Array
+from colibri.common.types import Array, Quaternion
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import fixed_step
 from colibri.plant.physics.parameters import parameters_of
@@ -46,67 +45,51 @@ def table(name: str) -> dict[str, Any]:
     return load_profile("flight").table(name)
 
 
-class Case(Protocol):
-    """A certified law, and what its errors are in the plant."""
-
-    name: str
-    certified: AttitudeLaw
-
-    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
-        """Return the quaternion of errors to a level attitude."""
-
-    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
-        """Return the errors of a quaternion."""
-
-    def memory(self, tracked: Tracked, remembered: Array) -> Any:
-        """Return the memory of a law that has last commanded these moments."""
-
-    def remembered(self, memory: Any) -> Array:
-        """Return the moments that the law has last commanded."""
-
-
 class Lqr:
     name = "lpv-mpc"
     certified: AttitudeLaw = LqrAttitude(table(name), VEHICLE, CONDITIONS)
     begun = LpvMpc(table(name), VEHICLE, lambda: 0.0).initial(VEHICLE.hover_speed)
 
-    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
+    def attitude(self, angles: Array) -> Quaternion:
         return quaternion_from_euler(*angles.tolist())
 
-    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
+    def angles(self, attitude: Quaternion) -> Array:
         return np.array(euler_from_quaternion(attitude))
 
-    def memory(self, tracked: Tracked, remembered: Array) -> lpv_mpc.Memory:
+    def memory(self, tracked: Tracked, remembered: Array) -> Any:
         return self.begun._replace(tracked=tracked, moments=remembered)
 
-    def remembered(self, memory: lpv_mpc.Memory) -> Array:
-        return memory.moments
+    def remembered(self, memory: Any) -> Array:
+        moments: Array = memory.moments
+        return moments
 
 
 class Whole:
     name = "whole-lpv-mpc"
     certified: AttitudeLaw = WholeAttitude(table(name), VEHICLE, CONDITIONS)
 
-    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
+    def attitude(self, angles: Array) -> Quaternion:
         x, y, z = (0.5 * angles).tolist()
         return float(np.sqrt(1.0 - x * x - y * y - z * z)), x, y, z
 
-    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
+    def angles(self, attitude: Quaternion) -> Array:
         errors: Array = 2.0 * np.copysign(1.0, attitude[0]) * np.array(attitude[1:])
         return errors
 
-    def memory(self, tracked: Tracked, remembered: Array) -> whole_lpv_mpc.Memory:
+    def memory(self, tracked: Tracked, remembered: Array) -> Any:
         commands, level = (np.linalg.solve(ALLOCATION, [HOVER_N, *moments]) for moments in (remembered, np.zeros(3)))
         states = np.tile(np.concatenate([np.zeros(12), level]), (29, 1))
         return whole_lpv_mpc.Memory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
 
-    def remembered(self, memory: whole_lpv_mpc.Memory) -> Array:
+    def remembered(self, memory: Any) -> Array:
         assert memory.plan
         moments: Array = ALLOCATION[1:] @ memory.plan.commands[memory.age]
         return moments
 
 
 LQR, WHOLE = Lqr(), Whole()
+Case: TypeAlias = Lqr | Whole
+"""A certified law, and what its errors are in the plant."""
 
 
 def invariant(case: Case) -> certificates.Entry:

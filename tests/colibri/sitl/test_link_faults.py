@@ -17,7 +17,6 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.errors import SitlError
-from colibri.sitl.fleet import Fleet
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 
@@ -116,22 +115,6 @@ def test_a_flight_over_a_link_that_carries_nothing_ends() -> None:
             sitl.step()
 
 
-def test_orders_pass_a_bad_link_to_the_ground() -> None:
-    def fly(sitl: Sitl) -> None:
-        sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
-        sitl.set_param("RTL_RETURN_ALT", 6.0)
-        items = sitl.items
-        sitl.upload_mission([items.waypoint(0.0, north, 3.0) for north in range(10)])
-        sitl.upload_fence(items.circle(30.0))
-        sitl.start_mission()
-        assert sitl.mode is Mode.MISSION
-        assert sitl.get_param("RTL_RETURN_ALT") == 6.0
-
-    first = flown(None, fly, airborne=3.0, seed=1)
-    assert flown(None, fly, airborne=3.0, seed=1) == first
-    assert flown(None, fly, airborne=3.0, seed=2) != first
-
-
 def test_sticks_are_held_whatever_is_done_meanwhile() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         sitl = flights.begin()
@@ -197,26 +180,9 @@ def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
     with Flights(Setting(airborne=3.0), launcher) as flights:
         sitl = flights.begin()
         sitl.run(0.1)
-        os.kill(process_of(sitl, package), signal.SIGKILL)
+        os.kill(sitl.processes[package], signal.SIGKILL)
         with pytest.raises(SessionError, match=f"the {package} was killed by SIGKILL"):
             sitl.run(1.0)
-
-
-def test_a_fleet_flies_as_each_flies_alone() -> None:
-    with Flights(Setting(airborne=3.0), None) as flights:
-        fleet = Fleet(flights.begin(system=system, seed=system) for system in (1, 2))
-        fleet[1].goto(1.0, 0.0, 3.0, wait=False)
-        fleet.run(0.5)
-        together = [sitl.sha256 for sitl in fleet]
-        assert {sitl.time_us for sitl in fleet} == {fleet[1].time_us}
-
-    def alone(sitl: Sitl) -> None:
-        if sitl.system == 2:
-            sitl.goto(1.0, 0.0, 3.0, wait=False)
-        while sitl.time_us < fleet[0].time_us:
-            sitl.step()
-
-    assert together == [flown(None, alone, airborne=3.0, system=system, seed=system)[0] for system in (1, 2)]
 
 
 def test_a_process_that_cannot_begin_is_quoted() -> None:
@@ -225,10 +191,6 @@ def test_a_process_that_cannot_begin_is_quoted() -> None:
         pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*unknown vehicle"),
     ):
         flights.begin()
-
-
-def process_of(sitl: Sitl, package: str) -> int:
-    return sitl.processes[package]
 
 
 def test_step_messages_come_whole_in_any_order() -> None:

@@ -194,6 +194,10 @@ def test_a_failure_is_reported_even_if_its_flight_is_not_kept(
         ("vehicle(model='iris')", "mark is vehicle(name): what is flown; not vehicle(model='iris')"),
         ("wind('5@270', 'light', 3)", "mark is wind(wind, turbulence=None): *; not wind('5@270', 'light', 3)"),
         ("sitl('iris')", "mark is sitl(*): what the flight begins with; not sitl('iris')"),
+        ("sitl(winds='3@0')", 'unknown option "winds" (did you mean "wind"?)'),
+        ("wind('three')", "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three"),
+        ("sitl(params={'NO_SUCH': 1.0})", 'unknown parameter "NO_SUCH" (choose *'),
+        ("vehicle('no-such')", "*no-such*"),
     ],
 )
 def test_a_mark_that_is_not_written_so_is_refused_in_one_line(pytester: pytest.Pytester, mark: str, line: str) -> None:
@@ -201,41 +205,6 @@ def test_a_mark_that_is_not_written_so_is_refused_in_one_line(pytester: pytest.P
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines([line.replace("[", "[[]")])
     result.stdout.no_fnmatch_line("*Error*")
-
-
-def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester) -> None:
-    result = run(
-        pytester,
-        """
-        import pytest
-
-        @pytest.mark.sitl(winds="3@0")
-        def test_unknown(sitl):
-            pass
-
-        @pytest.mark.wind("three")
-        def test_wind(sitl):
-            pass
-
-        @pytest.mark.sitl(params={"NO_SUCH": 1.0})
-        def test_parameter(sitl):
-            pass
-
-        @pytest.mark.vehicle("no-such")
-        def test_vehicle(sitl):
-            pass
-        """,
-    )
-    result.assert_outcomes(errors=4)
-    result.stdout.fnmatch_lines(
-        [
-            'unknown option "winds" (did you mean "wind"?)',
-            "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three",
-            'unknown parameter "NO_SUCH" (choose *',
-            "*no-such*",
-        ]
-    )
-    result.stdout.no_fnmatch_line("During handling of the above exception*")
 
 
 def test_a_ground_link_is_bad_by_option_or_mark(pytester: pytest.Pytester) -> None:

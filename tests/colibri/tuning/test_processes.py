@@ -11,33 +11,15 @@ import pytest
 from colibri.tuning.run import Watcher, fly_tuning
 from colibri.tuning.trials import JOURNAL
 from tests.support.campaigns import Here
-from tests.support.tuning import WEIGHTS, files_in, planned, tuned
+from tests.support.tuning import FILE, files_in, planned, tuned
 
 PATIENCE_S = 120.0
 TRIALS = 12
-FILE = f"""
-name = "short"
-trials = {TRIALS}
-seeds = "1-4"
-prune_after = 0
-metrics = ["rmse_m"]
-[fly]
-duration = 0.2
-start = {{ x = 0.1, z = 2.0 }}
-turbulence = "moderate"
-[grid]
-track = ["hover"]
-[tune]
-"{WEIGHTS}.position" = {{ log-uniform = [1, 1000] }}
-"{WEIGHTS}.rate" = {{ log-uniform = [0.001, 1.0] }}
-[objectives]
-rmse_m = "mean"
-"""
 
 
 def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
     file = folder / "short.toml"
-    file.write_text(FILE, encoding="utf-8")
+    file.write_text(FILE.format(trials=TRIALS), encoding="utf-8")
     words = [sys.executable, "-m", "colibri", "tune", str(file), "--workers", "1", "--quiet", "--out"]
     return subprocess.Popen([*words, str(folder / "out"), *options], stderr=subprocess.PIPE, text=True)
 
@@ -49,18 +31,6 @@ def wait_for(folder: Path, words: str, least: int) -> None:
     while not journal.exists() or journal.read_text(encoding="utf-8").count(words) < least:
         assert monotonic() < until_s
         sleep(0.005)
-
-
-@pytest.mark.long
-def test_it_is_killed_and_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
-    with begin(tmp_path) as first:
-        wait_for(tmp_path, '"pruned"', 5)
-        first.kill()
-    with begin(tmp_path, "--resume") as second:
-        _, said = second.communicate(timeout=PATIENCE_S)
-    assert (second.returncode, said) == (0, "")
-    tuned(tmp_path / "expected", trials=TRIALS)
-    assert files_in(tmp_path / "out") == files_in(tmp_path / "expected")
 
 
 class Joined(Watcher):

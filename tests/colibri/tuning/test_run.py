@@ -13,24 +13,7 @@ from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
 from tests.support.campaigns import Here, tables_in
 from tests.support.commands import Refused
-from tests.support.tuning import POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned
-
-TABLE = "\n".join(
-    [
-        'seeds = "1-4"',
-        "trials = 3",
-        "prune_after = 0",
-        "[fly]",
-        "duration = 0.2",
-        "start = { x = 0.1, z = 2.0 }",
-        "[grid]",
-        'track = ["hover"]',
-        "[tune]",
-        f'"{WEIGHTS}.position" = {{ log-uniform = [1, 1000] }}',
-        "[objectives]",
-        'rmse_m = "mean"',
-    ]
-)
+from tests.support.tuning import FILE, POSITION, RATE, TABLES, WEIGHTS, files_in, planned, tuned
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +191,7 @@ def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
 )
 def test_bad_input_is_refused_in_one_line(options: list[str], said: str, tmp_path: Path, refused: Refused) -> None:
     file = tmp_path / "short.toml"
-    file.write_text(TABLE, encoding="utf-8")
+    file.write_text(FILE.format(trials=3), encoding="utf-8")
     assert refused("tune", file, *options, "--out", tmp_path / "out").startswith(said)
     assert not (tmp_path / "out").exists()
 

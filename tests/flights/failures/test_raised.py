@@ -7,13 +7,7 @@ from math import inf
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.core.copter import copter_autopilot
-from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.parameters.definitions import ImpossibleError
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.wire.dialect import mav
-from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.vehicle import FORCE, Sitl
 from tests.support.flying import ACCEPTED, DENIED, QUICK, refused, restart
 from tools.chaos.places import Thrower
@@ -73,17 +67,3 @@ def test_the_last_resort_lets_nothing_else_be_flown(sitl: Sitl) -> None:
     assert sitl.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE) in (ACCEPTED, DENIED)
     sitl.wait_until(lambda: not sitl.rotors.armed, within=20.0)
     refused(sitl, "", sitl.arm, force=True)
-
-
-@pytest.mark.sitl(airborne=5.0)
-def test_a_strict_flight_raises(sitl: Sitl) -> None:
-    with thrown("autopilot.ground.snapshots:SnapshotBuilder.take"), pytest.raises(Exception, match="take"):
-        sitl.run(0.1)
-
-
-def test_impossible_values_are_refused_at_the_start() -> None:
-    profile = load_profile("flight")
-    settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
-    vehicle = load_vehicle(profile.simulation.vehicle)
-    with pytest.raises(ImpossibleError, match="hover needs"):
-        copter_autopilot(profile, vehicle, settings, lambda: 0.0, values={"VEH_MASS": 50.0})

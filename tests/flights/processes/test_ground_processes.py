@@ -79,16 +79,6 @@ def test_an_autopilot_that_was_killed_is_started_again_and_holds(logs: Path) -> 
             flies_on(seen, 1.0)
 
 
-@pytest.mark.long
-def test_an_autopilot_says_that_its_plant_is_gone(logs: Path) -> None:
-    with hovering(logs) as (plant, autopilot, _, _):
-        plant.process.send_signal(signal.SIGKILL)
-        assert "waiting for a plant" in autopilot.wait_for("silence")["text"]
-        autopilot.process.send_signal(signal.SIGINT)
-        assert autopilot.wait() == 130
-        assert autopilot.errors() == ""
-
-
 @contextmanager
 def flooding(port: int, datagrams: list[bytes]) -> Iterator[Callable[[], int]]:
     ended, sent = Event(), 0

@@ -3,7 +3,6 @@
 from io import BytesIO
 from math import nan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from tests.support.log_client import downloaded
 from tools.harness.observer import Observer
-from tools.harness.processes import topic_rows
 from tools.harness.sitl_process import Vehicle, vehicle
 
 HEIGHT_M = 2.0
@@ -33,10 +31,6 @@ class Flown:
         self.texts = flown.seen.texts
         self.logs = flown.state / "0" / "logs"
         self.log, self.out = ULog(BytesIO(self.content)), out / "0"
-
-    def __getitem__(self, topic: str) -> dict[str, Any]:
-        found: dict[str, Any] = self.log.get_dataset(topic).data
-        return found
 
 
 def fly(seen: Observer) -> None:
@@ -69,33 +63,18 @@ def test_a_download_over_a_lossy_link_is_the_file_on_disk(flown: Flown) -> None:
     assert not flown.log.file_corruption
 
 
-def test_its_numbers_are_those_of_the_flight(flown: Flown) -> None:
-    """On sensors the state is the estimate, and off the truth as its sensors are."""
-    on_sensors = "sensor_combined" in {topic.name for topic in flown.log.data_list}
-    near = 1.0 if on_sensors else 2e-6
-    position, truth = flown["vehicle_local_position"], topic_rows(flown.out)
-    places = np.searchsorted(np.rint(1e6 * truth["t"]), position["timestamp"])
-    assert np.array_equal(np.rint(1e6 * truth["t"])[places], position["timestamp"])
-    assert set(np.diff(position["timestamp"])) == {40_000}
-    assert -position["z"].min() == pytest.approx(HEIGHT_M, abs=max(near, 0.3))
-    for name, column in {"x": "y", "y": "x"}.items():
-        assert position[name] == pytest.approx(truth[column][places], abs=near, rel=1e-6), name
-    assert -position["z"] == pytest.approx(truth["z"][places], abs=near, rel=1e-6)
-    rates = flown["vehicle_angular_velocity"]
-    for name, column, sign in (("xyz[0]", "p", 1.0), ("xyz[1]", "q", -1.0), ("xyz[2]", "r", -1.0)):
-        assert sign * rates[name] == pytest.approx(truth[column][places], abs=near, rel=1e-6), name
-
-
 def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None:
     beside = ULog(str(flown.out / "flight.ulg"))
     for topic, names in {
         "vehicle_attitude": "q[0] q[1] q[2] q[3]",
         "vehicle_local_position": "x y z vx vy vz",
+        "vehicle_angular_velocity": "xyz[0] xyz[1] xyz[2]",
         "actuator_motors": "control[0] control[3]",
         "trajectory_setpoint": "position[2] velocity[2]",
         "mpc_status": "cost iterations solve_time_us qp_status",
     }.items():
-        few, all_of_them = flown[topic], beside.get_dataset(topic).data
+        few, all_of_them = flown.log.get_dataset(topic).data, beside.get_dataset(topic).data
+        assert set(np.diff(few["timestamp"])) == {40_000}
         at = np.searchsorted(all_of_them["timestamp"], few["timestamp"])
         for name in names.split():
             assert np.array_equal(few[name], all_of_them[name][at], equal_nan=True), (topic, name)
@@ -111,9 +90,9 @@ def test_both_logs_have_the_status_texts(flown: Flown) -> None:
 
 
 def test_it_has_the_battery_the_status_and_the_parameters(flown: Flown) -> None:
-    battery = flown["battery_status"]
+    battery = flown.log.get_dataset("battery_status").data
     assert 10.0 < battery["voltage_v"][-1] < 13.0
     assert 0.9 < battery["remaining"][-1] < battery["remaining"][0] <= 1.0
-    arming = flown["vehicle_status"]["arming_state"].tolist()
+    arming = flown.log.get_dataset("vehicle_status").data["arming_state"].tolist()
     assert arming == [1, *[2] * (len(arming) - 2), 1]
     assert flown.log.initial_parameters["MPC_XY_CRUISE"] > 0.0

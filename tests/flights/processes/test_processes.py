@@ -3,7 +3,6 @@
 import signal
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from colibri.mavlink.ulog.flight_topics import DECISION
@@ -11,17 +10,12 @@ from tools.harness.processes import (
     THESIS_PLANT,
     Process,
     fly_thesis,
-    reference,
     running,
     start_autopilot,
     start_plant,
     states,
     topic_rows,
-    wait_for,
 )
-from tools.harness.relay import BadLink
-
-START = ("--duration", "100", "--speed", "50")
 
 
 @pytest.fixture
@@ -29,24 +23,6 @@ def logs(tmp_path: Path) -> Path:
     folder = tmp_path / "logs"
     folder.mkdir()
     return folder
-
-
-@pytest.mark.long
-def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path) -> None:
-    """20 % lost, 10 % duplicated, 10 % reordered, both ways."""
-    duration = ("--duration", "20")
-    fly_thesis(tmp_path / "good", "spiral", "--link", "memory", *duration)
-    plant, url = start_plant(logs, tmp_path / "bad", *duration)
-    with BadLink(url, seed=1) as relay:
-        autopilot = start_autopilot(logs, relay.url)
-        with running(plant, autopilot):
-            ended = plant.wait_for("ended")
-            assert plant.wait() == 0
-    assert (states(tmp_path / "bad") == states(tmp_path / "good")).all()
-    assert ended["frames"] == 200
-    assert ended["resent"] > 60
-    assert min(relay.counts.values()) > 20
-    assert plant.errors() + autopilot.errors() == ""
 
 
 @pytest.mark.long
@@ -61,26 +37,6 @@ def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
         with running(plant):
             assert plant.wait_for("ended")["frames"] == 50
             assert plant.wait() == 0
-
-
-@pytest.mark.long
-def test_a_killed_autopilot_is_replaced_in_mid_flight(tmp_path: Path, logs: Path) -> None:
-    out = tmp_path / "flight"
-    plant, url = start_plant(logs, out, *START)
-    first = start_autopilot(logs, url)
-    with running(plant, first):
-        wait_for(lambda: any(event["sim_time_s"] > 30 for event in plant.events("progress")), "30 s of flight")
-        first.process.send_signal(signal.SIGKILL)
-        first.wait()
-        second = start_autopilot(logs, url)
-        with running(second):
-            assert plant.wait_for("ended")["sim_time_s"] == 100.0
-            assert plant.wait() == 0
-    flown, wanted = states(out), reference("spiral")
-    position = np.stack([wanted["x"], wanted["y"], wanted["z"]], axis=1)
-    off_m = np.linalg.norm(flown[:, 7:10] - position, axis=1)
-    assert off_m.max() < 0.1
-    assert off_m[-100:].max() < 1e-3
 
 
 def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> None:

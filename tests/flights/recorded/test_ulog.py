@@ -218,15 +218,3 @@ def test_a_log_is_whole_up_to_the_kill_of_both_processes(tmp_path: Path) -> None
         assert len(times_us) >= 16
         assert np.all(np.diff(times_us) == interval_us)
     assert replay_flight(log).difference is None
-
-
-@pytest.mark.parametrize("feedback", ["state", "sensors"])
-def test_parameters_and_state_are_logged_for_ground_stations(tmp_path: Path, feedback: str) -> None:
-    ports = ["--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
-    flies = ["--quiet", "--speed", "max", "--duration", "3", "--feedback", feedback, "--out", str(tmp_path)]
-    subprocess.run([sys.executable, "-m", "colibri", "sitl", *ports, *flies], check=True, timeout=PATIENCE_S)
-    log = ULog(str(tmp_path / "0" / "flight.ulg"))
-    assert not log.file_corruption
-    assert "MPC_XY_CRUISE" in log.initial_parameters
-    assert len(log.get_dataset("vehicle_local_position").data["x"]) > 40
-    assert log.get_dataset("vehicle_status").data["arming_state"][0] != 2

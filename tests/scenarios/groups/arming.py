@@ -5,7 +5,19 @@ from colibri.sitl import mission_items
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, height, says
 from tests.scenarios.words.scenario import Scenario
-from tests.scenarios.words.steps import arm, check, command, disarm, hold, refused, run, takeoff, until, upload_fence
+from tests.scenarios.words.steps import (
+    arm,
+    check,
+    command,
+    disarm,
+    hold,
+    land,
+    refused,
+    run,
+    takeoff,
+    until,
+    upload_fence,
+)
 
 FAR_FENCE = mission_items.polygon([(100.0, 100.0), (110.0, 100.0), (110.0, 110.0), (100.0, 110.0)])
 ARM_DISARM: int = mav.MAV_CMD_COMPONENT_ARM_DISARM
@@ -91,8 +103,8 @@ SCENARIOS = (
         peer="ours",
         holds="two flights, one after the other",
         steps=(
-            *(takeoff(2.0), lambda sitl: sitl.land(), check(DISARMED)),
-            *(takeoff(2.0), lambda sitl: sitl.land(), check(DISARMED)),
+            *(takeoff(2.0), land(), check(DISARMED)),
+            *(takeoff(2.0), land(), check(DISARMED)),
         ),
     ),
 )

@@ -12,7 +12,9 @@ from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, mode
 from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
 from tests.scenarios.words.steps import (
     check,
+    goto,
     hold,
+    kill_autopilot,
     max_distance_from,
     measured,
     put,
@@ -24,7 +26,6 @@ from tests.scenarios.words.steps import (
 )
 
 PLACE = (0.0, 0.0, 5.0)
-MAX_TILT_DEG = 75.0
 ROUGH = {"loss": 0.3, "jitter_s": 0.05}
 """Of the ground link."""
 COMMANDED = {
@@ -41,10 +42,6 @@ OVER_A_ROUGH_LINK = (
     "outside-the-fence-it-does-not-begin",
     "mode-changes-while-it-uploads",
 )
-
-
-def kill_autopilot(sitl: Sitl) -> None:
-    sitl.kill_autopilot()
 
 
 def unlike(sitls: Sequence[Sitl]) -> None:
@@ -121,7 +118,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         holds="at most 0.05 m, 5°, and it holds on",
         steps=(
             run(2.0),
-            *(kill_autopilot, run(2.0), kill_autopilot, run(2.0)),
+            *(kill_autopilot, run(2.0)) * 2,
             measured("the distance", max_distance_from(PLACE), 0.05),
             check(every(ARMED, mode(Mode.HOLD), tilted_less(5.0))),
         ),
@@ -171,7 +168,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         holds="7 ms of 8: a step of 3 m ends within 0.05 m after 8 s",
         steps=(
             put("SIM_SOLVE_MS", 7.0),
-            lambda sitl: sitl.goto(3.0, 0.0, 5.0, wait=False),
+            goto((3.0, 0.0, 5.0), wait=False),
             until(near((3.0, 0.0, 5.0), 0.05), within=8.0),
             hold(every(near((3.0, 0.0, 5.0), 0.1), tilted_less(10.0)), for_=3.0),
         ),
@@ -183,8 +180,8 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         holds="half a second each way: goes there and back",
         steps=(
             trouble("ground", delay_s=0.5),
-            lambda sitl: sitl.goto(3.0, 0.0, 5.0),
-            lambda sitl: sitl.goto(0.0, 0.0, 5.0),
+            goto((3.0, 0.0, 5.0)),
+            goto((0.0, 0.0, 5.0)),
             check(every(near(PLACE, 0.3), above(4.7))),
         ),
         setting={"airborne": 5.0},

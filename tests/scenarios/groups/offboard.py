@@ -7,7 +7,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.conditions import ARMED, climbs, every, ground_speed, mode, near, says, slower
 from tests.scenarios.words.scenario import Scenario
-from tests.scenarios.words.steps import check, command, hold, refused, select, setpoint, until
+from tests.scenarios.words.steps import check, command, hold, refused, select, setpoint, takeoff, until
 
 PLACE = (0.0, 0.0, 5.0)
 THERE = (3.0, 2.0, 6.0)
@@ -93,7 +93,7 @@ SCENARIOS = (
         peer="PX4: 5 m to 0.3 m within 10 s",
         holds="to 1 m of the truth within 8 s, in wind",
         steps=(
-            lambda sitl: sitl.takeoff(5.0),
+            takeoff(5.0),
             begin_offboard,
             until(every(near(THERE, 1.0), slower(0.5)), within=8.0, meanwhile=setpoint(position=THERE)),
         ),

@@ -1,66 +1,33 @@
 """What is done in a scenario, and what must hold: the words that scenarios are written in."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from math import dist, nan, radians
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
 import pytest
 
-from colibri.autopilot.commander.rules.modes import Mode
 from colibri.common.types import Array, Vector
-from colibri.mavlink.mission.items import MissionItem
-from colibri.mavlink.parameters.store import Value
 from colibri.sitl.flight_record import Columns, tilt_deg
 from colibri.sitl.ground_station import RefusedError
-from colibri.sitl.mission_items import Item
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words.conditions import Condition
 from tests.scenarios.words.scenario import Step
 
 
-def run(seconds: float) -> Step:
-    return lambda sitl: sitl.run(seconds)
+def _order(method: str) -> Callable[..., Step]:
+    """Return what makes a step of an order of the vehicle."""
+    return lambda *given, **options: methodcaller(method, *given, **options)
 
 
-def arm(*, force: bool = False) -> Step:
-    return lambda sitl: sitl.arm(force=force)
-
-
-def disarm(*, force: bool = False) -> Step:
-    return lambda sitl: sitl.disarm(force=force)
-
-
-def takeoff(height_m: float, *, wait: bool = True) -> Step:
-    return lambda sitl: sitl.takeoff(height_m, wait=wait)
-
-
-def land(*, wait: bool = True) -> Step:
-    return lambda sitl: sitl.land(wait=wait)
+run, arm, disarm, takeoff, land, select = map(_order, ("run", "arm", "disarm", "takeoff", "land", "select"))
+put, upload, upload_fence, inject = map(_order, ("set_param", "upload_mission", "upload_fence", "inject"))
+start_mission, kill_autopilot = methodcaller("start_mission"), methodcaller("kill_autopilot")
 
 
 def goto(place: Vector, *, yaw_deg: float = nan, speed: float = -1.0, wait: bool = True) -> Step:
     return lambda sitl: sitl.goto(*place, yaw=radians(yaw_deg), speed=speed, wait=wait)
-
-
-def select(mode: Mode) -> Step:
-    return lambda sitl: sitl.select(mode)
-
-
-def put(name: str, value: Value) -> Step:
-    return lambda sitl: sitl.set_param(name, value)
-
-
-def upload(items: Iterable[Item | MissionItem]) -> Step:
-    return lambda sitl: sitl.upload_mission(items)
-
-
-def upload_fence(items: Iterable[Item | MissionItem]) -> Step:
-    return lambda sitl: sitl.upload_fence(items)
-
-
-def start_mission(sitl: Sitl) -> None:
-    sitl.start_mission()
 
 
 def command(number: int, *params: float, result: int) -> Step:
@@ -143,10 +110,6 @@ def by_hand(step: Step, **axes: float) -> Step:
 
 def setpoint(**what: Any) -> Step:
     return at_every(0.02, lambda sitl: sitl.setpoint(**what))
-
-
-def inject(unit: str, kind: str, instance: int = 0, *values: float) -> Step:
-    return lambda sitl: sitl.inject(unit, kind, instance, *values)
 
 
 def trouble(link: str, **what: float | bool) -> Step:
