@@ -1,7 +1,6 @@
 """The pytest plugin: fixture `sitl`, its marks and options, the files of a failed flight, and the summary of a run.
 
-Every run of pytest loads it where this package is installed; modules that fly are loaded by the first test that needs
-them.
+Every run of pytest loads it; modules that fly are loaded by the first test that needs them.
 """
 
 from __future__ import annotations
@@ -202,7 +201,6 @@ class _Collector:
 
 
 def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack) -> Flights:
-    """Return the flights of the test, which end with `stack`."""
     from colibri.sitl.backends.setting import setting_of
     from colibri.sitl.session import Flights
 
@@ -287,13 +285,11 @@ def _folder(item: pytest.Item) -> Path:
 
 
 def _as_given(config: pytest.Config, place: Path) -> Path:
-    """Return a folder relative to the working directory if option `--sitl-keep` is."""
     keep = Path(config.getoption("--sitl-keep"))
     return keep / place.relative_to(config.invocation_params.dir / keep)
 
 
 def _forget(folder: Path) -> None:
-    """Remove the flights that an earlier run of a test left."""
     from colibri.sitl.flight_record import KEPT
 
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Plan, fly, record and tabulate many flights, on a pool of processes or a cluster."""
+"""Plan, fly, record and tabulate many flights."""
 
 from typing import TYPE_CHECKING
 

@@ -61,12 +61,7 @@ Tables = TypeVar("Tables", bound=FlightTables)
 
 
 class CampaignTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The tables of a campaign's file; also the keywords of `colibri.campaign`.
-
-    Attributes:
-        paired: Use the same draws for a seed in every combination of the grid.
-        logs: Flights to keep logs of.
-    """
+    """The tables of a campaign's file; `paired` uses a seed's draws in every combination of the grid."""
 
     paired: bool = False
     logs: Logs = "none"
@@ -129,10 +124,7 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Yield flights that cover each value of each factor once; of numbers only the first and the last.
-
-        Enough to reject an impossible value before the campaign starts.
-        """
+        """Yield flights with each value of each factor, of numbers the ends, to test them before the campaign."""
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
@@ -144,7 +136,7 @@ class Campaign(NamedTuple):
                 yield first._replace(factors=first.factors | {factor: value})
 
     def values(self, option: str) -> Iterator[Any]:
-        """Yield the values of an option in any table; continuous draws are left out."""
+        """Yield the values of an option in any table, without continuous draws."""
         draw = self.draw.get(option)
         yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
         yield from self.grid.get(option, ())
@@ -154,7 +146,7 @@ class Campaign(NamedTuple):
         return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
-        """Draw a flight's factors from a random stream of its own."""
+        """Draw a flight's factors from its own random stream."""
         if not self.draw:
             return {}
         chance = Generator(PCG64(SeedSequence(self.root_seed, spawn_key=(stream,))))

@@ -54,7 +54,6 @@ def key_of(factor: str) -> Key | None:
 
 
 def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> Any:
-    """Apply the factors of one table to a profile or vehicle, in their order."""
     error = ProfileError if isinstance(of, Profile) else VehicleError
     changed: Any = of
     for factor, value in factors.items():

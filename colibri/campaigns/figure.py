@@ -1,4 +1,4 @@
-"""The figure of a campaign: strips or scatter, a line over one factor, or a heat map over two."""
+"""The figure of a campaign: strips, scatter, a line over one factor, or a heat map over two."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -26,7 +26,7 @@ _PANEL_IN, _MAP_IN = 2.6, 3.4
 
 
 class _Group(NamedTuple):
-    """The flights of one combination, by their places, with its coordinates along the axes."""
+    """The flights of one combination, with its coordinates along the axes."""
 
     name: str
     at: tuple[float, ...]
@@ -108,7 +108,6 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
 
 
 def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]) -> Figure:
-    """Draw the median over two factors, one map per combination of the others."""
     names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
     xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
     figure, grid = axes_grid(len(names), 1, 0.6, row_in=_MAP_IN, share=False)
@@ -138,7 +137,7 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
 
 
 def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
-    """Draw one dot per flight over the drawn factors; lost flights are at the upper edge."""
+    """Draw one dot per flight; lost flights are at the upper edge."""
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):

@@ -1,4 +1,4 @@
-"""The tables of a campaign: one row per flight, and a summary per combination of the grid."""
+"""The tables of a campaign: flights, and a summary per combination of the grid."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -31,12 +31,12 @@ class FlightTable:
         return self.campaign.columns
 
     def rows(self) -> list[Row]:
-        """Return one row of texts per flight: factors, metrics, verdict, hash; numbers with ten digits."""
+        """Return one row of texts per flight; numbers with ten digits."""
         return [self._row(each) for each in self.flown]
 
     @cached_property
     def flights(self) -> Table:
-        """The table as a structured array, one field per column; a missing number is nan."""
+        """The table as a structured array; a missing number is nan."""
         columns: dict[str, Any] = {"flight": [each.flight for each in self.flown]}
         columns |= {name: self.factor(name) for name in self.campaign.factors}
         columns["seed"] = [self._points[each.flight].seed for each in self.flown]
@@ -81,7 +81,7 @@ class FlightTable:
         return {verdict: sum(each.verdict is verdict for each in self.flown) for verdict in Verdict}
 
     def groups(self) -> dict[tuple[Any, ...], list[int]]:
-        """Return the places in `flown` of the flights of each combination of the grid."""
+        """Return the places in `flown` of each combination's flights."""
         found: dict[tuple[Any, ...], list[int]] = {}
         for place, each in enumerate(self.flown):
             factors = self._points[each.flight].factors
@@ -89,7 +89,7 @@ class FlightTable:
         return found
 
     def summary(self) -> tuple[Row, list[Row]]:
-        """Return headings and one row per combination: share lost, and quantiles of each metric."""
+        """Return headings and one row per combination: share lost, quantiles of metrics."""
         names = [metric.name for metric in self.campaign.metrics]
         headings = (
             *self.campaign.grid,

@@ -49,12 +49,7 @@ class MetricError(CampaignError, ForeignError):
 
 
 class Common(NamedTuple):
-    """Data common to all flights, with the contents of files, which a worker may not have.
-
-    Attributes:
-        profiles: By name or file; likewise `vehicles` and `winds`.
-        track_files: Contents of the tracks' files, by track.
-    """
+    """Data common to all flights, with the contents of files, which a worker may not have."""
 
     fly: dict[str, Any]
     metrics: tuple[Metric, ...]
@@ -102,7 +97,7 @@ def common_of(campaign: Campaign) -> Common:
 
 
 def check(points: Iterable[Point], common: Common) -> None:
-    """Plan flights and build their control laws, to raise errors before the campaign starts."""
+    """Plan flights and build their control laws, to find errors early."""
     for point in points:
         plan = plan_point(common, point)
         build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)

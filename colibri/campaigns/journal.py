@@ -44,7 +44,7 @@ class Journal:
 
 
 def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bool) -> Journal:
-    """Open the journal of a new or resumed campaign; CampaignError if the folder has other contents."""
+    """Open the journal of a new or resumed campaign."""
     there = claim(folder / IDENTITY, identity_of(campaign, common), "campaign")
     kept = {each.flight: each for each in read_journal(folder / JOURNAL)}
     if there and not resume:
@@ -80,7 +80,7 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
 
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
-    """Return all inputs that the campaign's table depends on as plain data, files by their hashes."""
+    """Return all inputs of the campaign's table as plain data, files by their hashes."""
     objects = (value for value in campaign.values("profile") if isinstance(value, Profile))
     own = {profile.controller for profile in (*common.profiles.values(), *objects)}
     laws = [*filter(None, campaign.values("controller")), *own.intersection(controller_names())]

@@ -32,7 +32,7 @@ def usual(*, sensors: bool) -> tuple[Metric, ...]:
 
 
 def read_metrics(given: Any) -> tuple[Metric, ...]:
-    """Read metrics from names of the report, functions, or a mapping of names to functions."""
+    """Read metrics from names, functions, or a mapping of names to functions."""
     if isinstance(given, Mapping):
         return tuple(Metric(str(name), of) for name, of in given.items())
     if isinstance(given, str) or callable(given):

@@ -26,7 +26,7 @@ class CampaignResults(FlightTable):
     """The results of a campaign."""
 
     def plot(self, metric: str | None = None) -> "Figure":
-        """Return a figure that suits the factors: distribution, line over one factor, or heat map over two."""
+        """Return a figure that suits the factors: distribution, line, or heat map."""
         from colibri.campaigns.figure import draw
 
         return draw(self, metric)

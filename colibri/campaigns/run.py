@@ -76,10 +76,7 @@ def fly_campaign(
     progress: Callable[[Flown], object] = lambda _flown: None,
     begun: Callable[[int], object] = lambda _kept: None,
 ) -> CampaignResults:
-    """Fly the flights missing in `out` and write the tables, also if interrupted.
-
-    `begun` is called with the number of flights found in `out`.
-    """
+    """Fly the flights missing in `out`, and write the tables, also if interrupted."""
     if planned.flights > MAX_UNASKED and not yes:
         raise CampaignError(f"{planned.flights} flights are many: say --yes if you mean it")
     if parquet:

@@ -163,7 +163,6 @@ def _only(key: str, given: Any, known: Sequence[str]) -> tuple[str, Any]:
 
 
 def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
-    """Return evenly spaced numbers, or evenly spaced logarithms."""
     if not isinstance(span, Sequence) or len(span) != 3 or not all(map(is_number, span)):
         raise CampaignError(f"{key}: {name}: expected [first, last, how many], not {span}")
     first, last, count = float(span[0]), float(span[1]), float(span[2])

@@ -30,7 +30,6 @@ def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
 
 
 def examine_as_told(args: argparse.Namespace) -> int:
-    """Run the checks and print each finding as it comes; return the exit code."""
     link = None if args.gcs is None else open_ground_link(args.gcs)
     asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
     failed = 0

@@ -1,4 +1,4 @@
-"""Describe a flight once; fly it in one process, two processes or a fleet, or replay its log."""
+"""Fly a described flight in one process, two processes or a fleet, or replay its log."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""`colibri sitl`: vehicles for ground stations, each a plant and an autopilot process, until interrupted."""
+"""`colibri sitl`: vehicles for ground stations, until interrupted."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -37,7 +37,6 @@ class Member:
     Attributes:
         instance: Ports and system id follow from it.
         links: URLs that its autopilot serves; once open, with actual ports.
-        plant_url: Address of its plant.
         boot_unix_us: Start of its plant, which dates telemetry logs.
         deaths_s: Wall-clock times when a process died.
     """
@@ -156,7 +155,6 @@ def _common(member: Member, spec: FleetSpec) -> dict[str, Any]:
 
 
 def _watch(fleet: Sequence[Member], spec: FleetSpec, stop: Stop, lines: StatusLines) -> None:
-    """Show the events of the processes until the last vehicle ends or the user interrupts."""
     flying = list(fleet)
     while flying and not stop:
         codes = {member: [child.code() for child in member.children] for member in flying}
@@ -187,10 +185,7 @@ def _hear(fleet: Sequence[Member], spec: FleetSpec, lines: StatusLines) -> None:
 
 
 def start_again(member: Member, spec: FleetSpec, lines: StatusLines) -> None:
-    """Restart a dead process: the autopilot alone, or with the plant both.
-
-    Everything ends if a process cannot begin or dies repeatedly.
-    """
+    """Restart a dead autopilot, or both after the plant's death; end if that fails repeatedly."""
     child, code = next((child, code) for child in member.children if (code := child.code()))
     if code == EXIT_BAD_INPUT:  # it has said why
         raise SystemExit(code)

@@ -48,5 +48,4 @@ class FleetSpec(VehiclesSpec, GroundSpec):
         return None if self.out is None else self.out / str(instance)
 
     def links(self, instance: int) -> list[str]:
-        """Return the URLs of a vehicle's links: those of the options, or the two ports of clients."""
         return list(self.gcs) or [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]

@@ -1,4 +1,4 @@
-"""The output of `colibri sitl`: a live line per vehicle on a terminal, and a line per event."""
+"""The output of `colibri sitl`: a live line per vehicle, and a line per event."""
 
 import sys
 from typing import Any, Literal
@@ -41,7 +41,6 @@ class StatusLines:
         self._live: Live | None = None
 
     def begin(self, vehicles: int) -> None:
-        """Print a first line on a terminal: the processes take seconds to load."""
         if self._console.is_terminal and not self._quiet:
             self._console.print("starting" + (f" {vehicles} vehicles" if vehicles > 1 else ""), markup=False)
 
@@ -74,10 +73,7 @@ class StatusLines:
 
 
 def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
-    """Return a row per vehicle and a row per link; in a fleet, only links with a ground station.
-
-    It fits 80 columns; on a narrower terminal, columns are left out.
-    """
+    """Return a row per vehicle and per link; in a fleet, only links with a ground station."""
     shown = _shown(width)
     vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
     for heading, least, side in _COLUMNS:

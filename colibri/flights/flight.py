@@ -30,12 +30,7 @@ Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 
 
 class Answered(NamedTuple):
-    """The answer to a frame, as it reached the plant.
-
-    Attributes:
-        faults: Faults and changes of the world that come with it.
-        datagram: The frame as the autopilot received it; empty where it was only rounded, None on a wire without any.
-    """
+    """The answer to a frame, as it reached the plant; `datagram` is empty if it was only rounded, `None` on `Direct`."""
 
     step: Step
     command: ActuatorCommand
@@ -46,17 +41,11 @@ class Answered(NamedTuple):
 class Wire(Protocol):
     """Carries a frame of the plant to the autopilot, and the answer back."""
 
-    def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
-        """Return the answer to the plant's next frame; DecisionError if the control law's is invalid."""
+    def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered: ...
 
 
 class Sample(NamedTuple):
-    """A frame that was flown.
-
-    Attributes:
-        world: The world at the time of the next frame.
-        datagram: The frame as the autopilot received it; `None` on a wire without datagrams.
-    """
+    """A frame that was flown; `world` is at the time of the next one."""
 
     step: Step
     command: ActuatorCommand
@@ -76,31 +65,22 @@ class Flight(Generic[StagesT]):
         return self.plant.world.time_us
 
     def step(self, inbox: Iterable[Received] = ()) -> Sample:
-        """Fly a frame, and serve ground stations, which sent `inbox`.
-
-        Raises:
-            DecisionError: The control law's decision is invalid.
-            IntegrationError: The state cannot be integrated any further.
-        """
+        """Fly a frame, and serve ground stations, which sent `inbox`; DecisionError or IntegrationError."""
         step, command, faults, datagram = self.wire.exchange(self.plant, self.autopilot)
         self.plant.answer(command, faults)
         return Sample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
 
     def samples(self, duration_s: float) -> Iterator[Sample]:
-        """Fly frame by frame, for as long as a whole frame is left of `duration_s` since time 0."""
+        """Fly whole frames up to `duration_s` since time 0."""
         end_us = duration_s * 1e6 - self.plant.interval_us
         while self.plant.world.time_us <= end_us:
             yield self.step()
 
     def snapshot(self) -> Snapshot:
-        """Keep the state of plant, autopilot and wire, without logs.
-
-        Vehicle, profile and track never change, and are shared; see `colibri.flights.snapshots`.
-        """
+        """Keep the state of plant, autopilot and wire; vehicle, profile and track are shared."""
         return Snapshot((self.plant, self.autopilot, self.wire))
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this flight; it continues bit for bit."""
         snapshot.restore()
 
 
@@ -113,15 +93,14 @@ class Direct:
 
 
 class InMemory:
-    """Carries the datagrams of two processes in memory.
+    """Carries the datagrams of two processes in memory; `traffic` records all frames.
 
-    A frame with nothing but the state is only rounded as its datagram would round it, unless traffic is recorded.
+    A frame of the state alone is only rounded as its datagram would round it, unless traffic is recorded.
     """
 
     def __init__(
         self, frame_interval_us: int, feedback: Feedback, system_id: int = SYSTEM_ID, traffic: Traffic | None = None
     ) -> None:
-        """Connect the autopilot and request `feedback`; `traffic` records all frames."""
         self._traffic = traffic
         self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
         self.autopilot_end = AutopilotEnd(
@@ -156,11 +135,9 @@ class InMemory:
         return Answered(step, command, self.plant_end.take_faults(), datagram)
 
     def carried_up(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return the datagrams of the plant that reach the autopilot."""
         return datagrams
 
     def carried_down(self, datagrams: list[bytes]) -> list[bytes]:
-        """Return the datagrams of the autopilot that reach the plant."""
         return datagrams
 
     def _to_autopilot(self, now_us: int, autopilot: Autopilot[Any]) -> tuple[Step | None, bytes]:

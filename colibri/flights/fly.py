@@ -22,11 +22,11 @@ def fly_plan(
 
     Args:
         progress: Called with the simulated time, s.
-        say: Called with a line per ground link and per ground station that connects.
+        say: Called with a line per ground link and ground station.
         compiling: Called with the number of functions compiled so far.
 
     Raises:
-        FlightError: The flight ended early; the reason is also in `FAILURE`, with the traceback of foreign code.
+        FlightError: The flight ended early; the reason is also in `FAILURE`.
     """
     if topics is None:
         write_provenance(plan)

@@ -37,7 +37,6 @@ def occupied(out: Path) -> Iterator[None]:
 
 
 def make_folder(out: Path) -> None:
-    """Make a writable folder, or end with one line."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):

@@ -1,4 +1,4 @@
-"""A flight in this process: with the codec but without sockets (`memory`), or without both (`direct`)."""
+"""A flight in this process: without sockets (`memory`), or also without the codec (`direct`)."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -24,10 +24,7 @@ from colibri.plant.simulation.plant import Plant, PlantBuilder
 def fly_locally(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
 ) -> Summary:
-    """Fly in this process and record in `topics`, or else in the plan's folder.
-
-    `progress` is called with the simulated time, s. Errors are those of the control law, the solver and the integrator.
-    """
+    """Fly in this process and record in `topics`, or else in the plan's folder."""
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
     setup = setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle, plan.contents.track_file)

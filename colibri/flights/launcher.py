@@ -3,8 +3,9 @@
 A child is forked if this process may be: loading takes longer than most flights. Otherwise it is started as a command,
 and reads its specification as JSON from standard input.
 
-Each has a process group of its own, so that Ctrl-C in the terminal reaches only this process, which ends its children
-in order: SIGTERM, then SIGKILL after the grace period. Each also ends if this process dies.
+Each has its own process group, so that Ctrl-C reaches only this process, which ends its children in order: SIGTERM,
+then
+SIGKILL after the grace period. Each also ends if this process dies.
 """
 
 import json
@@ -41,19 +42,10 @@ def can_fork() -> bool:
 
 
 class Child:
-    """A plant or an autopilot as a child of this process, which ends with it.
-
-    Attributes:
-        number: Process id.
-        stdout: The pipe from it, unless its output goes to a file.
-    """
+    """A plant or an autopilot as a child of this process, which ends with it."""
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
-        """Start it: forked if requested and possible, with its output to file `log` or to a pipe.
-
-        Raises:
-            SpecError: It is not forked, and JSON cannot hold an object in its specification.
-        """
+        """Start it, forked if requested and possible; its output goes to file `log` or to pipe `stdout`."""
         self.name = name_of(spec)
         self.forked = fork and can_fork()
         self._rest = b""
@@ -81,7 +73,6 @@ class Child:
             os.kill(self.number, signal.SIGTERM)
 
     def wait(self, timeout_s: float | None = None) -> int | None:
-        """Return the exit code once it has ended; `None` after the timeout."""
         return self._process.wait(timeout_s)
 
     def kill(self) -> None:
@@ -95,7 +86,7 @@ class Child:
 
 
 class Fork:
-    """A process forked from this one, with its modules loaded; `stdout` and `stderr` are file descriptors."""
+    """A process forked from this one, with its modules loaded."""
 
     def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
         self._process = get_context("fork").Process(target=_fly, args=(spec, stdout, stderr, os.getpid()), daemon=True)

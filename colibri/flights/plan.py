@@ -22,7 +22,7 @@ from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicl
 
 
 def unseen(_what: object) -> None:
-    """Ignore progress: simulated time, s, or a line of text."""
+    """Ignore progress."""
 
 
 class Summary(NamedTuple):
@@ -42,8 +42,7 @@ class Contents(NamedTuple):
 
     Attributes:
         profile: With the law, solver and delay of the options.
-        vehicle: The vehicle that the autopilot controls.
-        plant_vehicle: The vehicle that the plant flies, without the parts left out.
+        plant_vehicle: Without the parts left out.
         track_file: Text of the track's file, if it has one.
     """
 
@@ -84,9 +83,7 @@ class FlightPlan:
         Raises:
             PlanError: Options cannot be combined, or a vehicle has no sensors or ground for feedback from sensors.
             LinkError: The URL of a ground station is invalid, or reachable from the network without a key.
-            ProfileError: The profile is invalid.
-            VehicleError: A vehicle is invalid, or cannot start as the profile requires.
-            TrackError: The track is unknown, leads below the floor, or its file cannot be flown.
+            ProfileError, VehicleError, TrackError: A file is invalid, or the vehicle cannot fly so.
         """
         if spec.gcs and spec.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {spec.link} there is no autopilot to connect to")
@@ -129,12 +126,12 @@ class FlightPlan:
 
     @property
     def vehicle_name(self) -> str:
-        """Name or file of the vehicle that the autopilot controls."""
+        """Its name or file."""
         return _names(self.spec, self.profile)[0]
 
     @property
     def plant_vehicle_name(self) -> str:
-        """Name or file of the vehicle that the plant flies."""
+        """Its name or file."""
         return _names(self.spec, self.profile)[1]
 
     @property
@@ -149,7 +146,7 @@ class FlightPlan:
 
     @property
     def flown_by(self) -> str:
-        """Profile, and control law unless it is the profile's, for tables and figures."""
+        """Profile, and control law unless it is the profile's."""
         law = self.spec.law_name
         return f"profile {self.profile.name}" + (f", controller {law}" if law else "")
 

@@ -12,12 +12,7 @@ _SHOWN = ("ground", "heard", "said")
 
 
 class FlightError(InFlightError):
-    """A process ended before its flight did.
-
-    Attributes:
-        code: Exit code to return.
-        said: Whether the process has already printed the reason.
-    """
+    """A process ended before its flight did; `said` if it has printed the reason."""
 
     def __init__(self, message: str, code: int, *, said: bool) -> None:
         super().__init__(message)

@@ -35,12 +35,9 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """The inputs of a flight.
 
     Attributes:
-        colibri: Version that flew it.
-        spec: The flight as described.
         profile: With the law, solver and delay of the options.
         law: Origin of the control law.
         plant_vehicle: Without the parts left out.
-        track_file: Text of the track's file, if it had one.
         sha256: Hash of each of these without names, and of all of them as `all`.
     """
 
@@ -116,12 +113,7 @@ def read_provenance(folder: Path) -> Provenance:
 
 
 def plan_of(folder: Path) -> FlightPlan:
-    """Return the plan of a recorded flight from its folder alone.
-
-    Raises:
-        ProvenanceError: The record is missing or invalid.
-        TrackError: This version has no such track.
-    """
+    """Return the plan of a recorded flight from its folder alone."""
     kept = read_provenance(folder)
     spec = from_values(FlightSpec, {**kept.spec, "out": folder}, ProvenanceError)
     return FlightPlan.of(spec, Contents(kept.profile, kept.vehicle, kept.plant_vehicle, kept.track_file))

@@ -1,4 +1,4 @@
-"""`colibri replay`: feed the frames of a recorded flight to the autopilot and compare its commands."""
+"""`colibri replay`: feed recorded frames to the autopilot and compare its commands."""
 
 import argparse
 import json
@@ -39,12 +39,7 @@ _NO_CLOCK_S = 0.0
 
 
 class Answer(NamedTuple):
-    """The autopilot's answer in the replay.
-
-    Attributes:
-        command: The recorded answer.
-        known: State estimate; `None` before the first one.
-    """
+    """The autopilot's answer in the replay; `command` is the recorded one, `known` the state estimate."""
 
     time_us: int
     command: ActuatorCommand
@@ -54,12 +49,7 @@ class Answer(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """The first command that differs.
-
-    Attributes:
-        mode: Flight mode at that time.
-        known: State estimate; `None` before the first one.
-    """
+    """The first command that differs, with flight mode and state estimate."""
 
     recorded: ActuatorCommand
     replayed: ActuatorCommand
@@ -78,7 +68,7 @@ class Difference(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """The result of a replay; `commands` counts those compared up to a difference, `last_us` is the last time."""
+    """The result of a replay; `commands` counts those compared, `last_us` is the time of the last one."""
 
     commands: int
     last_us: int
@@ -111,12 +101,11 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def replay_flight(path: Path) -> Replayed:
-    """Replay a flight from its log or folder, with the profile, vehicle and waypoints in the log."""
+    """Replay a log or folder, with the profile, vehicle and waypoints in the log."""
     return _compare(_read(path))
 
 
 def answers_of(path: Path) -> Iterator[Answer]:
-    """Return the autopilot's answers to the frames of a recorded flight."""
     return _answers(_read(path))
 
 
@@ -147,7 +136,7 @@ def _read(path: Path) -> _Flight:
 
 
 def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
-    """Yield time, datagram and command of each answered frame, up to the first frame missing in the log."""
+    """Yield time, datagram and command of each frame, up to the first one missing in the log."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
@@ -194,7 +183,7 @@ def _compare(flight: _Flight) -> Replayed:
 
 
 def _answers(flight: _Flight) -> Iterator[Answer]:
-    """Answer each frame with the autopilot that was running, as set up at its last start."""
+    """Answer each frame with the autopilot as set up at its last start."""
     setups, inbox = flight.inputs.setups, flight.inputs.datagrams
     autopilot: Autopilot[Any] | None = None
     known: StateFrame | None = None
@@ -250,7 +239,6 @@ def _changed(setups: Iterable[Setup]) -> list[str]:
 
 
 def _ended_us(flight: _Flight) -> int:
-    """Return the end of the flight, from its truth or the report beside the log."""
     ended_s = max((float(block[-1, 0]) for block in flight.log.blocks(TRUTH)), default=0.0)
     with suppress(OSError, ValueError, KeyError):
         ended_s = max(ended_s, json.loads((flight.path.parent / "report.json").read_text("utf-8"))["sim_time_s"])

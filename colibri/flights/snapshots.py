@@ -4,8 +4,7 @@ A snapshot follows every reference from its roots: attributes, containers, array
 shallow copy of each mutable object, the numbers of arrays, and the state of random generators. Immutable objects are
 shared. Restoring writes into the same objects, so that references to them, as in a callback, stay valid.
 
-Files, sockets and the state of modules and classes are left out. SnapshotError if a state cannot be read, as of a
-running generator.
+Files, sockets and the state of modules and classes are left out; a state that cannot be read is a SnapshotError.
 """
 
 from collections import deque
@@ -35,11 +34,7 @@ Keep: TypeAlias = Callable[[Any], Kept]
 
 
 class Snapshot:
-    """The state of some objects and of all their references at one instant.
-
-    Attributes:
-        objects: Number of objects copied.
-    """
+    """The state of some objects and of all their references at one instant."""
 
     def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:
         """Keep the state of `roots`; `shared` objects are assumed constant and not followed."""

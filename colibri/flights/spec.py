@@ -53,11 +53,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
 
     @classmethod
     def of(cls, track: str, **options: Any) -> "FlightSpec":
-        """Return the flight of a track with options by name, as Python values or as texts of the command line.
-
-        Raises:
-            OptionError: An option is unknown or has an invalid value.
-        """
+        """Return the flight of a track with options by name, as Python values or as texts of the command line."""
         return from_values(cls, {"track": track, **options}, OptionError)
 
     @property

@@ -1,4 +1,4 @@
-"""Several vehicles in one simulated time, each with its own plant, autopilot and ground stations."""
+"""Several vehicles in one simulated time."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -10,10 +10,7 @@ from colibri.sitl.vehicle import Sitl
 
 
 class Fleet(tuple[Sitl, ...], Stepped):
-    """Vehicles that share one simulated time: each is at most one frame ahead.
-
-    Flying one of them, or the fleet, by `run`, `step`, or a command that waits, flies all.
-    """
+    """Vehicles that share one simulated time; flying one of them, or the fleet, flies all."""
 
     __slots__ = ()
 
@@ -28,7 +25,7 @@ class Fleet(tuple[Sitl, ...], Stepped):
 
     @property
     def time_us(self) -> int:
-        """Simulated time of the last vehicle, µs; others differ only if frames have unequal lengths."""
+        """Simulated time of the last vehicle, µs."""
         return min(sitl.time_us for sitl in self)
 
     def step(self) -> None:

@@ -22,7 +22,7 @@ _END_COLOUR = "tab:red"
 def draw(
     flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, failed_s: float, title: str, reason: str
 ) -> None:
-    """Draw a flight that failed at `failed_s` into a PNG; `texts` have times in s."""
+    """Draw a flight that failed at `failed_s`; `texts` have times in s."""
     use_writable_folders()
     from matplotlib.figure import Figure
 
@@ -95,7 +95,6 @@ def _draw_plan(axes: "Axes", flown: Columns) -> None:
 
 
 def _write_texts(axes: "Axes", timeline: "Axes", numbered: Sequence[tuple[int, tuple[float, str]]]) -> None:
-    """Write numbered texts, and the numbers over the timeline."""
     axes.axis("off")
     lines = [f"{number:>3}  {time_s:8.3f} s  {_line(text, 54)}" for number, (time_s, text) in numbered]
     axes.text(0.0, 1.0, "\n".join(lines or ["it said nothing"]), va="top", family="monospace", fontsize=8.5)

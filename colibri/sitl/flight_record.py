@@ -1,4 +1,4 @@
-"""The record of a flight: each frame with its command, and each message; written to files on request."""
+"""The record of a flight: each frame with its command, and each message."""
 
 import csv
 from hashlib import sha256
@@ -30,11 +30,7 @@ Columns = dict[str, NDArray[np.float64]]
 
 
 class Record:
-    """The frames and messages of a flight.
-
-    Attributes:
-        frames: Number of frames flown.
-    """
+    """The frames and messages of a flight."""
 
     def __init__(self) -> None:
         self.frames = 0
@@ -83,7 +79,6 @@ class Record:
 
 
 def mode_name(number: float) -> str:
-    """Return the name of a custom mode; unknown ones as a number."""
     return str(mode_of_custom(int(number)) or int(number))
 
 

@@ -55,8 +55,6 @@ class Station(Inbox):
     `ANSWER_WITHIN_S`.
 
     Attributes:
-        system, component: Its ids.
-        number: Number of its link.
         silent: Set it to stop all sending, HEARTBEAT included.
         dropped: Number of invalid frames received, by reason.
     """
@@ -72,7 +70,6 @@ class Station(Inbox):
         seed: int,
         beats: bool,
     ) -> None:
-        """Connect as `component` of `system` on link `number`; `beats` sends a HEARTBEAT a second."""
         super().__init__()
         self._flight = flight
         self.number = number
@@ -144,12 +141,12 @@ class Station(Inbox):
         self.check(result, said, what or f"command {number}")
 
     def check(self, result: int, said: int, what: str) -> None:
-        """Raise unless a result is ACCEPTED; `said` is the number of texts received before the request."""
+        """Raise unless a result is ACCEPTED; `said` is the number of texts before the request."""
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
     def request(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Send a request every half second until it is answered; `send` is called with the number of tries before."""
+        """Send every half second until answered; `send` is called with the number of tries before."""
         for tries in range(_REPEAT.tries):
             send(tries)
             again_us = self._flight.time_us + _AGAIN_AFTER_US

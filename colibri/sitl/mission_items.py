@@ -18,7 +18,7 @@ class Item(NamedTuple):
     Attributes:
         command: MAV_CMD.
         params: The first parameters; others are 0.
-        place: East, north, and height above home, m; `None` for an item without a place.
+        place: East, north, and height above home, m.
     """
 
     command: int
@@ -42,7 +42,6 @@ def on_wire(items: Iterable[Item | MissionItem], origin: Geodetic) -> list[Missi
 
 
 def waypoint(east: float, north: float, up: float, *, stay_s: float = 0.0, within_m: float = 0.3) -> Item:
-    """Fly to a place and stay there."""
     return Item(mav.MAV_CMD_NAV_WAYPOINT, (stay_s, within_m, 0.0, nan), (east, north, up))
 
 
@@ -55,17 +54,14 @@ def land(east: float, north: float) -> Item:
 
 
 def return_home() -> Item:
-    """Return home and land there."""
     return Item(mav.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 
 
 def change_speed(speed_m_s: float) -> Item:
-    """Change the speed from here on."""
     return Item(mav.MAV_CMD_DO_CHANGE_SPEED, (1.0, speed_m_s, -1.0))
 
 
 def jump(to: int, times: int) -> Item:
-    """Continue at item `to`, so many `times`."""
     return Item(mav.MAV_CMD_DO_JUMP, (float(to), float(times)))
 
 
@@ -77,6 +73,5 @@ def polygon(corners: Sequence[Corner], *, keep_out: bool = False) -> list[Item]:
 
 
 def circle(radius_m: float, centre: Corner = (0.0, 0.0), *, keep_out: bool = False) -> list[Item]:
-    """Return the item of a circle to stay inside of, or to `keep_out` of."""
     inside, outside = mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
     return [Item(outside if keep_out else inside, (radius_m,), (*centre, 0.0))]

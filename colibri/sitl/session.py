@@ -27,11 +27,10 @@ class Flights:
 
     Attributes:
         setting: The setting of the test's marks.
-        flown: The flights in the order of their start.
+        flown: In the order of their start.
     """
 
     def __init__(self, setting: Setting, launcher: Launcher | None) -> None:
-        """Fly in processes of a `launcher`, or in this process without one."""
         self.setting = setting
         self._launcher = launcher
         freeze_once()  # a run of tests has a lot that is there to stay
@@ -70,12 +69,7 @@ class Flights:
         return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
-        """Write records, figures and facts below `folder`; return the folder of each flight.
-
-        Args:
-            title: Title of the figures.
-            reason: Why the test failed, shown at the end of the figure.
-        """
+        """Write records, figures and facts below `folder`; return the folder of each flight."""
         places = []
         for number, sitl in enumerate(self.flown):
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder
@@ -98,7 +92,7 @@ class Flights:
         return places
 
     def summary(self) -> dict[str, Any]:
-        """Return number, simulated time in s, and hashes, for the summary of the run."""
+        """Return number, simulated time in s, and hashes."""
         return {
             "flights": len(self.flown),
             "simulated_s": sum(sitl.time_s for sitl in self.flown),

@@ -15,7 +15,6 @@ class StatusTexts(Inbox):
         self.times_us: list[int] = []
 
     def add_datagram(self, datagram: bytes, now_us: int) -> None:
-        """Read a datagram sent now."""
         if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
             return
         for message in self._codec.decode(datagram):

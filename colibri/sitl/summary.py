@@ -9,7 +9,7 @@ FLOWN = "sitl_flown"
 
 
 class Summary:
-    """Adds up the reports of all processes in any order; `began_s` is wall-clock time."""
+    """Adds up the reports of all processes in any order."""
 
     def __init__(self, began_s: float) -> None:
         self._began_s = began_s
@@ -29,7 +29,6 @@ class Summary:
         return [f"{test} {outcome} {hashes}" for test, (outcome, hashes) in sorted(self._outcomes.items())]
 
     def verdict(self) -> str:
-        """Return a hash of `lines`."""
         return sha256("\n".join(self.lines()).encode()).hexdigest()[:16]
 
     def line(self, now_s: float) -> str:

@@ -44,8 +44,7 @@ class Links(NamedTuple):
 
     Attributes:
         ground: Between the vehicle and all ground stations, in simulated time.
-        plant: Between plant and autopilot. It leaves the flight unchanged: the plant repeats its frame until it is
-            answered.
+        plant: Between plant and autopilot. The flight stays the same: the plant repeats its frame until it is answered.
     """
 
     ground: Trouble
@@ -59,8 +58,7 @@ class Links(NamedTuple):
 class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
-    State is in `View`, waiting in `Stepped`, sticks and setpoints in `Steered`. Commands, uploads and parameters raise
-    a `RefusedError` if the vehicle refuses.
+    Commands, uploads and parameters raise a `RefusedError` if the vehicle refuses.
 
     Attributes:
         items: Functions for items of missions and fences, such as `items.waypoint(3.0, 0.0, 5.0)`.
@@ -68,7 +66,7 @@ class Sitl(View, Stepped, Steered):
         NotInTime: The error if a condition is not met in time, an AssertionError.
         gcs: The first ground station, which sends the commands of `Sitl`.
         link: Link faults, which may be changed at any time.
-        fleet: The vehicles in the same simulated time, with this one; empty if it flies alone.
+        fleet: The vehicles in the same simulated time; empty if it flies alone.
     """
 
     items = items
@@ -99,7 +97,7 @@ class Sitl(View, Stepped, Steered):
             super().__setattr__(name, value)
 
     def begin(self) -> None:
-        """Fly until the first HEARTBEAT of the vehicle, if the setting requires it."""
+        """Fly until the first HEARTBEAT, if the setting requires it."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 
@@ -149,11 +147,7 @@ class Sitl(View, Stepped, Steered):
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
     def takeoff(self, height_m: float | None = None, *, wait: bool = True, within: float | None = None) -> None:
-        """Arm and climb to a height above home, default MIS_TAKEOFF_ALT; wait until `is_at` holds there.
-
-        Args:
-            within: Simulated time, s; default 8 s and 2 s per metre.
-        """
+        """Arm and climb to a height above home, default MIS_TAKEOFF_ALT; by default `within` 8 s and 2 s per metre."""
         height_m = self.get_param("MIS_TAKEOFF_ALT") if height_m is None else height_m
         east, north, from_m = self.position
         if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
@@ -167,11 +161,7 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
-        """Land here and wait until disarmed.
-
-        Args:
-            within: Simulated time, s; default 8 s and 2 s per metre.
-        """
+        """Land here and wait until disarmed; by default `within` 8 s and 2 s per metre."""
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
         if wait:
@@ -328,7 +318,7 @@ class Sitl(View, Stepped, Steered):
         self._injected += self._lockstep.change_of_world(PayloadChange(mass_kg))
 
     def kill_autopilot(self) -> None:
-        """Kill the autopilot as SIGKILL does, and restart it at once with the files written so far."""
+        """Kill the autopilot as SIGKILL does, and restart it with the files written so far."""
         self._lockstep.kill_autopilot()
 
     @property

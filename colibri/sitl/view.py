@@ -23,15 +23,7 @@ _SLOW_M_S = 0.3
 
 
 class View:
-    """The observable state of a vehicle in flight.
-
-    Positions and velocities are true, ENU, m and m/s; the origin is the initial position, or `home` of the setting.
-
-    Attributes:
-        setting: The setting of the flight.
-        gcs: The first ground station.
-        record: The record of the flight.
-    """
+    """The observable state of a vehicle in flight. Positions and velocities are true, ENU, m and m/s."""
 
     setting: Setting
     gcs: Station
@@ -122,7 +114,7 @@ class View:
         return self._texts.said(part)
 
     def heard(self, name: str) -> list[Any]:
-        """Return the messages of a name that the first ground station has received, as their fields."""
+        """Return the messages of a name that the first ground station has received."""
         return self.gcs.heard[name]
 
     def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:
@@ -147,7 +139,7 @@ class View:
 
     @property
     def sha256(self) -> str:
-        """Hash of truth and command of all frames; the same on all links and on machines of a kind."""
+        """Hash of truth and command of all frames; the same on all links."""
         return self.record.sha256
 
     def __repr__(self) -> str:

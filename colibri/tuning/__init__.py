@@ -1,4 +1,4 @@
-"""Tune numbers of a profile with Optuna over many flights, and test the result with other seeds."""
+"""Tune numbers of a profile with Optuna, and test the result with other seeds."""
 
 from typing import TYPE_CHECKING
 

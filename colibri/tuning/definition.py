@@ -22,10 +22,8 @@ _MIN_SEEDS = 3
 class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The tables of a tuning's file; also the keywords of `colibri.tune`.
 
-    Seeds, draws and grid are those of every trial; metrics are shown beside the objectives.
-
     Attributes:
-        check_seeds: Seeds to compare the best profile with the original by; by default no comparison.
+        check_seeds: Seeds to compare the best profile with the original by.
         trials: Number of trials, including the original profile.
         prune_after: Seeds between decisions to end a trial clearly worse than the best; 0 never. Default a quarter of
             the seeds, at least three.
@@ -44,15 +42,7 @@ class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class Tuning(NamedTuple):
-    """A validated tuning.
-
-    Attributes:
-        campaign: The flights of each trial.
-        check_seeds: Seeds of the comparison; may be empty.
-        prune_after: Seeds between decisions to prune; 0 never.
-        base: The original profile.
-        text: Its file, if it has one.
-    """
+    """A validated tuning; `base` is the original profile, `text` its file."""
 
     campaign: Campaign
     common: Common
@@ -74,7 +64,6 @@ class Tuning(NamedTuple):
         return profile
 
     def flown(self, params: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the numbers of a trial as factors of a flight."""
         return {name: as_flown(self.space[name], value) for name, value in params.items()}
 
     def steps(self) -> list[list[Point]]:
@@ -91,7 +80,7 @@ class Tuning(NamedTuple):
 
 
 def tuning_of(tables: TuningTables) -> Tuning:
-    """Read a tuning; the ends of all ranges are planned, to raise errors before it starts."""
+    """Read a tuning, and plan flights at the ends of all ranges to find errors early."""
     space = _space(tables)
     campaign = campaign_of(
         CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})
@@ -189,7 +178,6 @@ def _text(given: Any) -> str | None:
 
 
 def _check_ends(tuning: Tuning) -> None:
-    """Plan flights of the original profile and of both ends of each range."""
     campaign, common = tuning.campaign, tuning.common
     check(campaign.samples(), common)
     first = campaign._replace(grid={name: values[:1] for name, values in campaign.grid.items()}, draw={})

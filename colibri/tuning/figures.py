@@ -30,7 +30,6 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) -> Figure:
-    """Draw the importance of each number for each objective, the largest first."""
     first = next(iter(importances.values()))
     names = sorted(first, key=lambda name: -first[name])
     figure, ((axes,),) = axes_grid(1, 1, TOP_IN, row_in=0.3 + _BAR_IN * len(names) * len(importances))
@@ -95,7 +94,6 @@ def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended],
 def draw_pareto(
     title: str, objectives: Sequence[str], trials: Sequence[Ended], front: Sequence[Ended], best: Ended
 ) -> Figure:
-    """Draw the other objectives over the first, with the Pareto front."""
     figure, grid = axes_grid(len(objectives) - 1, 1, TOP_IN, row_in=3.6, share=False)
     joined = sorted(front, key=lambda trial: trial.values)
     for place, (objective, (axes,)) in enumerate(zip(objectives[1:], grid, strict=True), start=1):

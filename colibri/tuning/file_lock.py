@@ -14,7 +14,6 @@ class FileLock:
         self._file: int | None = None
 
     def acquire(self, *, wait: bool = True) -> bool:
-        """Lock; return False if it is taken and `wait` is off."""
         how = os.O_RDONLY if self._path.is_dir() else os.O_RDWR | os.O_CREAT
         opened = os.open(self._path, how | os.O_CLOEXEC, 0o666)
         try:
@@ -39,7 +38,7 @@ class FileLock:
 
 
 class JournalLock(FileLock):
-    """A lock on a journal for a writer; it removes an incomplete last line of a dead one."""
+    """A writer's lock on a journal; removes the incomplete last line of a dead one."""
 
     def __init__(self, journal: Path) -> None:
         super().__init__(journal.with_name(f"{journal.name}.lock"))

@@ -1,4 +1,4 @@
-"""Fly a trial in steps of some seeds, until its end or until it is clearly worse than the best."""
+"""Fly a trial in steps, until its end or until it is clearly worse than the best."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -19,12 +19,7 @@ _WORST, _EACH = "worst", "each"
 
 
 class Scale(NamedTuple):
-    """Reference values from the original profile's flights.
-
-    Attributes:
-        worst: Value of a lost flight, for each objective.
-        each: Value of each flight in order, for each objective.
-    """
+    """Reference values by objective, from the original profile: of a lost flight, and of each flight."""
 
     worst: tuple[float, ...]
     each: tuple[tuple[float, ...], ...]
@@ -49,7 +44,6 @@ class Flights:
         return self
 
     def __next__(self) -> Point:
-        """Return the next flight; more may follow after StopIteration."""
         if not self._left:
             raise StopIteration
         return self._left.popleft()

@@ -28,24 +28,19 @@ class Objective(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name in tables and figures."""
         if self.metric == SHARE_LOST:
             return SHARE_LOST
         return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
 
     def of_flights(self, flown: Sequence[Flown], metrics: Sequence[Metric], worst: float) -> Array:
-        """Return the value of each flight, (n,): at most `worst`, which also stands for lost and missing ones."""
+        """Return each flight's value, (n,), at most `worst`, which also stands for lost and missing ones."""
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
         return np.array([min(value_of(each, place, worst), worst) for each in flown])
 
     def worst(self, flown: Sequence[Flown], metrics: Sequence[Metric]) -> float:
-        """Return the value of a lost flight, from the original profile's flights.
-
-        Raises:
-            TuningError: All of them were lost, or a metric is missing or negative.
-        """
+        """Return the value of a lost flight, from the original profile's flights."""
         if self.metric == SHARE_LOST:
             return 1.0
         place = [metric.name for metric in metrics].index(self.metric)

@@ -14,8 +14,7 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
     """Return the file of a tuned profile, verified by reading it back.
 
     Args:
-        base: The original profile.
-        text: Its file, if it has one.
+        text: The file of `base`, if it has one.
         factors: Names of the tuned numbers.
         origin: Lines of the comment at the top.
     """
@@ -46,7 +45,6 @@ def tuned_name(base: Profile) -> str:
 
 
 def _set(document: Any, key: str, value: Any) -> None:
-    """Set a value at a dotted key, as in `Profile.replace`."""
     *above, last = key.split(".")
     parent = document
     for name in above:
@@ -55,7 +53,6 @@ def _set(document: Any, key: str, value: Any) -> None:
 
 
 def _tables(profile: Profile) -> Mapping[str, Any]:
-    """Return a profile as the tables of its file."""
     plain = msgspec.to_builtins(profile)
     return {key: _given(plain[key]) for key in ProfileTables.__struct_fields__ if plain[key] is not None}
 

@@ -25,7 +25,6 @@ class TuningResults:
     """The results of a tuning.
 
     Attributes:
-        tuning: The tuning.
         trials: Finished trials by number; the first is the original profile.
         best: Trial with the least objective; with several, the one on the Pareto front nearest to the least of each,
             relative to the front's ranges.
@@ -54,7 +53,7 @@ class TuningResults:
 
     @property
     def is_better(self) -> bool:
-        """Whether one objective is better with 95 % confidence on `check_seeds`, and no other is worse."""
+        """Whether an objective is better with 95 % confidence on `check_seeds`, and none worse."""
         return better(self.verdict)
 
     @property
@@ -87,7 +86,7 @@ class TuningResults:
         return ("trial", "state", "flights", "lost", *objectives, *self.tuning.space)
 
     def rows(self) -> list[Row]:
-        """Return the table of trials: chosen, front, pruned or flown; numbers with ten digits."""
+        """Return the table of trials; numbers with ten digits."""
         return [
             (
                 str(trial.number),
@@ -101,11 +100,7 @@ class TuningResults:
         ]
 
     def plot(self, what: str = "importance") -> "Figure":
-        """Return a figure: history, slices, with eight trials importance, with several objectives pareto.
-
-        Raises:
-            TuningError: The name is unknown.
-        """
+        """Return a figure: history, slices, with eight trials importance, with several objectives pareto."""
         figures = self._figures()
         if what not in figures:
             raise TuningError(f"there is no figure {what} of these trials: choose {', '.join(figures)}")
@@ -166,7 +161,6 @@ def _front(trials: Sequence[Ended]) -> list[Ended]:
 
 
 def _chosen(front: Sequence[Ended]) -> Ended:
-    """Return the trial nearest to the least of each objective, relative to the front's ranges."""
     least = [min(values) for values in zip(*(trial.values for trial in front), strict=True)]
     most = [max(values) for values in zip(*(trial.values for trial in front), strict=True)]
 

@@ -29,17 +29,14 @@ IDENTITY = "tuning.json"
 class Watcher:
     """Progress callbacks of a tuning; each does nothing by default."""
 
-    def began(self, trials: int) -> None:
-        """Start with this number of trials to do."""
+    def began(self, trials: int) -> None: ...
 
-    def flown(self, flown: Flown) -> None:
-        """Count a finished flight."""
+    def flown(self, flown: Flown) -> None: ...
 
     def ended(self, trials: int, first: float, best: float) -> None:
-        """Update the finished trials; `first` and `best` are the first objective of the original and its minimum."""
+        """Update progress; `first` and `best` are the first objective of the original and its minimum."""
 
-    def checking(self, flights: int) -> None:
-        """Start the comparison, with this number of flights."""
+    def checking(self, flights: int) -> None: ...
 
 
 def tune(
@@ -118,7 +115,6 @@ def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -
 
 
 def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, told: Watcher) -> CampaignResults:
-    """Fly both profiles with `check_seeds`, continuing earlier flights."""
     after = msgspec.structs.replace(results.profile, name=tuned_name(tuning.base))
     campaign = check_campaign(tuning, tuning.base, after)
     told.checking(campaign.flights)
@@ -127,7 +123,7 @@ def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, to
 
 
 def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
-    """Claim `out` for this tuning; TuningError if it has other contents or may not be resumed."""
+    """Claim `out` for this tuning."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with FileLock(out):

@@ -63,7 +63,6 @@ def check_holds(key: str, values: Range, value: Any) -> None:
 
 
 def distribution(values: Range) -> Any:
-    """Convert a range for Optuna; choices by their names in tables."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
     if isinstance(values, Choice):

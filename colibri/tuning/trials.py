@@ -27,12 +27,7 @@ _BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
 class Ended(NamedTuple):
-    """A finished trial; number 0 is the original profile.
-
-    Attributes:
-        values: Objectives; extrapolated if pruned.
-        lost: Number of flights lost.
-    """
+    """A finished trial; number 0 is the original profile. Objectives are extrapolated if pruned."""
 
     number: int
     values: tuple[float, ...]
@@ -54,9 +49,8 @@ class Begun(NamedTuple):
 class Trials:
     """The trials of a tuning in a folder, shared by several processes.
 
-    Each process holds a lock that ends with it, so that others repeat its unfinished trials. The values of a trial
-    depend only on the trials finished before, its number and the root seed: a resumed tuning continues as it would
-    have.
+    Each process holds a lock that ends with it, so that others repeat its unfinished trials. A trial depends only on
+    the trials finished before, its number and the root seed: a resumed tuning continues as it would have.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -131,14 +125,12 @@ class Trials:
         return found
 
     def _take_place(self) -> tuple[int, FileLock]:
-        """Return the first free place of a process and its lock."""
         place = 0
         while not (lock := FileLock(self._folder / f"process-{place}")).acquire(wait=False):
             place += 1
         return place, lock
 
     def _trials(self) -> list["FrozenTrial"]:
-        """Return finished and running trials by number."""
         from optuna.trial import TrialState
 
         states = (TrialState.COMPLETE, TrialState.RUNNING)
@@ -162,7 +154,6 @@ class Trials:
             lock.release()
 
     def _begin(self, trials: Sequence["FrozenTrial"]) -> Begun:
-        """Begin the first missing trial."""
         from optuna.trial import TrialState
 
         taken = {int(trial.user_attrs[_NUMBER]) for trial in trials}
@@ -175,7 +166,6 @@ class Trials:
         return Begun(int(trial.user_attrs[_NUMBER]), trial.params, trial)
 
     def _next(self, trials: Sequence["FrozenTrial"], number: int) -> dict[str, Any]:
-        """Sample the values of a trial."""
         from optuna.samplers import TPESampler
 
         root = self._tuning.campaign.root_seed
@@ -197,7 +187,7 @@ class Trials:
 
 
 def require_optuna() -> Any:
-    """Import Optuna and check for tomlkit; TuningError if one is missing."""
+    """Import Optuna and check for tomlkit."""
     try:
         import optuna
         import tomlkit  # noqa: F401

@@ -26,13 +26,9 @@ _STREAM = 1
 
 
 class Compared(NamedTuple):
-    """One number before and after, for one combination or all.
+    """One number before and after, for one combination or `all`.
 
     Attributes:
-        what: Objective or metric.
-        where: The combination, or `all`.
-        before: With the original profile.
-        after: With the tuned profile.
         change: Relative to `before`; absolute for a share, or if a resampled `before` is zero.
         low, high: Bounds at 95 % confidence: bootstrap over seeds, in pairs.
     """
@@ -62,7 +58,6 @@ class Compared(NamedTuple):
 
     @property
     def row(self) -> Row:
-        """The row of a table."""
         numbers = (self.before, self.after, self.change, self.low, self.high)
         return (self.what, self.where, str(self.seeds), *(f"{number:.6g}" for number in numbers))
 
@@ -81,7 +76,6 @@ def check_campaign(tuning: Tuning, before: Profile, after: Profile) -> Campaign:
 
 
 def compare(tuning: Tuning, table: FlightTable) -> list[Compared]:
-    """Compare each objective and each other metric."""
     pairs = _Pairs(table)
     others = [metric.name for metric in table.campaign.metrics]
     wanted = {objective.metric for objective in tuning.objectives}
@@ -114,10 +108,7 @@ class _Pairs:
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
     def _counts(self, objective: Objective, *, penalised: bool) -> Array:
-        """Return the value of each flight, (2, combinations, seeds).
-
-        For a metric without penalty, lost flights and their pairs are nan.
-        """
+        """Return values, (2, combinations, seeds); without penalty, lost flights and their pairs are nan."""
         metrics = self._campaign.metrics
         if penalised or objective.metric == SHARE_LOST:
             worst = objective.worst(self._listed(0), metrics)
@@ -149,7 +140,6 @@ def _compared(objective: Objective, where: str, counts: Array, *, is_objective: 
 
 
 def _pooled(objective: Objective, counts: Array) -> Array:
-    """Pool each row, ignoring nan."""
     if not np.isnan(counts).any():
         pooled: Array = objective.pooled(counts)
         return pooled

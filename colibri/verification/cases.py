@@ -20,12 +20,7 @@ _WAYPOINTS_FILE = "waypoints.csv"
 
 
 class Case(NamedTuple):
-    """A flight along a track.
-
-    Attributes:
-        options: Those of `colibri fly`.
-        waypoints: Contents of the file of track `waypoints`.
-    """
+    """A flight along a track, by options of `colibri fly`, with the contents of a waypoint file."""
 
     name: str
     options: dict[str, Any]
@@ -50,11 +45,7 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SitlCase:
-    """A flight commanded by a ground station, as under `colibri sitl`.
-
-    Attributes:
-        setting: Keys of `colibri.sitl.backends.setting.Setting`.
-    """
+    """A flight commanded by a ground station, by keys of `colibri.sitl.backends.setting.Setting`."""
 
     name: str
     orders: "Callable[[Sitl], object]"

@@ -33,7 +33,6 @@ class Outcome(NamedTuple):
 
 
 def verify_golden(args: argparse.Namespace) -> int:
-    """Fly the golden flights; compare or renew their hashes; return the exit code."""
     if args.duration is not None:
         fail("--duration does not go with --golden: each golden flight has its own")
     path: Path = args.golden
@@ -87,7 +86,6 @@ def read_hashes(path: Path) -> dict[str, str]:
 
 
 def _check_names(path: Path, known: Mapping[str, str]) -> None:
-    """Require the file to have the hash of each golden flight and no others."""
     names = {flight.name for flight in FLIGHTS}
     wrong = [f"names {name}, which is no golden flight" for name in sorted(known.keys() - names)]
     wrong += [f"has no hash of golden flight {name}" for name in sorted(names - known.keys())]

@@ -37,12 +37,7 @@ SEED = 7
 
 
 class Verdict(NamedTuple):
-    """The result of a case.
-
-    Attributes:
-        hashes: Of the trajectories: first, second, in memory.
-        commands: Number of commands replayed.
-    """
+    """The result of a case: hashes of three flights, and commands replayed."""
 
     name: str
     hashes: tuple[str, str, str]

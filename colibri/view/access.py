@@ -28,7 +28,7 @@ class Token(NamedTuple):
 
 
 def refusal(headers: Mapping[str, str], port: int) -> str | None:
-    """Return why to refuse a request or connection, or `None`; `port` is the page's."""
+    """Return why to refuse a request or connection, if it must be."""
     if headers.get("Host") not in {f"{name}:{port}" for name in _OURS}:
         return "the page is served to this computer alone"
     origin = headers.get("Origin")

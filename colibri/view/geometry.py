@@ -28,7 +28,7 @@ _EDGES = 4
 
 
 def rotor_colour(part: float) -> Colour:
-    """Return the colour of a relative rotor speed: blue, green, yellow, red; grey if unknown."""
+    """Return the colour of a relative rotor speed."""
     if not isfinite(part):
         return IDLE_GREY
     levels, colours = zip(*_SCALE, strict=True)
@@ -37,7 +37,6 @@ def rotor_colour(part: float) -> Colour:
 
 
 def blade_angles(rotors: FourRotors, spins: FourRotors, before_rad: FourRotors, elapsed_s: float) -> FourRotors:
-    """Return the displayed angles of the rotors, rad."""
     full = 2.0 * pi * _TURNS_A_SECOND * elapsed_s
     a, b, c, d = (
         (angle + full * spin * (0.0 if isnan(part) else part)) % (2.0 * pi)
@@ -75,7 +74,7 @@ def thinned(points: Array, most: int) -> Array:
 
 
 def zone_segments(zone: Zone, bottom_m: float, top_m: float) -> NDArray[np.float32]:
-    """Return the outline of a zone at two heights and its upright edges, (n, 2, 3)."""
+    """Return a zone's outline at two heights and its upright edges, (n, 2, 3)."""
     closed = np.vstack([zone.corners_m, zone.corners_m[:1]])
     rings = [np.column_stack([closed, np.full(len(closed), height)]) for height in (bottom_m, top_m)]
     corners = len(zone.corners_m)
@@ -118,7 +117,6 @@ def outline(around: Surroundings) -> list[Array]:
 
 
 def vehicle_scale(extent_m: float, airframe: Airframe) -> float:
-    """Return the scale at which a vehicle is visible in a scene of half size `extent_m`."""
     size = max(hypot(*place) for place in airframe.rotors_m) + airframe.radius_m
     return max(1.0, round(0.2 * extent_m / size, 1))
 

@@ -13,22 +13,12 @@ _WAIT_S = 0.02
 
 
 class LiveVehicle:
-    """The vehicle at the other end of a link; a `Source`.
-
-    Attributes:
-        url: With the actual port.
-        airframe: Generic, as telemetry has no geometry.
-    """
+    """The vehicle at the other end of a link; a `Source`. The airframe is generic, as telemetry has none."""
 
     airframe = Airframe()
     is_live = True
 
     def __init__(self, url: str, name: str = "") -> None:
-        """Open a link and serve it.
-
-        Raises:
-            ViewError: It cannot be opened.
-        """
         try:
             self._link = open_ground_link(url)
         except LinkError as error:

@@ -1,4 +1,4 @@
-"""The page's end of a MAVLink link: requests telemetry and plans, sends commands and reports their results.
+"""The page's end of a MAVLink link: requests telemetry and plans, sends commands.
 
 No I/O: datagrams and time in, datagrams out. It does not identify as a ground station: closing a browser must not
 trigger a failsafe.
@@ -118,7 +118,6 @@ class Observer:
         self._give(what, Command(self._vehicle, number, *params, repeat=_REPEAT))
 
     def _give(self, what: str, command: Command) -> None:
-        """Send a command; a pending one is cancelled."""
         if not self.telemetry.system:
             self.telemetry.say(f"{what}: no vehicle is there")
             return
@@ -144,7 +143,6 @@ class Observer:
                     self._order = None
 
     def _draw(self) -> None:
-        """Redraw the surroundings if a plan, the origin or home has changed."""
         home = self.telemetry.home_enu_m
         now = str((self.telemetry.origin, home, self._plans))
         if now != self._drawn:

@@ -25,7 +25,6 @@ Place = Callable[[MissionItem], Vector]
 
 
 def drawn(plans: Mapping[int, Sequence[MissionItem]], home_enu_m: Vector, place: Place) -> Surroundings:
-    """Convert plans, by MAV_MISSION_TYPE."""
     return Surroundings(
         ground_m=0.0 if home_enu_m[2] != home_enu_m[2] else home_enu_m[2],
         home_enu_m=home_enu_m,

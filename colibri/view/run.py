@@ -35,10 +35,7 @@ PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
 
 
 class Show:
-    """Updates the page as time passes, without waiting; starts with the first browser.
-
-    `order` is called with each command.
-    """
+    """Updates the page as time passes, without waiting; starts with the first browser."""
 
     def __init__(
         self,
@@ -132,13 +129,11 @@ def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False
 
 
 def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Show the vehicle on a link until interrupted; print the token for commands."""
     with _live_page(url, port, browser=browser, say=say) as (_, show):
         _keep_showing(show, Stop().__bool__)
 
 
 def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
-    """Execute a command of the page."""
     orders: dict[str, Callable[[Observer], None]] = {
         "arm": lambda observer: observer.arm(True),
         "disarm": lambda observer: observer.arm(False),

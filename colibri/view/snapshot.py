@@ -46,11 +46,10 @@ class Snapshot:
     Attributes:
         attitude: Unit quaternion, FLU to ENU.
         rotors: Fractions of the largest speed.
-        trail: Recent positions, ENU, m, (n, 3), the newest last.
-        horizon: Predicted positions, ENU, m, (k, 3).
+        trail: Recent positions, (n, 3), the newest last.
+        horizon: Predicted positions, (k, 3).
         estimate_enu_m: Estimated position, if `position_enu_m` is the true one.
         sigma_m: Its standard deviations, east, north, up.
-        texts: Latest texts, the newest first.
     """
 
     time_s: float
@@ -78,12 +77,7 @@ class Mark(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """A part of a geofence.
-
-    Attributes:
-        corners_m: East and north of its outline, (n, 2), n >= 3.
-        keeps_in: Whether the vehicle must stay inside, or else outside.
-    """
+    """A part of a geofence, with its outline east and north, (n, 2)."""
 
     corners_m: Array
     keeps_in: bool
@@ -91,14 +85,7 @@ class Zone(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """The static objects around a vehicle.
-
-    Attributes:
-        ground_m: Height of the ground, z of ENU.
-        path: All positions of a recorded flight, ENU, m, (n, 3).
-        reference_path: Its references, (n, 3).
-        ceiling_m: Displayed top of zones.
-    """
+    """The static objects around a vehicle; paths are (n, 3)."""
 
     ground_m: float = 0.0
     path: Array = field(default_factory=lambda: NO_POINTS)
@@ -116,7 +103,6 @@ class Chart(NamedTuple):
     Attributes:
         title: Quantity and unit; charts of several flights are merged by title.
         names: Names of the series; in parentheses a limit, drawn grey.
-        times_s: (n,).
         values: (series, n).
         headline: The series to show of each of several flights, (n,).
     """
@@ -132,7 +118,6 @@ class Source(Protocol):
     """A vehicle that can be shown, recorded or live.
 
     Attributes:
-        name: Short, for labels.
         is_live: Whether time passes by itself.
         span_s: First and last known time.
         surroundings: A new object after each change.

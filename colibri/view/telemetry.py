@@ -38,13 +38,7 @@ _CHARTS = (
 
 
 class Telemetry:
-    """The latest state by messages.
-
-    Attributes:
-        autopilot: MAV_AUTOPILOT; `None` before the first heartbeat.
-        system: Its system id; 0 before.
-        origin: Origin of its local frame, once received.
-    """
+    """The latest state by messages; `system` is 0 before the first heartbeat."""
 
     def __init__(self) -> None:
         self.autopilot: int | None = None
@@ -78,7 +72,6 @@ class Telemetry:
         }
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Process a message of the autopilot; `now_s` is wall-clock time."""
         if isnan(self._began_s):
             self._began_s = now_s
         handler = self._handlers.get(message.name)

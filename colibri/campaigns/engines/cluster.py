@@ -23,8 +23,7 @@ _MAX_BATCH = 500
 class Cluster:
     """A Dask cluster.
 
-    If a worker is lost, its jobs are repeated by others. A job lost with several workers is repeated alone at the end,
-    and given up if it is lost again.
+    Jobs of a lost worker are repeated by others; a job lost with several workers is repeated alone at the end.
     """
 
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
@@ -108,7 +107,7 @@ class Cluster:
 
 
 def _do(jobs: list[Any], given: tuple[Callable[[Any, Any], Any], Any], wanted: str) -> tuple[float, list[Any]]:
-    """Do a batch of jobs; return the duration in s, and the results."""
+    """Return the duration of a batch, s, and its results."""
     if version(_PACKAGE) != wanted:
         raise CampaignError(f"--dask: a worker has colibri {version(_PACKAGE)}, the campaign is of {wanted}")
     work, common = given

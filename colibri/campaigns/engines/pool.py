@@ -20,8 +20,8 @@ _AHEAD = 2
 class Pool:
     """A pool of processes that end with this one.
 
-    If a worker is killed, the whole pool breaks. All submitted jobs are then repeated one by one; a job that kills its
-    worker again is given up.
+    A killed worker breaks the whole pool. All submitted jobs are then repeated one by one; one that kills again is
+    given up.
     """
 
     def __init__(self, workers: int | None = None) -> None:

@@ -19,10 +19,7 @@ def in_order(
     quiet: bool,
     keep: Callable[[Result], object] = lambda _result: None,
 ) -> list[Result]:
-    """Run jobs in a pool of processes; return the results in the order of the jobs.
-
-    `keep` is called with each result as soon as it is available.
-    """
+    """Run jobs in a pool of processes; return results in the order of jobs, and `keep` each at once."""
     found: dict[int, Result] = {}
     with closing(Pool().each(_numbered, work, enumerate(jobs))) as done:
         for (number, job), result in with_bar(done, title, len(jobs), quiet=quiet):

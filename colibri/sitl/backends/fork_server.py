@@ -43,7 +43,6 @@ def main() -> None:
 
 
 def _load() -> None:
-    """Load all modules and run all compiled functions once."""
     from colibri.sitl.backends.lockstep import LockstepSession
     from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
     from colibri.sitl.backends.setting import setting_of

@@ -10,10 +10,7 @@ from colibri.sitl.errors import SitlError
 
 
 class Inside:
-    """Access to plant and autopilot, for tests of internal state.
-
-    SitlError if they are in other processes.
-    """
+    """Plant and autopilot in memory, for tests of internal state; SitlError in other processes."""
 
     def __init__(self, session: LockstepSession) -> None:
         plant, autopilot = session.plant, session.autopilot
@@ -35,17 +32,15 @@ class Inside:
 
     @property
     def world(self) -> World:
-        """The plant's world; setting it changes the next frame."""
         return self.plant.world
 
     @world.setter
     def world(self, world: World) -> None:
-        """The plant's world; setting it changes the next frame."""
         self.plant.world = world
         self._measure_again()
 
     def skip(self, frames: int) -> None:
-        """Let the plant run without the autopilot for some frames, with the last command."""
+        """Run the plant alone for some frames, with the last command."""
         for _ in range(frames):
             self.plant.go_on()
         self._measure_again()

@@ -38,7 +38,6 @@ class Launcher:
         return _ForkedChild(pid, self._request)
 
     def close(self) -> None:
-        """End the server, and with it the processes it has started."""
         if self._server is not None:
             self._server.communicate()
 
@@ -101,13 +100,9 @@ class LoggedChild:
 
 @contextmanager
 def one_core(worker: int, workers: int) -> Iterator[None]:
-    """Pin this thread and its processes to one core each if workers occupy all cores.
+    """Pin this thread and its processes to one core if workers occupy all cores.
 
     In lockstep one process computes at a time, and waking another core costs much more.
-
-    Args:
-        worker: Index of the worker, from 0.
-        workers: Number of workers.
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
     if not cores or not workers or workers % len(cores):  # a core may be idle, or would have more to do than others

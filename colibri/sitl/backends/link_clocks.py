@@ -12,8 +12,7 @@ class LinkClock(Protocol):
 
     def now_s(self) -> float: ...
 
-    def wait(self, timeout_s: float) -> None:
-        """Let time pass, at most `timeout_s`."""
+    def wait(self, timeout_s: float) -> None: ...
 
 
 class StoppedClock:
@@ -30,10 +29,7 @@ class StoppedClock:
 
 
 class QuickClock:
-    """Ten times the wall clock, for an autopilot in another process.
-
-    Links delay less, and the plant repeats lost datagrams sooner; duplicates are dropped.
-    """
+    """Ten times the wall clock, for an autopilot in another process: lost datagrams are repeated sooner."""
 
     def now_s(self) -> float:
         return _QUICK * perf_counter()

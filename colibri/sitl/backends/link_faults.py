@@ -1,4 +1,4 @@
-"""Link faults: loss, delay, duplication, reordering and corruption of datagrams, by seed and simulated time."""
+"""Link faults: loss, delay, duplication, reordering and corruption of datagrams, by seed and time."""
 
 from dataclasses import dataclass
 from heapq import heappop, heappush
@@ -24,7 +24,6 @@ class Trouble:
         duplicate: Fraction delivered twice, the copy with its own delay.
         reorder: Fraction delayed so that later ones overtake.
         corrupt: Fraction with a wrong bit.
-        down: Whether all are lost.
     """
 
     loss: float = 0.0

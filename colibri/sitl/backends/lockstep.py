@@ -1,4 +1,4 @@
-"""A flight in lockstep: the session passes datagrams between plant and autopilot, frame by frame.
+"""A flight in lockstep: pass datagrams between plant and autopilot, frame by frame.
 
 Each side may be in this process or another, see `memory` and `udp`; the bytes are the same.
 """
@@ -49,8 +49,7 @@ class Plant(Protocol):
     @property
     def clock(self) -> LinkClock: ...
 
-    def receive(self, datagram: bytes) -> None:
-        """Process a datagram of an autopilot, which may be corrupt."""
+    def receive(self, datagram: bytes) -> None: ...
 
     def frame(self) -> list[bytes]:
         """Return the datagrams up to the next frame, which comes last."""
@@ -73,17 +72,13 @@ class Autopilot(Protocol):
     def expect(self, step_message: StepMessage) -> None:
         """Process the datagrams of ground stations for the next frame."""
 
-    def receive(self, datagram: bytes) -> None:
-        """Process a datagram of the plant, which may be corrupt."""
+    def receive(self, datagram: bytes) -> None: ...
 
-    def listen(self) -> list[bytes]:
-        """Return the datagrams sent to the plant."""
+    def listen(self) -> list[bytes]: ...
 
-    def answer(self) -> bytes:
-        """Return the answer to the frame."""
+    def answer(self) -> bytes: ...
 
-    def to_stations(self) -> StepMessage:
-        """Return the datagrams to ground stations at that frame."""
+    def to_stations(self) -> StepMessage: ...
 
     def kill(self) -> None:
         """End it as a power cut does."""
@@ -94,13 +89,7 @@ class Autopilot(Protocol):
 
 
 class Instant(NamedTuple):
-    """A frame that was flown.
-
-    Attributes:
-        began: True state at its start.
-        frame: Datagram to the autopilot.
-        answer: Datagram to the plant.
-    """
+    """A frame that was flown; `began` is the true state at its start."""
 
     began: StateFrame
     command: ActuatorCommand
@@ -114,7 +103,6 @@ class LockstepSession:
 
     Attributes:
         truth: True state now.
-        flown: The last frame.
         acks: Answers of the plant to commands: number and MAV_RESULT.
         trouble: Faults of the link between plant and autopilot.
     """
@@ -134,15 +122,7 @@ class LockstepSession:
         self.flown = Instant(self.truth, still, StepMessage(0, ()), b"", b"")
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
-        """Fly one frame.
-
-        Args:
-            parcels: Datagrams of ground stations.
-            injected: MAVLink frames added to the autopilot's answer.
-
-        Raises:
-            SessionError: The flight cannot go on.
-        """
+        """Fly one frame; frames `injected` are added to the autopilot's answer."""
         frame, began = self._frame, self.truth
         step_message = StepMessage(began.time_us, parcels)
         self.autopilot.expect(step_message)
@@ -162,10 +142,7 @@ class LockstepSession:
         return self.flown
 
     def _struggle(self, frame: bytes, time_us: int, injected: bytes) -> tuple[bytes, StepMessage, list[bytes]]:
-        """Pass a frame and its answer over a faulty link.
-
-        Return the answer, the datagrams to ground stations, and those of the plant up to its next frame.
-        """
+        """Pass a frame over a faulty link; return the answer, and the datagrams to stations and of the plant."""
         plant, autopilot, up, down = self.plant, self.autopilot, self._up, self._down
         now_s = plant.clock.now_s
         began_s = now_s()
@@ -197,12 +174,10 @@ class LockstepSession:
         self._frame, self.truth = self._taken_in(self.plant.frame())
 
     def command_to_plant(self, number: int, *params: float) -> bytes:
-        """Encode a COMMAND_LONG from the autopilot to the plant."""
         values = (*params, *(0.0,) * (7 - len(params)))
         return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
 
     def change_of_world(self, change: WorldChange) -> bytes:
-        """Encode a change of the world from the autopilot to the plant."""
         return encode_change(self._codec, change, (self._codec.source[0], PLANT_COMPONENT))
 
     def processes(self) -> dict[str, int]:
@@ -210,7 +185,6 @@ class LockstepSession:
         return {name: number for name, number in sides.items() if number is not None}
 
     def kill_autopilot(self) -> None:
-        """End the autopilot as a power cut does, and restart it while the plant waits."""
         self.autopilot.kill()
         self.autopilot.start()
         self.autopilot.call()
@@ -250,7 +224,7 @@ class LockstepSession:
 
 
 def answers(datagram: bytes, time_us: int) -> bool:
-    """Whether a datagram of unsigned MAVLink 2 frames holds the answer to the frame of a time."""
+    """Whether a datagram of unsigned MAVLink 2 frames answers the frame of a time."""
     sought = time_us.to_bytes(8, "little")
     at = 0
     while at < len(datagram):

@@ -27,16 +27,11 @@ _ADDRESS: Address = ("memory", 0)
 
 
 class MemoryPlant:
-    """A plant in this process.
-
-    Attributes:
-        plant: `None` before the first frame.
-    """
+    """A plant in this process; with a `clock` if the autopilot is in another."""
 
     process = None
 
     def __init__(self, spec: PlantSpec, clock: LinkClock | None = None) -> None:
-        """Build the plant; pass a `clock` if the autopilot is in another process."""
         try:
             self._builder = builder_of(spec)
         except VehicleError as error:
@@ -83,11 +78,7 @@ class MemoryPlant:
 
 
 class MemoryAutopilot:
-    """An autopilot in this process, with its ground side.
-
-    Attributes:
-        autopilot: A new one after a restart.
-    """
+    """An autopilot in this process with its ground side; `autopilot` is a new one after a restart."""
 
     process = None
 
@@ -144,7 +135,6 @@ class MemoryAutopilot:
         return self._conductor.to_stations
 
     def kill(self) -> None:
-        """End it as a power cut does: pending files are not written."""
         self._ground.abandon()
 
     def close(self) -> None:

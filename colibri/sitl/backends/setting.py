@@ -28,7 +28,6 @@ class SettingError(SitlError):
 
 
 def _numbers(text: str) -> dict[str, int | float]:
-    """Parse KEY=VALUE,... with numbers; integers stay integers."""
     try:
         return {key: _number(value) for key, _, value in (pair.partition("=") for pair in text.split(","))}
     except ValueError:
@@ -43,8 +42,7 @@ def _number(text: str) -> int | float:
 class Setting(WorldSpec, LawSpec):
     """The setting of a flight; most fields are options of `colibri plant` and `autopilot`.
 
-    The seed also seeds link faults. The default start is standing at the origin, facing north; x, y, z count from
-    there.
+    The seed also seeds link faults. The default start is standing at the origin, facing north.
     """
 
     vehicle: Annotated[str | Vehicle, Option("vehicle that the plant flies, name or .toml")] = "hummingbird"

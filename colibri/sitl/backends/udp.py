@@ -1,4 +1,4 @@
-"""Plant and autopilot, either or both, as processes that this one connects over UDP."""
+"""Plant and autopilot as processes that this one connects over UDP."""
 
 import json
 from dataclasses import replace
@@ -124,7 +124,6 @@ class UdpAutopilot:
         return datagrams
 
     def answer(self) -> bytes:
-        """Return the answer to the frame; other datagrams are calls for a plant."""
         while True:
             datagram, _ = received(self._link, self._child)
             if answers(datagram, self._time_us):
@@ -154,7 +153,6 @@ def opened(url: str) -> UdpLink:
 
 
 def received(link: UdpLink, child: LoggedChild) -> tuple[bytes, Address]:
-    """Return the next datagram; SessionError if the process has died or is silent."""
     began_s = perf_counter()
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:
         child.check()

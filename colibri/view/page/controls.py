@@ -70,7 +70,6 @@ class Controls:
 
 
 def words(names: Sequence[str], snapshots: Sequence[Snapshot]) -> str:
-    """Describe the vehicles now, as Markdown."""
     return "\n\n".join(
         _of_one(name, "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)]), now)
         for number, (name, now) in enumerate(zip(names, snapshots, strict=True))

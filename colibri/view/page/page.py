@@ -22,12 +22,7 @@ _LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
 
 
 class Page:
-    """A page that shows vehicles.
-
-    Attributes:
-        server: The server of viser.
-        laid_out: Whether a browser has laid out its panels, which changes the aspect of its camera.
-    """
+    """A page that shows vehicles; `laid_out` once a browser's panels have changed the aspect of its camera."""
 
     def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
         self._sources = sources
@@ -67,7 +62,7 @@ class Page:
         return bool(self.server.get_clients())
 
     def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
-        """Draw the scene; browsers that are connected already get the camera of a live vehicle's surroundings."""
+        """Draw the scene; connected browsers get the camera of a live vehicle's surroundings."""
         if self._vehicles:
             return
         if snapshots and self._sources[0].is_live:
@@ -107,7 +102,6 @@ class Page:
             yield done
 
     def show(self, snapshots: Sequence[Snapshot]) -> None:
-        """Update each vehicle, once the scene is drawn."""
         if not self._vehicles:
             return
         layers = self.controls.layers
@@ -122,26 +116,22 @@ class Page:
                 self._world.position = (-x, -y, -z)
 
     def tell(self, snapshots: Sequence[Snapshot], time_s: float, plays: bool) -> None:
-        """Update the texts."""
         self.controls.show(words(self._names, snapshots), time_s, plays)
 
     def plot(self, time_s: float, *, anew: bool = False) -> None:
-        """Move the mark in the plots; `anew` also updates the series."""
         if anew:
             self._plots.show([source.charts() for source in self._sources])
         self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
-        """Offer commands to browsers with the token; they are yielded by `done` as `order`."""
         Commands(self.server, token, modes, self.controls.done, self._ground_point)
 
     def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
-        """Intersect a ray of the camera with the ground, in the vehicle's frame."""
         x, y, z = np.subtract(origin, self._world.position).tolist()
         return ground_point((x, y, z), direction, self._ground_m)
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
-        """Return an animation of the scene at some times as a page that works without a server."""
+        """Return an animation of the scene at some times, which works without a server."""
         self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]

@@ -72,7 +72,6 @@ class Plots:
         return self._framed(chart.times_s, list(chart.values), lines)
 
     def _overlaid(self, charts: Sequence[Chart | None]) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-        """Return the headlines of several vehicles over the union of their times."""
         known = [chart for chart in charts if chart is not None]
         times_s = np.unique(np.concatenate([chart.times_s for chart in known]))
         values, lines = [], []
@@ -96,7 +95,7 @@ class Plots:
 
 
 def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
-    """Return the mark: a line at the lowest value with a peak at a time. A nan would break uPlot's scaling."""
+    """Return a line at the lowest value with a peak at a time. A nan would break uPlot's scaling."""
     low, high = (float(pick(values)) for pick in (np.min, np.max))
     mark = np.full(len(times_s), low)
     if time_s >= times_s[0]:

@@ -38,7 +38,7 @@ _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 
 
 class VehicleScene:
-    """One vehicle with trail, reference and horizon, drawn at `scale` times its size."""
+    """One vehicle with trail, reference and horizon, at `scale` times its size."""
 
     def __init__(self, scene: viser.SceneApi, number: int, airframe: Airframe, scale: float) -> None:
         self._scene = scene
@@ -165,7 +165,6 @@ class SurroundingsScene:
         self.shown: Surroundings | None = None
 
     def show(self, around: Surroundings, layers: frozenset[str]) -> None:
-        """Redraw after changes; show the given layers."""
         if around is not self.shown:
             self.shown = around
             self._frame.remove()
@@ -219,7 +218,6 @@ class SurroundingsScene:
 
 
 def add_ground(scene: viser.SceneApi, ground_m: float, extent_m: float) -> None:
-    """Draw the ground: squares of 1 m, of 10 m in a large scene."""
     cell = 1.0 if extent_m < 40.0 else 10.0
     scene.configure_default_lights(cast_shadow=False)
     scene.add_grid(
@@ -244,7 +242,7 @@ def add_ground(scene: viser.SceneApi, ground_m: float, extent_m: float) -> None:
 
 
 def _show(handle: Any, points: Any, layers: frozenset[str], layer: str) -> None:
-    """Update lines or arrows; hide them if they are empty or their layer is off."""
+    """Update lines or arrows; hide empty ones."""
     visible = layer in layers and points is not None and len(points) > 0
     if handle.visible != visible:
         handle.visible = visible

@@ -25,11 +25,6 @@ class PageServer(viser.ViserServer):
 
 
 def serve(port: int, label: str) -> PageServer:
-    """Start a server on a port of loopback; 0 takes a free one.
-
-    Raises:
-        ViewError: The port is taken.
-    """
     with _guarded() as guards, redirect_stdout(StringIO()):
         server = PageServer(host=HOST, port=port, label=label, verbose=False)
     if not guards:

@@ -1,1 +1,1 @@
-"""Recorded flights: state from their logs, and horizons from a replay."""
+"""Recorded flights and their horizons."""

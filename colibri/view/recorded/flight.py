@@ -52,7 +52,6 @@ class RecordedFlight:
     """A recorded flight, reduced for display; a `Source`."""
 
     def __init__(self, folder: Path, name: str = "") -> None:
-        """Read a folder; ViewError if it has no flight or no samples."""
         try:
             self.plan = plan_of(folder)
             log = FlightFile(folder / FILE)
@@ -87,7 +86,6 @@ class RecordedFlight:
         self._horizons = horizons
 
     def at(self, time_s: float) -> Snapshot:
-        """Interpolate the vehicle's state between samples."""
         truth, times_s = self._truth, self._truth.times_s
         row = int(np.searchsorted(times_s, time_s + 1e-9))
         at_s = min(max(time_s, self.span_s[0]), self.span_s[1])
@@ -188,7 +186,6 @@ def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
 
 
 def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:
-    """Return the reference positions, (n, 3)."""
     lags = Lags(decisions.times_s, decisions.named["path_lag_s"])
     return position(plan.track, path_times(times_s, lags))
 
@@ -208,7 +205,7 @@ def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, he
 
 
 def _events(decisions: Columns) -> list[tuple[float, str]]:
-    """Return the times at which the QP failed or a fallback decided, with texts."""
+    """Return times and texts at which the QP failed or a fallback decided."""
     statuses = {code: status for status, code in STATUS_CODES.items()}
     fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}
     events = []
@@ -225,7 +222,6 @@ def _word(what: object) -> str:
 
 
 def _between(times_s: Array, rows: Array, time_s: float) -> Array:
-    """Interpolate linearly, (columns,)."""
     after = min(max(int(np.searchsorted(times_s, time_s)), 1), max(len(times_s) - 1, 0))
     before = max(after - 1, 0)
     span_s = times_s[after] - times_s[before]

@@ -30,7 +30,6 @@ class Horizons:
         self._known: tuple[list[float], list[Array]] = ([], [])
 
     def add(self, time_s: float, points: Array) -> None:
-        """Append a horizon, (k, 3)."""
         times_s, horizons = self._known
         horizons.append(points)
         times_s.append(time_s)  # last: who looks it up from another thread finds its points
@@ -52,7 +51,6 @@ class HorizonProcess:
         self._thread.start()
 
     def wait(self) -> int:
-        """Wait for all horizons; return the exit code."""
         self._thread.join()
         return self._process.wait()
 

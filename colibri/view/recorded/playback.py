@@ -6,13 +6,7 @@ SPEEDS = ("0.1x", "0.25x", "0.5x", "1x", "2x", "4x", "8x")
 
 
 class Playback(NamedTuple):
-    """The position in a flight.
-
-    Attributes:
-        span_s: First and last time of the flight.
-        since_s: Wall-clock time at which it was at `from_s`.
-        speed: Times real time.
-    """
+    """The position in a flight; it was at `from_s` at wall-clock time `since_s`."""
 
     span_s: tuple[float, float]
     since_s: float = 0.0
@@ -21,7 +15,6 @@ class Playback(NamedTuple):
     plays: bool = False
 
     def time_s(self, now_s: float) -> float:
-        """Return the time of the flight, up to its end."""
         ahead_s = self.speed * (now_s - self.since_s) if self.plays else 0.0
         return min(max(self.from_s + ahead_s, self.span_s[0]), self.span_s[1])
 

@@ -16,11 +16,7 @@ EVERY = 5
 
 
 def predicted(folder: Path) -> Iterator[tuple[float, Array]]:
-    """Yield time and points of each horizon, (k, 3), starting at the estimated position.
-
-    Raises:
-        Error: The flight cannot be replayed, or its control law has no horizon.
-    """
+    """Yield time and points of each horizon, (k, 3), starting at the estimated position."""
     plan = plan_of(folder)
     loop = ControlLoop(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
     forecaster = Forecaster(plan.vehicle, loop.control_interval_us / 1e6, loop.plan_columns)
