@@ -1,4 +1,4 @@
-"""The pytest plugin: fixture `sitl`, its marks and options, the files of a failed flight, and the summary of a run.
+"""The pytest plugin: fixture `sitl`, marks and options, files of a failed flight, summary.
 
 Every run of pytest loads it; modules that fly are loaded by the first test that needs them.
 """
@@ -98,7 +98,7 @@ def sitl_seed(request: pytest.FixtureRequest) -> int | None:
 
 @pytest.fixture
 def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., Fleet]]:
-    """Return a function that begins fleets: each vehicle with the marks of the test and its own system id."""
+    """Return a function that begins fleets: each vehicle with the marks of the test."""
     from colibri.sitl.fleet import begin_fleet
 
     with ExitStack() as stack:
@@ -123,7 +123,6 @@ def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Keep the flights of a failed test, and attach the summary of all to the report."""
     report = yield
     flights = item.stash.get(_FLIGHTS, None)
     if flights is None:
@@ -146,7 +145,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tuple[list[Path], str]:
-    """Keep the flights of a failed test; return their folders, and a text for the report."""
+    """Return the folders of a failed test's flights, and a text for the report."""
     link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
     again = f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
     folder, crash = _folder(item), getattr(report.longrepr, "reprcrash", None)
@@ -243,7 +242,6 @@ def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
 
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
-    """Return the keywords of a test's marks, the closest last."""
     said: list[Mapping[str, Any]] = [_values(mark) for mark in reversed(list(node.iter_markers("sitl")))]
     for name, key in (("vehicle", "name"), ("feedback", "kind")):
         mark = node.get_closest_marker(name)
@@ -258,7 +256,7 @@ def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
 
 
 def _values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
-    """Return the values of a mark by name; fail in one line, which begins with `of`, if it does not match `MARKS`."""
+    """Return the values of a mark by name; fail in one line, which begins with `of`."""
     names = [name.strip() for name in MARKS[mark.name].partition("(")[2].partition(")")[0].split(",")]
     if mark.name == "sitl":
         needed, names = set(), []

@@ -1,4 +1,4 @@
-"""A campaign as data: common options, factors, seeds and metrics."""
+"""A campaign as data."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterator, Mapping, Sequence
@@ -124,7 +124,7 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Yield flights with each value of each factor, of numbers the ends, to test them before the campaign."""
+        """Yield flights that test each value of each factor, of numbers the ends."""
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
@@ -136,7 +136,7 @@ class Campaign(NamedTuple):
                 yield first._replace(factors=first.factors | {factor: value})
 
     def values(self, option: str) -> Iterator[Any]:
-        """Yield the values of an option in any table, without continuous draws."""
+        """Yield the values of an option, without continuous draws."""
         draw = self.draw.get(option)
         yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
         yield from self.grid.get(option, ())
@@ -146,7 +146,6 @@ class Campaign(NamedTuple):
         return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
-        """Draw a flight's factors from its own random stream."""
         if not self.draw:
             return {}
         chance = Generator(PCG64(SeedSequence(self.root_seed, spawn_key=(stream,))))
@@ -154,7 +153,7 @@ class Campaign(NamedTuple):
 
 
 def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, Any]) -> Tables:
-    """Read a file and override its tables by keywords, factor by factor."""
+    """Read a file and override it by keywords, factor by factor."""
     base = kind() if file is None else read_toml(Path(file), kind, CampaignError)
     known = kind.__struct_fields__
     for name in given:

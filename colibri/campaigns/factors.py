@@ -27,7 +27,7 @@ class Key(NamedTuple):
 
 
 def factor_name(given: str) -> str:
-    """Return the canonical name of a factor; `profile.` may be left out."""
+    """Return the canonical name; `profile.` may be left out."""
     options = [name for name in keywords_of(FlightSpec) if name not in _NOT_FACTORS]
     name = given.replace("-", "_")
     if name in options:
@@ -46,7 +46,6 @@ def factor_name(given: str) -> str:
 
 
 def key_of(factor: str) -> Key | None:
-    """Parse a factor as a key; `None` for an option of the flight."""
     table, dot, rest = factor.partition(".")
     if not dot:
         return None

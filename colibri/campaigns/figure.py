@@ -1,4 +1,4 @@
-"""The figure of a campaign: strips, scatter, a line over one factor, or a heat map over two."""
+"""The figure of a campaign."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -78,7 +78,7 @@ def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
 
 
 def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
-    """Draw median and 5 to 95 % range over a factor, and below the share of lost flights."""
+    """Draw median and 5 to 95 % range over a factor, and the share of lost flights."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
     for name, color in zip(names, COLORS, strict=False):
@@ -158,7 +158,7 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
 
 
 def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
-    """Draw one row of dots per combination, with a bar at the median."""
+    """Draw a row of dots per combination, with a bar at the median."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
     make_room_for_names(figure, names)

@@ -1,4 +1,4 @@
-"""The tables of a campaign: flights, and a summary per combination of the grid."""
+"""The tables of a campaign."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -129,10 +129,7 @@ class FlightTable:
 
 
 def wilson(lost: int, of: int) -> tuple[float, float]:
-    """Return the Wilson score interval of a share at 95 % confidence.
-
-    E. B. Wilson, Probable Inference, the Law of Succession, and Statistical Inference, JASA 22, 1927.
-    """
+    """Return the Wilson score interval at 95 % confidence (E. B. Wilson, JASA 22, 1927)."""
     if not of:
         return 0.0, 1.0
     share, z2 = lost / of, _NORMAL_95**2

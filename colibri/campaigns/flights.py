@@ -1,4 +1,4 @@
-"""Fly one flight of a campaign, from its factors to its row."""
+"""Fly one flight of a campaign."""
 
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing
@@ -97,7 +97,6 @@ def common_of(campaign: Campaign) -> Common:
 
 
 def check(points: Iterable[Point], common: Common) -> None:
-    """Plan flights and build their control laws, to find errors early."""
     for point in points:
         plan = plan_point(common, point)
         build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
@@ -156,7 +155,6 @@ def _object(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _names(campaign: Campaign, option: str, usual: str | None = None) -> list[str]:
-    """Return the names and files that an option is set to, with its default where flights may leave it out."""
     always = option in (*campaign.fly, *campaign.grid, *campaign.draw)
     return [value for value in (*campaign.values(option), None if always else usual) if isinstance(value, str)]
 

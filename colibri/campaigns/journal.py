@@ -1,4 +1,4 @@
-"""The journal of a campaign: its identity, and a line per finished flight."""
+"""The journal of a campaign: a line per finished flight."""
 
 import os
 from collections.abc import Mapping
@@ -44,7 +44,6 @@ class Journal:
 
 
 def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bool) -> Journal:
-    """Open the journal of a new or resumed campaign."""
     there = claim(folder / IDENTITY, identity_of(campaign, common), "campaign")
     kept = {each.flight: each for each in read_journal(folder / JOURNAL)}
     if there and not resume:
@@ -80,7 +79,7 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
 
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
-    """Return all inputs of the campaign's table as plain data, files by their hashes."""
+    """Return the inputs as plain data, files by their hashes."""
     objects = (value for value in campaign.values("profile") if isinstance(value, Profile))
     own = {profile.controller for profile in (*common.profiles.values(), *objects)}
     laws = [*filter(None, campaign.values("controller")), *own.intersection(controller_names())]
@@ -130,7 +129,7 @@ def _hash(content: Any) -> str:
 
 
 def read_journal(path: Path) -> list[Flown]:
-    """Read the flights of a journal; an incomplete last line is cut off in the file, too."""
+    """Read the flights of a journal, and cut off an incomplete last line in the file."""
     if not path.exists():
         return []
     with path.open("r+b") as file:

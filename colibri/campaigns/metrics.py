@@ -16,7 +16,7 @@ _OUTCOMES = ("qp_failures", "fallbacks", "lost_at_s")
 
 
 class Metric(NamedTuple):
-    """A column of the table; without a function `of`, the number of that name in the report."""
+    """A column of the table; without `of`, the number of that name in the report."""
 
     name: str
     of: Callable[[Flight], float | None] | None = None
@@ -32,7 +32,6 @@ def usual(*, sensors: bool) -> tuple[Metric, ...]:
 
 
 def read_metrics(given: Any) -> tuple[Metric, ...]:
-    """Read metrics from names, functions, or a mapping of names to functions."""
     if isinstance(given, Mapping):
         return tuple(Metric(str(name), of) for name, of in given.items())
     if isinstance(given, str) or callable(given):

@@ -1,4 +1,4 @@
-"""The results of a campaign: tables, figure and folder."""
+"""The results of a campaign."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

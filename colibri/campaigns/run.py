@@ -1,4 +1,4 @@
-"""`colibri.campaign`: fly a campaign with any engine and record each flight as it ends."""
+"""`colibri.campaign`: fly a campaign."""
 
 from collections.abc import Callable
 from contextlib import closing

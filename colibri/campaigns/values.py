@@ -1,4 +1,4 @@
-"""Values of factors: lists, ranges, levels and random distributions."""
+"""Values of factors."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -121,7 +121,6 @@ def has_levels(given: Any) -> bool:
 
 
 def read_values(key: str, given: Any) -> tuple[Any, ...]:
-    """Read the values of a factor: a list, `{ linspace = [2, 20, 10] }`, or `2:20:10`."""
     if isinstance(given, Mapping):
         name, span = _only(key, given, _SPANS)
         return _span(key, name, span)
@@ -136,7 +135,7 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
 
 
 def first_twice(names: Iterable[str]) -> str:
-    """Return the first duplicate; empty if names are unique."""
+    """Return the first duplicate, or an empty text."""
     return next((name for name, count in Counter(names).items() if count > 1), "")
 
 

@@ -1,3 +1,3 @@
-"""The command line: one file per subcommand with its options and its call."""
+"""The command line: one file per subcommand."""
 
 __all__: list[str] = []  # the command line's; nothing to import

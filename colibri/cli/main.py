@@ -62,7 +62,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _drop_what_cannot_be_printed() -> None:
-    """Discard output that standard output no longer takes; Python would report it again at exit."""
+    """Discard the rest of standard output; Python would report it again at exit."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -70,7 +70,7 @@ def run(args: Namespace) -> int:
 
 @contextmanager
 def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
-    """Show the number of trials, the best objective and the flights on standard error."""
+    """Show trials, the best objective and flights."""
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -1,3 +1,3 @@
-"""Check that Colibri can fly on this computer: packages, machine code, ports, network, speed."""
+"""Check that Colibri can fly on this computer."""
 
 __all__: list[str] = []  # the command line's; nothing to import

@@ -21,7 +21,7 @@ def ground_station(link: GroundLink, within_s: float) -> Finding:
 
 
 def called(link: GroundLink, within_s: float) -> str | None:
-    """Send a vehicle's heartbeats; describe the first ground station that answers."""
+    """Describe the first ground station that answers."""
     codec = Codec(1, mav.MAV_COMP_ID_AUTOPILOT1)
     beat = (mav.MAV_TYPE_QUADROTOR, mav.MAV_AUTOPILOT_GENERIC, 0, 0, mav.MAV_STATE_STANDBY, 3)
     stations: set[Address] = set()
@@ -43,7 +43,6 @@ def called(link: GroundLink, within_s: float) -> str | None:
 
 
 def _station(codec: Codec, datagram: bytes) -> int | None:
-    """Return the system id of a ground station whose HEARTBEAT is in a datagram."""
     kinds: Sequence[int] = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER)
     beats = (it for it in codec.decode(datagram) if it.name == "HEARTBEAT" and it.fields.type in kinds)
     return next((it.source[0] for it in beats), None)

@@ -1,4 +1,4 @@
-"""Check the network: loopback, free ports, and the host outside a container or WSL."""
+"""Check loopback, ports, and the host of a container or WSL."""
 
 import os
 import socket
@@ -59,7 +59,7 @@ def beyond() -> Finding | None:
 
 
 def gateway(routes: str) -> str | None:
-    """Read the address of the default gateway from the text of `/proc/net/route`."""
+    """Read the default gateway from the text of `/proc/net/route`."""
     for line in routes.splitlines()[1:]:
         _, destination, through, *_ = line.split()
         if int(destination, 16) == 0 and int(through, 16):
@@ -76,7 +76,6 @@ def _in_wsl() -> bool:
 
 
 def _who_has(port: int) -> str | None:
-    """Return the program that has a UDP port of loopback, if it is taken."""
     with _udp() as tried:
         try:
             tried.bind((HOST, port))

@@ -1,4 +1,4 @@
-"""`colibri.fly`: fly from Python; the flight is an object."""
+"""`colibri.fly`: fly from Python."""
 
 from functools import cached_property
 from pathlib import Path
@@ -28,7 +28,7 @@ class Flight:
     Attributes:
         plan: The plan flown.
         report: The numbers of `report.json`.
-        log: Its topics.
+        log: The topics of its log.
     """
 
     def __init__(self, plan: FlightPlan, report: Report, log: TopicReader) -> None:
@@ -38,7 +38,7 @@ class Flight:
 
     @property
     def sha256(self) -> str:
-        """Hash of the plant's states at all frames, reproducible on every computer."""
+        """Hash of the plant's states at all frames, the same on every computer."""
         return str(self.report["trajectory_sha256"])
 
     @property
@@ -108,7 +108,7 @@ def fly(track: str, **options: Any) -> Flight:
 
     Args:
         track: As in `colibri fly`, with its options: `lemniscate:lap=5`.
-        options: Those of `colibri fly`, with underscores, as Python values or texts: `seed=3, wind="5@270", start={"x":
+        options: As in `colibri fly`, with underscores, as Python values or texts: `seed=3, wind="5@270", start={"x":
             1.0}, link="udp"`. `profile` also takes a `Profile`, `vehicle` and `plant_vehicle` a `Vehicle`, and
             `controller` a class or another factory of (table of the profile, vehicle, clock); its table is
             `controllers.NAME`, with the name of the class.

@@ -1,4 +1,4 @@
-"""Tables of a flight as structured arrays, one field per column."""
+"""Tables of a flight as structured arrays."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -185,7 +185,7 @@ def _hear(fleet: Sequence[Member], spec: FleetSpec, lines: StatusLines) -> None:
 
 
 def start_again(member: Member, spec: FleetSpec, lines: StatusLines) -> None:
-    """Restart a dead autopilot, or both after the plant's death; end if that fails repeatedly."""
+    """Restart a dead autopilot, or both after the plant's death."""
     child, code = next((child, code) for child in member.children if (code := child.code()))
     if code == EXIT_BAD_INPUT:  # it has said why
         raise SystemExit(code)

@@ -1,4 +1,4 @@
-"""The output of `colibri sitl`: a live line per vehicle, and a line per event."""
+"""The output of `colibri sitl`."""
 
 import sys
 from typing import Any, Literal

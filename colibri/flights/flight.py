@@ -30,7 +30,7 @@ Traffic: TypeAlias = Callable[[int, list[bytes]], None]
 
 
 class Answered(NamedTuple):
-    """The answer to a frame, as it reached the plant; `datagram` is empty if it was only rounded, `None` on `Direct`."""
+    """The answer to a frame as it reached the plant; `datagram` is empty if only rounded, `None` on `Direct`."""
 
     step: Step
     command: ActuatorCommand

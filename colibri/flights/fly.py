@@ -18,7 +18,7 @@ def fly_plan(
     compiling: Callable[[int], None] = unseen,
     topics: TopicLog | None = None,
 ) -> Summary:
-    """Fly a plan over its link, and write its provenance; a flight in this process with `topics` writes no files.
+    """Fly a plan over its link and write its provenance; with `topics` no files are written.
 
     Args:
         progress: Called with the simulated time, s.

@@ -26,7 +26,7 @@ def prepare(out: Path) -> None:
 
 @contextmanager
 def occupied(out: Path) -> Iterator[None]:
-    """Lock a folder against other commands; end with one line if it is locked."""
+    """Lock a folder against other commands."""
     make_folder(out)
     try:
         lock = FolderLock(out, "--out")

@@ -24,7 +24,7 @@ from colibri.plant.simulation.plant import Plant, PlantBuilder
 def fly_locally(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
 ) -> Summary:
-    """Fly in this process and record in `topics`, or else in the plan's folder."""
+    """Record in `topics`, or else in the plan's folder."""
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
     setup = setup_of(plan.autopilot_spec(""), plan.profile, plan.vehicle, plan.contents.track_file)
@@ -56,7 +56,7 @@ def fly_locally(
 
 
 def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages], Plant]:
-    """Build the autopilot and the plant of a flight; `clock` only measures."""
+    """Build autopilot and plant; `clock` only measures."""
     estimator = estimator_for(plan.spec.feedback, plan.vehicle, DEFAULT_ORIGIN)
     autopilot = track_autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.spec.law)
     starts = {plan.spec.feedback: nudged(plan.start)}

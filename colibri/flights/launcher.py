@@ -45,7 +45,7 @@ class Child:
     """A plant or an autopilot as a child of this process, which ends with it."""
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
-        """Start it, forked if requested and possible; its output goes to file `log` or to pipe `stdout`."""
+        """Start it; its output goes to file `log` or to pipe `stdout`."""
         self.name = name_of(spec)
         self.forked = fork and can_fork()
         self._rest = b""
@@ -86,7 +86,7 @@ class Child:
 
 
 class Fork:
-    """A process forked from this one, with its modules loaded."""
+    """A process forked from this one."""
 
     def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
         self._process = get_context("fork").Process(target=_fly, args=(spec, stdout, stderr, os.getpid()), daemon=True)

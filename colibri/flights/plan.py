@@ -26,7 +26,7 @@ def unseen(_what: object) -> None:
 
 
 class Summary(NamedTuple):
-    """Measurements of the run: wall-clock time, frames exchanged, and frames sent again."""
+    """Wall-clock time, frames exchanged, and frames sent again."""
 
     wall_time_s: float
     frames: int
@@ -171,7 +171,7 @@ class FlightPlan:
         )
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
-        """Return the specification of the autopilot, which calls the plant at a link."""
+        """Return the specification of the autopilot, which calls the plant."""
         return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m)
 
 
@@ -192,7 +192,7 @@ def _check_sensors(name: str, vehicle: Vehicle) -> None:
 
 
 def _usual_start(profile: Profile, flown: Track, feedback: Feedback) -> Start:
-    """Return the default start: at rest with the first yaw of the track; with sensors on the ground."""
+    """Return the default start: at rest with the first yaw; with sensors on the ground."""
     x, y, z = profile.simulation.position_enu_m
     yaw_deg = degrees(start_yaw(flown, profile.references))
     if feedback is Feedback.SENSORS:

@@ -26,7 +26,7 @@ def fly_processes(
     say: Callable[[str], None] = unseen,
     compiling: Callable[[int], None] = unseen,
 ) -> Summary:
-    """Fly on a free port, as `fly_plan` does; both processes have ended when this returns or raises."""
+    """Fly on a free port, as `fly_plan` does."""
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     try:

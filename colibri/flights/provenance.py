@@ -1,4 +1,4 @@
-"""`provenance.json`: all inputs of a flight by content, as their files may change later."""
+"""`provenance.json`: all inputs of a flight by content, as their files may change."""
 
 from dataclasses import replace
 from hashlib import sha256
@@ -75,7 +75,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
 
 
 def _named(plan: FlightPlan) -> FlightSpec:
-    """Return the specification with names for objects and with defaults resolved."""
+    """Name objects and resolve defaults."""
     return replace(
         plan.spec,
         profile=name_of(plan.spec.profile),

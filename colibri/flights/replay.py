@@ -39,7 +39,7 @@ _NO_CLOCK_S = 0.0
 
 
 class Answer(NamedTuple):
-    """The autopilot's answer in the replay; `command` is the recorded one, `known` the state estimate."""
+    """The autopilot's answer in the replay; `command` is the recorded one, `known` the estimate."""
 
     time_us: int
     command: ActuatorCommand
@@ -49,7 +49,7 @@ class Answer(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """The first command that differs, with flight mode and state estimate."""
+    """The first command that differs."""
 
     recorded: ActuatorCommand
     replayed: ActuatorCommand
@@ -68,7 +68,7 @@ class Difference(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """The result of a replay; `commands` counts those compared, `last_us` is the time of the last one."""
+    """The result of a replay: commands compared, and the time of the last one."""
 
     commands: int
     last_us: int
@@ -110,7 +110,7 @@ def answers_of(path: Path) -> Iterator[Answer]:
 
 
 class _Flight(NamedTuple):
-    """A recorded flight: its log, and the inputs of the autopilot."""
+    """A recorded flight."""
 
     path: Path
     log: FlightFile
@@ -136,7 +136,7 @@ def _read(path: Path) -> _Flight:
 
 
 def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
-    """Yield time, datagram and command of each frame, up to the first one missing in the log."""
+    """Yield time, datagram and command, up to the first frame missing in the log."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
@@ -225,7 +225,7 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
 
 
 def _changed(setups: Iterable[Setup]) -> list[str]:
-    """Return the profiles and vehicles whose files differ from the log by now."""
+    """Return the profiles and vehicles whose files differ from the log."""
     changed = []
     for setup in setups:
         with suppress(Error):

@@ -1,4 +1,4 @@
-"""All options of a flight: plant, autopilot and the link between them."""
+"""All options of a flight."""
 
 from dataclasses import dataclass
 from math import inf
@@ -25,7 +25,7 @@ class OptionError(Error):
 
 @dataclass(frozen=True, kw_only=True)
 class VehiclesSpec(WorldSpec, LawSpec):
-    """The law and its vehicle, and the vehicle and world of the plant."""
+    """The law and its vehicle, and vehicle and world of the plant."""
 
     plant_vehicle: Annotated[
         str | Vehicle | None,
@@ -53,7 +53,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
 
     @classmethod
     def of(cls, track: str, **options: Any) -> "FlightSpec":
-        """Return the flight of a track with options by name, as Python values or as texts of the command line."""
+        """Return a flight with options as Python values or as texts of the command line."""
         return from_values(cls, {"track": track, **options}, OptionError)
 
     @property

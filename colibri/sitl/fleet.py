@@ -15,7 +15,6 @@ class Fleet(tuple[Sitl, ...], Stepped):
     __slots__ = ()
 
     def __new__(cls, vehicles: Iterable[Sitl] = ()) -> "Fleet":
-        """Bind the time of vehicles together; those behind fly until they catch up."""
         fleet = super().__new__(cls, vehicles)
         for sitl in fleet:
             sitl.fleet = fleet
@@ -44,10 +43,10 @@ def begin_fleet(
     places: Sequence[tuple[float, float]] | None = None,
     **changes: Any,
 ) -> Fleet:
-    """Begin the flights of a fleet.
+    """Begin a fleet.
 
     Args:
-        spacing: Distance from each vehicle to the next one to the east, m.
+        spacing: Distance between neighbours to the east, m.
         places: East and north of each vehicle from the default start, m; replaces `spacing`.
         changes: Applied to the test's setting, for all vehicles.
     """

@@ -1,4 +1,4 @@
-"""The figure of a failed flight: position, tilt, mode and status texts."""
+"""The figure of a failed flight."""
 
 from collections.abc import Sequence
 from math import inf

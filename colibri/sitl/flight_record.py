@@ -1,4 +1,4 @@
-"""The record of a flight: each frame with its command, and each message."""
+"""The record of a flight."""
 
 import csv
 from hashlib import sha256

@@ -1,4 +1,4 @@
-"""A ground station or another MAVLink component that tests control."""
+"""A MAVLink component that tests control."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -50,9 +50,8 @@ class SteppedVehicle(Stepped, Protocol):
 class Station(Inbox):
     """A component on a link of its own; received messages are in `Inbox`.
 
-    Messages are sent with the next frame. A method that waits for an answer advances simulated time and repeats its
-    request every half second; it raises `RefusedError` if the vehicle refuses, and `NotInTimeError` after
-    `ANSWER_WITHIN_S`.
+    A method that waits for an answer advances simulated time and repeats its request every half second; it raises
+    `RefusedError` if the vehicle refuses, and `NotInTimeError` after `ANSWER_WITHIN_S`.
 
     Attributes:
         silent: Set it to stop all sending, HEARTBEAT included.
@@ -141,12 +140,12 @@ class Station(Inbox):
         self.check(result, said, what or f"command {number}")
 
     def check(self, result: int, said: int, what: str) -> None:
-        """Raise unless a result is ACCEPTED; `said` is the number of texts before the request."""
+        """Raise unless a result is ACCEPTED; `said` is the number of texts before."""
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
     def request(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Send every half second until answered; `send` is called with the number of tries before."""
+        """Send every half second until answered; `send` gets the number of tries before."""
         for tries in range(_REPEAT.tries):
             send(tries)
             again_us = self._flight.time_us + _AGAIN_AFTER_US

@@ -1,4 +1,4 @@
-"""Items of missions and fences with places in metres, ENU, from the flight's origin."""
+"""Items of missions and fences in metres, ENU, from the flight's origin."""
 
 from collections.abc import Iterable, Sequence
 from math import nan

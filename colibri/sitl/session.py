@@ -39,7 +39,7 @@ class Flights:
         self.flown: list[Sitl] = []
 
     def begin(self, **changes: Any) -> Sitl:
-        """Begin a flight that differs from the test's setting by `changes`; `params` add up."""
+        """Begin a flight; `changes` override the test's setting, `params` add up."""
         setting = setting_of([values_of(self.setting), changes])
         state = self._folder / f"vehicle-{len(self.flown)}"
         sitl = Sitl(setting, self._lockstep(setting, state), setting.home.origin)
@@ -69,7 +69,7 @@ class Flights:
         return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
-        """Write records, figures and facts below `folder`; return the folder of each flight."""
+        """Write records, figures and facts below `folder`; return the folders."""
         places = []
         for number, sitl in enumerate(self.flown):
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder

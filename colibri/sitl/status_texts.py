@@ -1,4 +1,4 @@
-"""The STATUSTEXT messages of a vehicle, read before the link, so that none is lost."""
+"""The STATUSTEXT messages of a vehicle, read before the link loses any."""
 
 from colibri.mavlink.client.inbox import Inbox
 from colibri.mavlink.wire.dialect import Codec, mav

@@ -1,4 +1,4 @@
-"""Methods of all flights in simulated time: step, wait, send sticks and setpoints."""
+"""Methods of all flights in simulated time."""
 
 from collections.abc import Callable
 from typing import Any, Protocol

@@ -1,4 +1,4 @@
-"""The summary of a test run's flights: number, speed, and a hash to compare runs by."""
+"""The summary of a test run's flights."""
 
 from collections.abc import Mapping
 from hashlib import sha256
@@ -25,7 +25,7 @@ class Summary:
         self._outcomes[test] = (outcome, " ".join(flown["sha256"]))
 
     def lines(self) -> list[str]:
-        """Return a sorted line per test: name, outcome, and hashes of its flights."""
+        """Return a sorted line per test: name, outcome, hashes."""
         return [f"{test} {outcome} {hashes}" for test, (outcome, hashes) in sorted(self._outcomes.items())]
 
     def verdict(self) -> str:

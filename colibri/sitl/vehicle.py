@@ -1,4 +1,4 @@
-"""Fixture `sitl`: a vehicle in flight, with commands that wait for their acknowledgement."""
+"""Fixture `sitl`: a vehicle in flight."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Iterator, Sequence
@@ -147,7 +147,7 @@ class Sitl(View, Stepped, Steered):
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
     def takeoff(self, height_m: float | None = None, *, wait: bool = True, within: float | None = None) -> None:
-        """Arm and climb to a height above home, default MIS_TAKEOFF_ALT; by default `within` 8 s and 2 s per metre."""
+        """Arm and climb to a height above home, default MIS_TAKEOFF_ALT; `within` defaults to 8 s and 2 s per metre."""
         height_m = self.get_param("MIS_TAKEOFF_ALT") if height_m is None else height_m
         east, north, from_m = self.position
         if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
@@ -161,7 +161,7 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
-        """Land here and wait until disarmed; by default `within` 8 s and 2 s per metre."""
+        """Land here and wait until disarmed; `within` defaults to 8 s and 2 s per metre."""
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
         if wait:
@@ -291,12 +291,12 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def wind(self) -> str:
-        """The mean wind, as in mark `wind`; may be set to a constant wind, from the next frame on."""
+        """The mean wind, as in mark `wind`; may be set to a constant wind."""
         return self._wind
 
     @wind.setter
     def wind(self, wind: str | None) -> None:
-        """The mean wind, as in mark `wind`; may be set to a constant wind, from the next frame on."""
+        """The mean wind, as in mark `wind`; may be set to a constant wind."""
         try:
             constant = constant_wind(str(wind or CALM))
         except ArgumentTypeError as error:
@@ -306,12 +306,12 @@ class Sitl(View, Stepped, Steered):
 
     @property
     def payload_kg(self) -> float:
-        """Payload, kg; may be set, from the next frame on."""
+        """Payload, kg; may be set."""
         return self._payload_kg
 
     @payload_kg.setter
     def payload_kg(self, mass_kg: float) -> None:
-        """Payload, kg; may be set, from the next frame on."""
+        """Payload, kg; may be set."""
         if not 0.0 <= mass_kg <= MAX_PAYLOAD_KG:
             raise ValueError(f"payload_kg must be from 0 to {MAX_PAYLOAD_KG:g}, not {mass_kg!r}")
         self._payload_kg = mass_kg
@@ -329,7 +329,7 @@ class Sitl(View, Stepped, Steered):
     # Who else is there.
 
     def client(self, system: int = 254, component: int = 190, *, beats: bool = True) -> Station:
-        """Connect another ground station or companion on its own link; `beats` sends HEARTBEAT."""
+        """Connect another component on its own link; `beats` sends HEARTBEAT."""
         number = len(self._stations) + 1
         trouble, seed = self.link.ground, self.setting.seed
         station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)

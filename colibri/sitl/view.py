@@ -1,4 +1,4 @@
-"""The observable state of a vehicle: truth, and the autopilot's reports."""
+"""The observable state of a vehicle."""
 
 from collections.abc import Sequence
 from math import dist, hypot
@@ -146,7 +146,6 @@ class View:
         return f"<vehicle {self.system}: {self}>"
 
     def __str__(self) -> str:
-        """Return its state in a line, for the message of a failed test."""
         east, north, up = self.position
         words = f"t = {self.time_us * 1e-6:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
         where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"

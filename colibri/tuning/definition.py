@@ -1,4 +1,4 @@
-"""A tuning as data: numbers with ranges, flights, and objectives."""
+"""A tuning as data."""
 
 from collections.abc import Mapping
 from math import ceil

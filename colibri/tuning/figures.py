@@ -1,4 +1,4 @@
-"""Figures of a tuning: importance, slices, history and Pareto front."""
+"""Figures of a tuning."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -116,7 +116,7 @@ def draw_pareto(
 def _dots(
     axes: Axes, trials: Sequence[Ended], best: Ended, along: Any, place: int, front: Sequence[Ended] | None = None
 ) -> None:
-    """Draw an objective of each trial: pruned or dominated ones grey, others blue."""
+    """Draw an objective of each trial: pruned or dominated ones grey."""
     first = trials[0]
     strong = [trial for trial in trials if not trial.pruned and (front is None or trial in front)]
     weak = [trial for trial in trials if trial not in strong]

@@ -1,4 +1,4 @@
-"""Fly a trial in steps, until its end or until it is clearly worse than the best."""
+"""Fly a trial until its end, or until it is clearly worse than the best."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,7 @@ class Scale(NamedTuple):
 class Flights:
     """Flies with an engine whose workers are kept between trials.
 
-    It is also the iterator from which the engine takes its jobs.
+    It is also the engine's iterator of jobs.
     """
 
     def __init__(self, engine: Engine, common: Common) -> None:
@@ -66,7 +66,7 @@ def fly_trial(
     """Fly a trial.
 
     Args:
-        scale: Reference of the original profile, whose own trial has none.
+        scale: Reference of the original profile; `None` in its own trial.
         best: Least value so far; a pruned trial counts at least that.
     """
     factors = tuning.flown(begun.params)
@@ -90,7 +90,7 @@ def fly_trial(
 
 
 def scale_of(tuning: Tuning, flown: Sequence[Flown]) -> Scale:
-    """Return the reference values; TuningError if the flights are refused or have no metric."""
+    """Return the reference values; TuningError without a metric."""
     refused = next((each for each in flown if each.verdict is Verdict.REFUSED), None)
     if refused is not None:
         raise TuningError(refused.why)
@@ -111,7 +111,7 @@ def _counts(tuning: Tuning, flown: Sequence[Flown], worst: Sequence[float]) -> l
 
 
 def _is_pruned(tuning: Tuning, begun: Begun, counts: Array, new: int) -> bool:
-    """Report the last flights to Optuna; return whether to end the trial early."""
+    """Report the last flights to Optuna; return whether to end early."""
     if not tuning.prune_after:
         return False
     for place in range(len(counts) - new, len(counts)):

@@ -1,4 +1,4 @@
-"""Objectives: metrics pooled over a trial's flights; lost flights count."""
+"""Objectives: metrics pooled over a trial's flights."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ _NOT_SMALL = ("lost_at_s",)
 
 
 class Objective(NamedTuple):
-    """A metric to minimize, and its pooling over flights; `metric` may be `share_lost`."""
+    """A metric to minimize, or `share_lost`, and its pooling over flights."""
 
     metric: str
     pooling: str = "mean"
@@ -33,7 +33,7 @@ class Objective(NamedTuple):
         return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
 
     def of_flights(self, flown: Sequence[Flown], metrics: Sequence[Metric], worst: float) -> Array:
-        """Return each flight's value, (n,), at most `worst`, which also stands for lost and missing ones."""
+        """Return each flight's value, (n,), at most `worst`, which replaces missing ones."""
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
@@ -69,7 +69,7 @@ def value_of(flown: Flown, place: int, otherwise: float) -> float:
 
 
 def read_objectives(given: Mapping[str, Any], metrics: Sequence[Metric]) -> tuple[Objective, ...]:
-    """Read objectives such as `{ rmse_m = "mean" }`; `metrics` adds user-defined ones."""
+    """Read objectives such as `{ rmse_m = "mean" }`."""
     if not given:
         raise TuningError('objectives: say what is to become small, rmse_after_20s_m = "mean" say')
     return tuple(_objective(name, pooling, metrics) for name, pooling in given.items())
@@ -96,7 +96,7 @@ def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
 
 
 def metrics_of(objectives: Sequence[Objective], metrics: Sequence[Metric]) -> tuple[Metric, ...]:
-    """Return the metrics to keep: those of objectives first."""
+    """Return the metrics to keep, first the objectives'."""
     names = {metric.name: metric for metric in metrics}
     needed = [each.metric for each in objectives if each.metric != SHARE_LOST]
     found = {name: names.get(name) or read_metrics([name])[0] for name in needed}

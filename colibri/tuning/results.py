@@ -1,4 +1,4 @@
-"""The results of a tuning: trials, profile, comparison, and folder."""
+"""The results of a tuning."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""`colibri.tune`: fly trials, alone or beside other processes, then compare on other seeds."""
+"""`colibri.tune`: fly trials, then compare on other seeds."""
 
 from collections.abc import Callable
 from importlib.metadata import version
@@ -27,14 +27,14 @@ IDENTITY = "tuning.json"
 
 
 class Watcher:
-    """Progress callbacks of a tuning; each does nothing by default."""
+    """Progress callbacks of a tuning."""
 
     def began(self, trials: int) -> None: ...
 
     def flown(self, flown: Flown) -> None: ...
 
     def ended(self, trials: int, first: float, best: float) -> None:
-        """Update progress; `first` and `best` are the first objective of the original and its minimum."""
+        """Update progress; `first` and `best` are first objectives."""
 
     def checking(self, flights: int) -> None: ...
 

@@ -49,7 +49,7 @@ def read_range(key: str, given: Any) -> Range:
 
 
 def check_holds(key: str, values: Range, value: Any) -> None:
-    """Check that the original value, where tuning starts, is within its range."""
+    """Check that the original value, where tuning starts, is in range."""
     if isinstance(values, Choice):
         if value not in values.values:
             raise TuningError(
@@ -73,7 +73,7 @@ def distribution(values: Range) -> Any:
 
 
 def as_tried(values: Range, value: Any) -> Any:
-    """Round a value from Optuna to four digits, for people to read and write."""
+    """Round a value to four digits, for people to read and write."""
     if not isinstance(values, Uniform | LogUniform):
         return value
     return min(max(float(f"{value:.{_DIGITS}g}"), values.low), values.high)

@@ -1,4 +1,4 @@
-"""The trials of a tuning: an Optuna study in a journal that several processes share."""
+"""The trials of a tuning: an Optuna study in a shared journal."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -50,7 +50,7 @@ class Trials:
     """The trials of a tuning in a folder, shared by several processes.
 
     Each process holds a lock that ends with it, so that others repeat its unfinished trials. A trial depends only on
-    the trials finished before, its number and the root seed: a resumed tuning continues as it would have.
+    earlier trials, its number and the root seed: a resumed tuning continues as it would have.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -176,7 +176,6 @@ class Trials:
         return {name: as_tried(values, params[name]) for name, values in self._tuning.space.items()}
 
     def _study_of(self, ended: Sequence["FrozenTrial"], objectives: Sequence[int], sampler: Any = None) -> "Study":
-        """Copy trials, with some of their objectives, into a study in memory."""
         import optuna
 
         study = optuna.create_study(directions=["minimize"] * len(objectives), sampler=sampler)

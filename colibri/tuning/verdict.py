@@ -63,7 +63,7 @@ class Compared(NamedTuple):
 
 
 def check_campaign(tuning: Tuning, before: Profile, after: Profile) -> Campaign:
-    """Return the campaign that flies both profiles with `check_seeds` and other draws."""
+    """Return the campaign of both profiles with `check_seeds` and other draws."""
     campaign = tuning.campaign
     return campaign._replace(
         name=f"{campaign.name}: check",
@@ -100,7 +100,7 @@ class _Pairs:
         self._names = [", ".join(shown(point.factors[name]) for name in several) for point in points]
 
     def compared(self, objective: Objective, *, is_objective: bool) -> Iterator[Compared]:
-        """Compare a number over all combinations and, if there are several, over each."""
+        """Compare a number over all combinations and each."""
         counts = self._counts(objective, penalised=is_objective)
         each = zip(self._names, np.moveaxis(counts, 1, 0), strict=True) if len(self._names) > 1 else ()
         for where, some in ((ALL, counts), *each):
@@ -108,7 +108,7 @@ class _Pairs:
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
     def _counts(self, objective: Objective, *, penalised: bool) -> Array:
-        """Return values, (2, combinations, seeds); without penalty, lost flights and their pairs are nan."""
+        """Return values, (2, combinations, seeds); without penalty, pairs with a lost flight are nan."""
         metrics = self._campaign.metrics
         if penalised or objective.metric == SHARE_LOST:
             worst = objective.worst(self._listed(0), metrics)

@@ -1,4 +1,4 @@
-"""Named flights: by options of `colibri fly`, or by commands of a ground station."""
+"""Named flights."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ _WAYPOINTS_FILE = "waypoints.csv"
 
 
 class Case(NamedTuple):
-    """A flight along a track, by options of `colibri fly`, with the contents of a waypoint file."""
+    """A flight along a track, by options of `colibri fly`."""
 
     name: str
     options: dict[str, Any]
@@ -45,7 +45,7 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SitlCase:
-    """A flight commanded by a ground station, by keys of `colibri.sitl.backends.setting.Setting`."""
+    """A flight commanded by a ground station, by keys of `Setting`."""
 
     name: str
     orders: "Callable[[Sitl], object]"

@@ -1,4 +1,4 @@
-"""The golden flights: a fixed set in which the difference of a single bit changes a hash.
+"""The golden flights: a fixed set, sensitive to a single bit.
 
 Flights that saturate, tumble or use noisy sensors amplify one bit within a second; good tracking hides it, as the link
 carries 32-bit floats. Both are included: the former find a difference, the latter show where it matters.
@@ -27,7 +27,6 @@ def _flown(name: str, track: str, duration: float, profile: str = "flight", **op
 
 
 def _mission(sitl: "Sitl") -> None:
-    """Take off, fly a corner at two speeds, return and land."""
     corner = [
         mission_items.waypoint(8.0, 0.0, 4.0),
         mission_items.change_speed(8.0),
@@ -39,7 +38,6 @@ def _mission(sitl: "Sitl") -> None:
 
 
 def _rotor_lost(sitl: "Sitl") -> None:
-    """Lose a rotor at speed, and fly on with three."""
     sitl.goto(30.0, 0.0, 12.0, speed=6.0, wait=False)
     sitl.run(2.0)
     sitl.inject("motor", "off", 2)
@@ -47,7 +45,6 @@ def _rotor_lost(sitl: "Sitl") -> None:
 
 
 def _rotor_lost_on_sensors(sitl: "Sitl") -> None:
-    """Lose a rotor soon after take-off, and land on three."""
     sitl.takeoff(6.0, wait=False)
     sitl.wait_until(lambda: sitl.mode is Mode.HOLD and sitl.position[2] > 5.4, within=17.0, what="the climb")
     sitl.inject("motor", "off", 4)
@@ -55,7 +52,6 @@ def _rotor_lost_on_sensors(sitl: "Sitl") -> None:
 
 
 def _restarted(sitl: "Sitl") -> None:
-    """Kill the autopilot in a turn, and fly on."""
     sitl.goto(12.0, 9.0, 8.0, speed=6.0, wait=False)
     sitl.run(2.5)
     sitl.kill_autopilot()
@@ -63,7 +59,6 @@ def _restarted(sitl: "Sitl") -> None:
 
 
 def _sticks(sitl: "Sitl") -> None:
-    """Fly manually: by attitude, by position, and return."""
     with sitl.sticks_held(pitch=0.7, roll=-0.4, thrust=0.6, yaw=0.3):
         sitl.run(0.2)
         sitl.select(Mode.STABILIZED)

@@ -1,4 +1,4 @@
-"""`colibri verify`: fly each case twice and in memory, and replay it; compare all bits."""
+"""`colibri verify`: fly each case three times and replay it; compare all bits."""
 
 import argparse
 from pathlib import Path
@@ -37,7 +37,7 @@ SEED = 7
 
 
 class Verdict(NamedTuple):
-    """The result of a case: hashes of three flights, and commands replayed."""
+    """The result of a case."""
 
     name: str
     hashes: tuple[str, str, str]

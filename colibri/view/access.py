@@ -1,4 +1,4 @@
-"""Access control of the page: browsers of this computer, from its own address; commands require a token.
+"""Access control of the page.
 
 Pages of other sites can open connections to loopback, with their address in `Origin`. A foreign name that resolves to
 loopback (DNS rebinding) shows in `Host`.
@@ -28,7 +28,7 @@ class Token(NamedTuple):
 
 
 def refusal(headers: Mapping[str, str], port: int) -> str | None:
-    """Return why to refuse a request or connection, if it must be."""
+    """Return why to refuse a request, if it must be."""
     if headers.get("Host") not in {f"{name}:{port}" for name in _OURS}:
         return "the page is served to this computer alone"
     origin = headers.get("Origin")

@@ -1,4 +1,4 @@
-"""Geometry of the scene: segments, arrows and colours, as pure functions of arrays."""
+"""Geometry of the scene, as pure functions of arrays."""
 
 from collections.abc import Sequence
 from math import cos, hypot, isfinite, isnan, pi, sin
@@ -60,7 +60,7 @@ def thrust_arrows(airframe: Airframe, rotors: FourRotors, scale: float) -> Array
 
 
 def segments(points: Array) -> NDArray[np.float32]:
-    """Join points (n, 3) by segments, (n - 1, 2, 3); non-finite points interrupt the line."""
+    """Join points (n, 3), (n - 1, 2, 3); non-finite points interrupt the line."""
     joined = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
     whole: NDArray[np.float32] = joined[np.isfinite(joined).all(axis=(1, 2))]
     return whole

@@ -1,4 +1,4 @@
-"""A live vehicle: a thread serves its link; the page reads its state."""
+"""A live vehicle, whose link a thread serves."""
 
 from collections.abc import Callable
 from threading import Event, Lock, Thread
@@ -13,7 +13,7 @@ _WAIT_S = 0.02
 
 
 class LiveVehicle:
-    """The vehicle at the other end of a link; a `Source`. The airframe is generic, as telemetry has none."""
+    """The vehicle at the other end of a link; a `Source`. Telemetry has no airframe."""
 
     airframe = Airframe()
     is_live = True

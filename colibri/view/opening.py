@@ -1,4 +1,4 @@
-"""Serve the page of recorded flights before the reader is loaded: the browser loads it meanwhile."""
+"""Serve the page of recorded flights before their reader is loaded."""
 
 import webbrowser
 from collections.abc import Callable, Sequence

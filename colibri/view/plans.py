@@ -1,4 +1,4 @@
-"""Missions, rally points and fences of a live vehicle as surroundings."""
+"""Plans of a live vehicle as surroundings."""
 
 from collections.abc import Callable, Mapping, Sequence
 

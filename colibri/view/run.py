@@ -1,4 +1,4 @@
-"""Run the page: play flights, follow vehicles, pass on user actions."""
+"""Run the page."""
 
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
@@ -35,7 +35,7 @@ PLOTTED_AFTER_S, WAITS_S = 0.7, 4.0
 
 
 class Show:
-    """Updates the page as time passes, without waiting; starts with the first browser."""
+    """Updates the page as time passes, without waiting."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
 
 
 def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
-    """Read flights. Their horizons are computed while `held` is open; `wait` for all of them."""
+    """Read flights. Their horizons are computed while `held` is open; `wait` for all."""
     flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
     for folder, flight in zip(folders, flights, strict=True):
         horizons = Horizons()
@@ -186,7 +186,7 @@ def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return short unique names: as many last parts of the paths as needed."""
+    """Return short unique names: the last parts of the paths."""
     paths = [folder.resolve().parts for folder in folders]
     if len(set(paths)) < len(paths):
         raise ViewError(f"{folders[0]} is given twice: name two flights")

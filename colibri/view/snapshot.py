@@ -1,4 +1,4 @@
-"""The state that the page shows: now, around the vehicle, and over time. SI, ENU and FLU."""
+"""The state that the page shows. SI, ENU and FLU."""
 
 from dataclasses import dataclass, field
 from math import nan

@@ -1,1 +1,1 @@
-"""What does many jobs at once: a pool of processes on this computer, or a cluster of Dask."""
+"""Engines: a pool of processes, or a Dask cluster."""

@@ -1,4 +1,4 @@
-"""Run jobs on a Dask cluster whose workers may come and go."""
+"""Run jobs on a Dask cluster."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from importlib.metadata import version
@@ -21,10 +21,7 @@ _MAX_BATCH = 500
 
 
 class Cluster:
-    """A Dask cluster.
-
-    Jobs of a lost worker are repeated by others; a job lost with several workers is repeated alone at the end.
-    """
+    """A Dask cluster. A job that was lost with several workers is repeated alone at the end."""
 
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
         """Connect to a scheduler, or use a `distributed.Client`; without `batch`, the jobs per task adapt."""
@@ -92,7 +89,7 @@ class Cluster:
             self.close()
 
     def _batches(self, left: Iterator[Job], size: int, waiting: int) -> list[list[Job]]:
-        """Return batches for the free capacity. Submitting many at once takes the scheduler a tenth of the time."""
+        """Return batches for the free capacity; many at once take the scheduler a tenth of the time."""
         if waiting > _AHEAD * self._cores / 2:
             return []
         self._cores = sum(self._client.nthreads().values()) or 1  # asks the scheduler: not for every result
@@ -107,7 +104,6 @@ class Cluster:
 
 
 def _do(jobs: list[Any], given: tuple[Callable[[Any, Any], Any], Any], wanted: str) -> tuple[float, list[Any]]:
-    """Return the duration of a batch, s, and its results."""
     if version(_PACKAGE) != wanted:
         raise CampaignError(f"--dask: a worker has colibri {version(_PACKAGE)}, the campaign is of {wanted}")
     work, common = given

@@ -1,4 +1,4 @@
-"""The interface of the engines that run jobs in parallel."""
+"""The interface of engines."""
 
 from collections.abc import Callable, Generator, Iterable
 from typing import Any, Protocol, TypeVar
@@ -17,4 +17,4 @@ class Engine(Protocol):
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:
-        """Yield each job with its result, in order of completion; `work` and `common` are sent by cloudpickle."""
+        """Yield each job with its result, in order of completion; `work` and `common` are pickled."""

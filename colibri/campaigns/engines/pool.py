@@ -1,4 +1,4 @@
-"""Run jobs in a pool of processes on this computer."""
+"""Run jobs in a pool of processes."""
 
 import os
 import signal
@@ -18,11 +18,7 @@ _AHEAD = 2
 
 
 class Pool:
-    """A pool of processes that end with this one.
-
-    A killed worker breaks the whole pool. All submitted jobs are then repeated one by one; one that kills again is
-    given up.
-    """
+    """A pool of processes. A killed worker breaks it; submitted jobs are then repeated one by one."""
 
     def __init__(self, workers: int | None = None) -> None:
         self._workers = workers or len(os.sched_getaffinity(0))
@@ -38,7 +34,7 @@ class Pool:
                     yield job, Killed()
 
     def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
-        """Yield jobs with their results until all are done or the pool breaks; return those lost."""
+        """Yield jobs with results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
         pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (packed,))
         waiting: dict[Future[Any], Job] = {}
@@ -79,7 +75,7 @@ _given: tuple[Callable[[Any, Any], Any], Any]
 
 
 def _begin(packed: bytes) -> None:
-    """Prepare a worker: ignore SIGINT, which the parent handles, and end with the parent."""
+    """Prepare a worker, which ends with its parent."""
     global _given
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()

@@ -1,4 +1,4 @@
-"""Run jobs on all cores of this computer with a progress bar."""
+"""Run jobs on all cores with a progress bar."""
 
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
@@ -19,7 +19,7 @@ def in_order(
     quiet: bool,
     keep: Callable[[Result], object] = lambda _result: None,
 ) -> list[Result]:
-    """Run jobs in a pool of processes; return results in the order of jobs, and `keep` each at once."""
+    """Return results in the order of jobs, and `keep` each at once."""
     found: dict[int, Result] = {}
     with closing(Pool().each(_numbered, work, enumerate(jobs))) as done:
         for (number, job), result in with_bar(done, title, len(jobs), quiet=quiet):

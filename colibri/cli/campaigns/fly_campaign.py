@@ -1,4 +1,4 @@
-"""Fly the campaign of a command line and its file, and print the results."""
+"""Fly a campaign and print the results."""
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -108,7 +108,7 @@ def _short(cell: str) -> str:
 
 
 class _Bar:
-    """Shows progress, rate, share lost and time left on standard error."""
+    """Shows progress, rate, share lost and time left."""
 
     def __init__(self, title: str, flights: int, *, quiet: bool) -> None:
         from rich.console import Console

@@ -1,1 +1,1 @@
-"""Parser, list of subcommands, shared options, and the two processes."""
+"""Parser, list of subcommands, and shared options."""

@@ -15,7 +15,7 @@ def add_view(add: Any) -> None:
 
 @contextmanager
 def loading_viser() -> Iterator[None]:
-    """Load modules that import viser; end with one line if it is not installed."""
+    """Load modules that import viser, if it is installed."""
     try:
         with loading():
             yield

@@ -1,4 +1,4 @@
-"""`colibri fly`: fly one track with a progress bar, and report the results."""
+"""Fly one track with a progress bar, and report."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -86,7 +86,7 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
 
 
 class Shown(NamedTuple):
-    """Callbacks of `fly_plan`: simulated time, s; a line of text; number of compiled functions."""
+    """Callbacks of `fly_plan`."""
 
     progress: Callable[[float], None]
     say: Callable[[str], None]

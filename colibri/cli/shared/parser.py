@@ -1,4 +1,4 @@
-"""The parser of the command and its help. Loads only the modules of requested subcommands."""
+"""The parser. Loads only the modules of requested subcommands."""
 
 from argparse import Action, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Generator, Sequence
@@ -23,7 +23,7 @@ class Subcommand(Protocol):
 
 
 class Version(Action):
-    """Print the installed version and exit; it is looked up only now, as that takes time."""
+    """Print the version and exit; it is looked up only now, as that takes time."""
 
     def __call__(self, *_: object) -> NoReturn:
         from importlib.metadata import version

@@ -1,1 +1,1 @@
-"""Lockstep sessions of plant and autopilot, in memory or as processes, with link faults."""
+"""Lockstep sessions of plant and autopilot."""

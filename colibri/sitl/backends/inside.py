@@ -1,4 +1,4 @@
-"""Plant and autopilot of a flight in memory, as objects."""
+"""Plant and autopilot in memory, as objects."""
 
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.copter import Copter
@@ -10,7 +10,7 @@ from colibri.sitl.errors import SitlError
 
 
 class Inside:
-    """Plant and autopilot in memory, for tests of internal state; SitlError in other processes."""
+    """Plant and autopilot, for tests of internal state; only in memory."""
 
     def __init__(self, session: LockstepSession) -> None:
         plant, autopilot = session.plant, session.autopilot

@@ -1,4 +1,4 @@
-"""Start the processes of a flight: both as commands, or the autopilot forked from a loaded process."""
+"""Start the processes of a flight."""
 
 import json
 import os
@@ -89,7 +89,6 @@ class LoggedChild:
         raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
 
     def last_words(self) -> str:
-        """Return the last line of output that is not a status."""
         text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
         lines = [line for line in text.splitlines() if line and not line.startswith("{")]
         return lines[-1] if lines else ""

@@ -1,4 +1,4 @@
-"""Clocks of the link between plant and autopilot while simulated time stands still."""
+"""Clocks of the link between plant and autopilot. Flights are independent of them."""
 
 from time import perf_counter, sleep
 from typing import Protocol
@@ -8,7 +8,7 @@ _SOON_S = 2e-4
 
 
 class LinkClock(Protocol):
-    """The clock of the delays between plant and autopilot. Flights are independent of it."""
+    """The clock of the delays between plant and autopilot."""
 
     def now_s(self) -> float: ...
 
@@ -16,7 +16,7 @@ class LinkClock(Protocol):
 
 
 class StoppedClock:
-    """A clock that advances only while the plant waits: both sides are in this process."""
+    """Advances only while the plant waits: both sides are in this process."""
 
     def __init__(self) -> None:
         self._now_s = 0.0

@@ -1,4 +1,4 @@
-"""Link faults: loss, delay, duplication, reordering and corruption of datagrams, by seed and time."""
+"""Link faults, reproducible by seed and time."""
 
 from dataclasses import dataclass
 from heapq import heappop, heappush

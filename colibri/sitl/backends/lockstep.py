@@ -1,6 +1,6 @@
 """A flight in lockstep: pass datagrams between plant and autopilot, frame by frame.
 
-Each side may be in this process or another, see `memory` and `udp`; the bytes are the same.
+Each side may be in this process or another; the bytes are the same.
 """
 
 from collections.abc import Sequence
@@ -66,8 +66,7 @@ class Autopilot(Protocol):
     @property
     def process(self) -> int | None: ...
 
-    def call(self) -> bytes:
-        """Return its first datagram to the plant."""
+    def call(self) -> bytes: ...
 
     def expect(self, step_message: StepMessage) -> None:
         """Process the datagrams of ground stations for the next frame."""
@@ -142,7 +141,7 @@ class LockstepSession:
         return self.flown
 
     def _struggle(self, frame: bytes, time_us: int, injected: bytes) -> tuple[bytes, StepMessage, list[bytes]]:
-        """Pass a frame over a faulty link; return the answer, and the datagrams to stations and of the plant."""
+        """Pass a frame over a faulty link; return answer, messages to stations, datagrams of the plant."""
         plant, autopilot, up, down = self.plant, self.autopilot, self._up, self._down
         now_s = plant.clock.now_s
         began_s = now_s()
@@ -170,7 +169,6 @@ class LockstepSession:
                 raise SessionError("nothing passes between plant and autopilot, however often it is repeated")
 
     def measure_again(self) -> None:
-        """Replace the next frame by one of the plant's present state."""
         self._frame, self.truth = self._taken_in(self.plant.frame())
 
     def command_to_plant(self, number: int, *params: float) -> bytes:

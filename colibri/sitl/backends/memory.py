@@ -1,4 +1,4 @@
-"""Plant and autopilot in this process, without sockets and clock."""
+"""Plant and autopilot in this process."""
 
 from time import perf_counter
 
@@ -78,7 +78,7 @@ class MemoryPlant:
 
 
 class MemoryAutopilot:
-    """An autopilot in this process with its ground side; `autopilot` is a new one after a restart."""
+    """An autopilot in this process; `autopilot` is a new one after a restart."""
 
     process = None
 

@@ -1,4 +1,4 @@
-"""The setting of a flight, and the specifications of its two processes."""
+"""The setting of a flight."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
@@ -85,7 +85,7 @@ class Setting(WorldSpec, LawSpec):
         return part_of(self, PlantSpec, system_id=self.system, start=begins, truth=True, speed=inf)
 
     def autopilot_spec(self, state: Path) -> AutopilotSpec:
-        """Return the specification of an autopilot with its files in folder `state`."""
+        """Return the specification of an autopilot with its files in `state`."""
         vehicle = self.believed or self.vehicle
         return part_of(self, AutopilotSpec, vehicle=vehicle, system_id=self.system, state=state)
 

@@ -1,4 +1,4 @@
-"""Commands to a live vehicle, in each browser once its user has entered the token."""
+"""Commands to a live vehicle, in each browser after its token."""
 
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue

@@ -13,7 +13,7 @@ from colibri.view.snapshot import Snapshot
 
 
 class Done(NamedTuple):
-    """A user action: `play`, `seek` with time, `speed` with its text, `layers`, `scale`, `follow`."""
+    """A user action."""
 
     what: str
     value: Any = None

@@ -22,7 +22,7 @@ _LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
 
 
 class Page:
-    """A page that shows vehicles; `laid_out` once a browser's panels have changed the aspect of its camera."""
+    """A page that shows vehicles; `laid_out` once a browser's panels have changed its camera's aspect."""
 
     def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
         self._sources = sources
@@ -62,7 +62,7 @@ class Page:
         return bool(self.server.get_clients())
 
     def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
-        """Draw the scene; connected browsers get the camera of a live vehicle's surroundings."""
+        """Draw the scene, with a live vehicle's surroundings in view."""
         if self._vehicles:
             return
         if snapshots and self._sources[0].is_live:
@@ -131,7 +131,7 @@ class Page:
         return ground_point((x, y, z), direction, self._ground_m)
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
-        """Return an animation of the scene at some times, which works without a server."""
+        """Return an animation of the scene, which works without a server."""
         self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]

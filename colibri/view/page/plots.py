@@ -1,4 +1,4 @@
-"""Plots beside the scene: series over time, with a mark at the present time."""
+"""Plots beside the scene."""
 
 from collections.abc import Sequence
 from itertools import cycle
@@ -86,7 +86,7 @@ class Plots:
     def _framed(
         self, times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
     ) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-        """Return data and series with time first and, if used, the mark last."""
+        """Return data and series with time first and the mark last."""
         seconds = uplot.Series(label="s")
         if not self._marked:
             return (times_s, *values), (seconds, *lines)
@@ -95,7 +95,7 @@ class Plots:
 
 
 def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
-    """Return a line at the lowest value with a peak at a time. A nan would break uPlot's scaling."""
+    """Return a line with a peak at a time. A nan would break uPlot's scaling."""
     low, high = (float(pick(values)) for pick in (np.min, np.max))
     mark = np.full(len(times_s), low)
     if time_s >= times_s[0]:

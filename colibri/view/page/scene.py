@@ -118,7 +118,7 @@ class VehicleScene:
         )
 
     def _build(self, colour: Colour) -> tuple[list[viser.BoxHandle], list[viser.CylinderHandle]]:
-        """Draw body, arms and rotors; return blades and discs, which change."""
+        """Draw body, arms and rotors; return blades and discs."""
         scene, at, scale = self._scene, f"{self._root}/vehicle", self._scale
         radius = self._airframe.radius_m * scale
         scene.add_box(f"{at}/body", dimensions=(0.9 * radius, 0.6 * radius, 0.3 * radius), color=colour)
@@ -154,7 +154,7 @@ class VehicleScene:
 
 
 class SurroundingsScene:
-    """Ground, paths, mission, fence, home and rally points of one vehicle."""
+    """Ground, paths, mission, fence, home and rally points."""
 
     def __init__(self, scene: viser.SceneApi, number: int) -> None:
         self._scene = scene

@@ -48,7 +48,7 @@ def stop(server: PageServer) -> None:
 
 @contextmanager
 def _guarded() -> Iterator[list[str]]:
-    """Add access control to servers started in this block; yield one word for each."""
+    """Add access control to servers started in this block."""
     begun: list[str] = []
     unguarded = websockets.asyncio.server.serve
 

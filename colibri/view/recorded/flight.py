@@ -1,4 +1,4 @@
-"""A recorded flight, from its folder, even if it ended early."""
+"""A recorded flight, from its folder."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -191,7 +191,7 @@ def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:
 
 
 def _ground_m(vehicle: Vehicle, place: Array) -> float:
-    """Return the height of the ground; below the flight for a vehicle without ground."""
+    """Return the ground's height; below the flight for a vehicle without ground."""
     return vehicle.ground_height_m if vehicle.ground else min(0.0, float(place[:, 2].min()))
 
 
@@ -205,7 +205,7 @@ def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, he
 
 
 def _events(decisions: Columns) -> list[tuple[float, str]]:
-    """Return times and texts at which the QP failed or a fallback decided."""
+    """Return times and texts of QP failures and fallbacks."""
     statuses = {code: status for status, code in STATUS_CODES.items()}
     fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}
     events = []

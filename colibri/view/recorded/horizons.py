@@ -1,7 +1,6 @@
-"""Predicted horizons of a recorded flight. Logs have none, so a replay computes them.
+"""Predicted horizons of a recorded flight, by replay in a process of its own.
 
-A process of its own does so while the flight is shown: `python -m colibri.view.recorded.horizons DIR` prints a line per
-horizon, its time and the coordinates of its points.
+`python -m colibri.view.recorded.horizons DIR` prints a line per horizon, its time and the coordinates of its points.
 """
 
 import os
@@ -42,7 +41,7 @@ class Horizons:
 
 
 class HorizonProcess:
-    """The process that predicts the horizons of a flight, and the thread that reads them."""
+    """The process that predicts the horizons, and the thread that reads them."""
 
     def __init__(self, folder: Path, horizons: Horizons) -> None:
         command = [sys.executable, "-m", "colibri.view.recorded.horizons", str(folder)]

@@ -1,4 +1,4 @@
-"""The clock of a recorded flight. Wall-clock time is an argument."""
+"""The clock of a recorded flight."""
 
 from typing import NamedTuple
 
