@@ -197,23 +197,25 @@ class _Layout:
     """Layout of a message in a frame."""
 
     def __init__(self, definition: Any) -> None:
-        definition = missing_messages.with_later_fields(definition)
         self.name: str = definition.msgname
+        later = [name for name in missing_messages.LATER.get(self.name, ()) if name not in definition.fieldnames]
+        names, names_on_wire = [*definition.fieldnames, *later], [*definition.ordered_fieldnames, *later]
+        kinds = [*definition.fieldtypes, *["uint32_t"] * len(later)]
+        array_lengths = [*definition.array_lengths, *[0] * len(later)]
+        packing = Struct(definition.unpacker.format + "I" * len(later))
         self.message_id: bytes = definition.id.to_bytes(3, "little")
         self.crc_extra = bytes([definition.crc_extra])
-        self._size: int = definition.unpacker.size
-        self._pack: Callable[..., bytes] = definition.unpacker.pack
-        self._unpack: Callable[[bytes], tuple[Any, ...]] = definition.unpacker.unpack
-        self._fields: Any = namedtuple("_fields", definition.fieldnames)  # type: ignore[misc]
-        self._defaults: tuple[Any, ...] = definition.__init__.__defaults__ or ()
-        order = [definition.fieldnames.index(name) for name in definition.ordered_fieldnames]
-        kinds = [definition.fieldtypes[i] for i in order]
-        lengths = [0 if kind == "char" else n for kind, n in zip(kinds, definition.array_lengths, strict=True)]
-        places = dict(zip(definition.ordered_fieldnames, _places(lengths), strict=True))
-        self._in_order_of_fields = _getter([places[name] for name in definition.fieldnames])
+        self._size, self._unpack = packing.size, packing.unpack
+        self._pack: Callable[..., bytes] = packing.pack
+        self._fields: Any = namedtuple("_fields", names)  # type: ignore[misc]
+        self._defaults: tuple[Any, ...] = (*(definition.__init__.__defaults__ or ()), *[0] * len(later))
+        order = [names.index(name) for name in names_on_wire]
+        lengths = [0 if kinds[i] == "char" else n for i, n in zip(order, array_lengths, strict=True)]
+        places = dict(zip(names_on_wire, _places(lengths), strict=True))
+        self._in_order_of_fields = _getter([places[name] for name in names])
         self._in_order_of_wire = _getter(order)
         self._lengths: list[int] | None = lengths if any(lengths) else None
-        self._texts = [i for i, kind in enumerate(definition.fieldtypes) if kind == "char"]
+        self._texts = [i for i, kind in enumerate(kinds) if kind == "char"]
 
     def payload(self, fields: Sequence[Any]) -> bytes:
         """Return the payload; extension fields may be omitted."""

@@ -4,7 +4,7 @@ Such a message is unsigned, from one component, and its last field is hardly eve
 One `Struct` reads header and payload, and fields are a tuple in wire order. Other forms are left to `Codec`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from re import findall
 from struct import Struct
 from typing import Any
@@ -27,7 +27,15 @@ class FixedFrame:
             ValueError: The dialect has other fields there.
         """
         definition = definition_of(name)
-        numbers = "".join(_formats(definition, fields))
+        of_dialect = zip(definition.ordered_fieldnames, findall(r"\d*\w", definition.unpacker.format), strict=True)
+        numbers, self._names = "", list[tuple[str, int]]()
+        for field, (expected, code) in zip(fields.split(), of_dialect, strict=False):
+            ((wanted, count, letter),) = findall(r"^(\w+)(?:\[(\d+)\])?(?::(\w))?$", field)
+            if wanted != expected:
+                raise ValueError(f"{name}: the dialect has {expected} in place of {wanted}")
+            unused = Struct(f"<{code}").size - Struct(f"<{count}{code[-1]}").size
+            numbers += f"{count}{code[-1]}{unused}x" if count else letter or code
+            self._names.append((wanted, int(count or 0)))
         payload = Struct("<" + numbers)
         self._pack, self._unpack = payload.pack, payload.unpack
         self._unpack_from = Struct(f"<4sB2s3s{numbers}H").unpack_from
@@ -56,12 +64,7 @@ class FixedFrame:
         covered = datagram[at + 1 : at + self._crc_at] + self._crc_extra
         return values[4:-1] if crc16(covered, CRC_START) == values[-1] else None
 
-
-def _formats(definition: Any, fields: str) -> Iterator[str]:
-    of_dialect = zip(definition.ordered_fieldnames, findall(r"\d*\w", definition.unpacker.format), strict=True)
-    for field, (name, code) in zip(fields.split(), of_dialect, strict=False):
-        ((wanted, count, letter),) = findall(r"^(\w+)(?:\[(\d+)\])?(?::(\w))?$", field)
-        if wanted != name:
-            raise ValueError(f"{definition.msgname}: the dialect has {name} in place of {wanted}")
-        unused = Struct(f"<{code}").size - Struct(f"<{count}{code[-1]}").size
-        yield f"{count}{code[-1]}{unused}x" if count else letter or code
+    def numbers(self, fields: Any) -> list[Any]:
+        """Return the numbers of a message that `Codec` has decoded."""
+        values = [(getattr(fields, name), count) for name, count in self._names]
+        return [number for value, count in values for number in (value[:count] if count else (value,))]

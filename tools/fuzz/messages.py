@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.wire.dialect import Codec, mav
-from colibri.mavlink.wire.missing_messages import with_later_fields
+from colibri.mavlink.wire.missing_messages import LATER
 
 VEHICLE = (1, 1)
 SOURCES = ((255, 190), (245, 190), (255, 0), (1, 191), (2, 1), (0, 0), VEHICLE)
@@ -186,9 +186,9 @@ def _fitting(value: int, kind: str) -> float:
 
 
 def _layout(number: int) -> tuple[_Field, ...]:
-    definition = with_later_fields(mav.mavlink_map[number])
+    definition = mav.mavlink_map[number]
     lengths = dict(zip(definition.ordered_fieldnames, definition.array_lengths, strict=True))
-    return tuple(
-        _Field(name, kind, lengths[name])
-        for name, kind in zip(definition.fieldnames, definition.fieldtypes, strict=True)
-    )
+    kinds = zip(definition.fieldnames, definition.fieldtypes, strict=True)
+    fields = [_Field(name, kind, lengths[name]) for name, kind in kinds]
+    later = [_Field(name, "uint32_t", 0) for name in LATER.get(definition.msgname, ()) if name not in lengths]
+    return (*fields, *later)
