@@ -9,8 +9,9 @@ PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and https://docs.px4.io/m
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Address, FourRotors, Vector
@@ -100,8 +101,7 @@ class SimulatorEnd:
         if len(datagram) == _CONTROLS.size and sender == self.peer:
             numbers = _CONTROLS.read(datagram, 0, self._source)
             if numbers is not None:
-                time_us, flags, a, b, c, d, mode = numbers
-                self._obey(time_us, flags, (a, b, c, d), mode)
+                self._obey(numbers)
                 self.received.append(datagram)
                 return
         for message in self._codec.decode(datagram):
@@ -111,8 +111,7 @@ class SimulatorEnd:
                 self.dropped["second autopilot" if self.peer else "not begun"] += 1
                 continue
             if message.name == "HIL_ACTUATOR_CONTROLS":
-                fields = message.fields
-                self._obey(fields.time_usec, fields.flags, tuple(fields.controls[:ROTORS]), fields.mode)
+                self._obey(_CONTROLS.numbers(message.fields))
             elif message.name == "COMMAND_LONG":
                 self._receive_request(message)
             elif message.name != "HEARTBEAT":
@@ -151,19 +150,19 @@ class SimulatorEnd:
         self.motors = Motors(_STOPPED, armed=False)
         self._answer_us = self._truth_every_us = None
 
-    def _obey(self, time_us: int, flags: int, controls: FourRotors, mode: int) -> None:
+    def _obey(self, numbers: Sequence[Any]) -> None:
+        time_us, flags, a, b, c, d, mode = numbers
         if time_us == self._answer_us:
             self.dropped["repeated"] += 1
             return
         self._answer_us = time_us
         self.lockstep = bool(flags & LOCKSTEP_FLAG)
         self.answered = True
-        a, b, c, d = controls
         if not (0.0 <= a <= 1.0 and 0.0 <= b <= 1.0 and 0.0 <= c <= 1.0 and 0.0 <= d <= 1.0):
             if not isfinite(a + b + c + d):
                 self.dropped["invalid"] += 1
                 return
-            a, b, c, d = (min(max(control, 0.0), 1.0) for control in controls)
+            a, b, c, d = (min(max(control, 0.0), 1.0) for control in (a, b, c, d))
         self.motors = Motors((a, b, c, d), bool(mode & dialect.MODE_ARMED))
 
     def _receive_request(self, message: Message) -> None:

@@ -167,7 +167,7 @@ def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
         fields = layout and _GPS.read(datagram, layout.size, source)
         if not fields:
             return None
-        fix = _fix(*fields)
+        fix = _fix(fields)
     numbers = layout and layout.read(datagram, 0, source)
     return _measured(numbers, fix) if numbers else None
 
@@ -175,7 +175,7 @@ def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
     """Decode a HIL_SENSOR and its `OWN_MESSAGES`."""
     own = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
-    return _measured([getattr(sensor.fields, name) for name in _FIELDS.split()], **own)
+    return _measured(_SENSOR.numbers(sensor.fields), **own)
 
 
 def _measured(numbers: Sequence[Any], gps: GpsFix | None = None, distance: Distance | None = None) -> SensorFrame:
@@ -214,26 +214,11 @@ def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
 
 def decode_gps(message: Message) -> GpsFix:
     """Decode a HIL_GPS; unknown accuracies are nan."""
-    g = message.fields
-    accuracies, speeds = (g.eph, g.epv), (g.vel, g.vn, g.ve, g.vd, g.cog)
-    return _fix(g.time_usec, g.lat, g.lon, g.alt, *accuracies, *speeds, g.fix_type, g.satellites_visible)
+    return _fix(_GPS.numbers(message.fields))
 
 
-def _fix(
-    time_us: int,
-    lat: int,
-    lon: int,
-    alt: int,
-    eph: int,
-    epv: int,
-    _vel: int,
-    vn: int,
-    ve: int,
-    vd: int,
-    _cog: int,
-    fix_type: int,
-    satellites: int,
-) -> GpsFix:
+def _fix(numbers: Sequence[int]) -> GpsFix:
+    time_us, lat, lon, alt, eph, epv, _, vn, ve, vd, _, fix_type, satellites = numbers
     return GpsFix(
         time_us=time_us,
         fix_type=fix_type,

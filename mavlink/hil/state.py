@@ -3,8 +3,9 @@
 Invalid input (not finite, out of range, halves of different frames) decodes to `None`.
 """
 
+from collections.abc import Sequence
 from math import isfinite, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from colibri.common.types import FourRotors, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
@@ -70,33 +71,17 @@ def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
         return None
     attitude = _ATTITUDE.read(datagram, 0, source)
     position = _POSITION.read(datagram, _ATTITUDE.size, source)
-    return _state(*attitude, *position) if attitude and position else None
+    return _state(attitude, position) if attitude and position else None
 
 
 def decode_state(attitude: Message, position: Message) -> StateFrame | None:
-    a, p = attitude.fields, position.fields
-    turning = (a.time_boot_ms, a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed)
-    return _state(*turning, p.time_boot_ms, p.x, p.y, p.z, p.vx, p.vy, p.vz)
+    return _state(_ATTITUDE.numbers(attitude.fields), _POSITION.numbers(position.fields))
 
 
-def _state(
-    attitude_ms: int,
-    q1: float,
-    q2: float,
-    q3: float,
-    q4: float,
-    rollspeed: float,
-    pitchspeed: float,
-    yawspeed: float,
-    position_ms: int,
-    x: float,
-    y: float,
-    z: float,
-    vx: float,
-    vy: float,
-    vz: float,
-) -> StateFrame | None:
-    """Return the frame of both messages' fields: single floats, with a finite sum if each is finite."""
+def _state(attitude: Sequence[Any], position: Sequence[Any]) -> StateFrame | None:
+    attitude_ms, q1, q2, q3, q4, rollspeed, pitchspeed, yawspeed = attitude
+    position_ms, x, y, z, vx, vy, vz = position
+    # Fields are single floats: their sum is finite if each of them is.
     all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
     squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
     if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
@@ -124,18 +109,15 @@ def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:
     if len(datagram) != _ACTUATORS.size:
         return None
     numbers = _ACTUATORS.read(datagram, 0, source)
-    return _command(*numbers) if numbers else None
+    return _command(numbers) if numbers else None
 
 
 def decode_actuators(message: Message) -> ActuatorCommand | None:
-    fields = message.fields
-    c1, c2, c3, c4 = fields.controls[:ROTORS]
-    return _command(fields.time_usec, fields.flags, c1, c2, c3, c4, fields.mode)
+    return _command(_ACTUATORS.numbers(message.fields))
 
 
-def _command(
-    time_us: int, _flags: int, c1: float, c2: float, c3: float, c4: float, mode: int
-) -> ActuatorCommand | None:
+def _command(numbers: Sequence[Any]) -> ActuatorCommand | None:
+    time_us, _, c1, c2, c3, c4, mode = numbers
     if not (0.0 <= c1 <= 1.0 and 0.0 <= c2 <= 1.0 and 0.0 <= c3 <= 1.0 and 0.0 <= c4 <= 1.0):
         return None
     return ActuatorCommand(time_us, (c1, c2, c3, c4), bool(mode & MODE_ARMED))
