@@ -65,10 +65,6 @@ class CommandInt(Command):
         return (("COMMAND_INT", self._fields),)
 
 
-def request_message(target: Target, name: str, *, repeat: Repeat = USUALLY) -> Command:
-    return Command(target, mav.MAV_CMD_REQUEST_MESSAGE, float(definition_of(name).id), repeat=repeat)
-
-
 def set_message_interval(target: Target, name: str, interval_us: float, *, repeat: Repeat = USUALLY) -> Command:
     number = float(definition_of(name).id)
     return Command(target, mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, interval_us, repeat=repeat)

@@ -4,9 +4,7 @@ from collections.abc import Sequence
 
 from colibri.mavlink.client.conversation import OK, USUALLY, Conversation, Encoded, Repeat, Target
 from colibri.mavlink.mission.items import MISSION, MissionItem, item_of
-from colibri.mavlink.wire.dialect import Message, mav
-
-INVALID_SEQUENCE: int = mav.MAV_MISSION_INVALID_SEQUENCE
+from colibri.mavlink.wire.dialect import Message
 
 
 class _PlanConversation(Conversation):

@@ -7,8 +7,8 @@ from time import monotonic
 
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.conversation import Conversation
-from colibri.mavlink.client.logs import DownloadLog, ListLogs
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
+from tests.support.log_conversations import DownloadLog, ListLogs
 
 LOSS = 0.2
 _VEHICLE = (1, AUTOPILOT_COMPONENT)

@@ -3,10 +3,10 @@
 from typing import Any
 
 from colibri.mavlink.client.client import LOST_AFTER_US, Client, Ended, Found, Lost
-from colibri.mavlink.client.commands import Command, request_message
+from colibri.mavlink.client.commands import Command
 from colibri.mavlink.client.conversation import UNANSWERED, Repeat
 from colibri.mavlink.client.parameters import ReadParameter
-from colibri.mavlink.wire.dialect import Codec, Message, mav
+from colibri.mavlink.wire.dialect import Codec, Message, definition_of, mav
 from colibri.mavlink.wire.signing import Signing
 
 TARGET = (1, 1)
@@ -26,6 +26,10 @@ def said(name: str, *fields: Any, system: int = 1) -> bytes:
 
 def ack(number: int, result: int = 0, to: tuple[int, int] = (255, 190), progress: int = 0) -> bytes:
     return said("COMMAND_ACK", number, result, progress, 0, *to)
+
+
+def requested(target: tuple[int, int], name: str) -> Command:
+    return Command(target, mav.MAV_CMD_REQUEST_MESSAGE, float(definition_of(name).id))
 
 
 def sent(client: Client, now_us: int) -> list[Message]:
@@ -72,7 +76,7 @@ def test_vehicles_are_found_lost_and_found_again() -> None:
 def test_a_vehicle_is_known_by_its_version() -> None:
     client, bits = Client(255, 190), mav.MAV_PROTOCOL_CAPABILITY_FTP
     client.receive(beat(), 0)
-    question = client.begin(request_message(TARGET, "AUTOPILOT_VERSION"))
+    question = client.begin(requested(TARGET, "AUTOPILOT_VERSION"))
     (message,) = sent(client, 0)
     assert message.fields.param1 == mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION
     none = (0,) * 8
@@ -107,9 +111,9 @@ def test_an_answer_to_somebody_else_is_none() -> None:
 
 def test_commands_of_a_kind_take_turns_and_others_do_not() -> None:
     client = Client(255, 190)
-    first, second = (client.begin(request_message(TARGET, name)) for name in ("HOME_POSITION", "ODOMETRY"))
+    first, second = (client.begin(requested(TARGET, name)) for name in ("HOME_POSITION", "ODOMETRY"))
     client.begin(Command(TARGET, ARM, 1.0))
-    client.begin(request_message((2, 1), "ODOMETRY"))
+    client.begin(requested((2, 1), "ODOMETRY"))
     numbers = [(message.fields.target_system, message.fields.command) for message in sent(client, 0)]
     assert numbers == [(1, mav.MAV_CMD_REQUEST_MESSAGE), (1, ARM), (2, mav.MAV_CMD_REQUEST_MESSAGE)]
     client.receive(ack(mav.MAV_CMD_REQUEST_MESSAGE), 1)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.commands import Command, CommandInt
 from colibri.mavlink.client.conversation import OK, UNANSWERED, Conversation, Repeat
-from colibri.mavlink.client.logs import DownloadLog, ListLogs
 from colibri.mavlink.client.parameters import DIFFERS, ListParameters, ReadParameter, SetParameter
 from colibri.mavlink.client.plans import Clear, Download, Upload
 from colibri.mavlink.files.log_download import Logs
@@ -24,6 +23,7 @@ from colibri.mavlink.services.command import Command as Received
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
 from colibri.mavlink.wire.refusal import Refusal
+from tests.support.log_conversations import DownloadLog, ListLogs
 from tests.support.mission_ends import Ground, bits, some_item
 from tests.support.unruly_link import MINUTE_US, TARGET, Link, Vehicle
 
