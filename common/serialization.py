@@ -27,13 +27,12 @@ def _encoded(value: Any) -> Any:
     raise TypeError(f"{type(value)} is not plain")
 
 
-def _decoded(kind: Any, value: Any) -> Any:
+def _decoded(_kind: Any, value: Any) -> Any:
     """Return an array, the only type that msgspec cannot decode itself.
 
     Raises:
         ValueError: Size and shape disagree.
     """
-    del kind
     shape, content = value
     return np.frombuffer(content, dtype=np.float64).reshape(shape).copy()
 

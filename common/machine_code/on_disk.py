@@ -4,6 +4,9 @@ import os
 import sys
 from collections.abc import Callable
 from functools import cache, cached_property
+from hashlib import sha256
+from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import llvmlite
@@ -13,7 +16,6 @@ from numba.core.caching import FunctionCache, NullCache
 
 from colibri.common.machine_code import results
 from colibri.common.machine_code.private_folder import private_folder
-from colibri.common.machine_code.sources import files_of, hash_of
 
 _SAID = "COLIBRI_SAID_UNCACHED"
 _NOWHERE = (
@@ -31,16 +33,8 @@ class MachineCode:
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
 
-    @property
-    def cache_path(self) -> str | None:
-        folder: str | None = self._cache.cache_path
-        return folder
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        return self._cache.load_overload(sig, target_context)
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        self._cache.save_overload(sig, data)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
 
     @cached_property
     def _cache(self) -> Any:
@@ -75,3 +69,25 @@ def _use_private_folder() -> bool:
         os.environ[_SAID] = "1"
         sys.stderr.write(_NOWHERE)
     return folder is not None
+
+
+def files_of(function: Callable[..., Any]) -> set[str]:
+    """Return the files of a function and of the functions it calls by global name."""
+    files: set[str] = set()
+    seen: set[Any] = set()
+    waiting: list[Any] = [function]
+    while waiting:
+        it = waiting.pop()
+        it = getattr(it, "py_func", it)
+        if not isinstance(it, FunctionType) or it in seen:
+            continue
+        seen.add(it)
+        files.add(it.__code__.co_filename)
+        waiting += [it.__globals__.get(name) for name in it.__code__.co_names]
+    return files
+
+
+@cache
+def hash_of(file: str) -> str:
+    """Return the hash of a file at the first call."""
+    return sha256(Path(file).read_bytes()).hexdigest()

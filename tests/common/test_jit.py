@@ -12,7 +12,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 from colibri import autopilot, common, mavlink, plant
-from colibri.common.machine_code.sources import files_of
+from colibri.common.machine_code.on_disk import files_of
 
 MODULES = [
     importlib.import_module(entry.name)
