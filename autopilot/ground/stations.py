@@ -164,7 +164,7 @@ class Stations:
 
     def expect_station(self, now_us: int) -> None:
         """Count a ground station, connected before a restart, as lost from now on."""
-        self._heartbeat.expect(now_us)
+        self._heartbeat.station_us = now_us
 
     def update(self, snapshot: Snapshot) -> None:
         vehicle = self._pilot.sensed.vehicle
@@ -213,8 +213,8 @@ class Stations:
 
     def refuse_commands(self, reason: str) -> None:
         """Deny every command, and drop other messages; an empty reason resumes service."""
-        self.hub.accept_only(_COMMANDS if reason else None)
-        self._obeys.close(reason)
+        self.hub.accepts_only = _COMMANDS if reason else None
+        self._obeys.closed = reason
 
     def take_outbox(self) -> list[Outgoing]:
         return self.hub.take_outbox()

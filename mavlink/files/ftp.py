@@ -127,8 +127,7 @@ class Ftp:
             outcome = self._obey[request.opcode](request)
         return () if outcome is None else (answer(request, outcome),)
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
+    def poll(self, _now_us: int) -> Iterable[Send]:
         if not self._bursts and not self._checksums:
             return IDLE
         sends: list[Send] = []

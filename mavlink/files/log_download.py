@@ -63,8 +63,7 @@ class Logs:
         self._listings: dict[Peer, _Listing] = {}
         self._transfers: deque[_Transfer] = deque()
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del now_us
+    def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "LOG_REQUEST_LIST":
             return self._list(peer, fields.start, fields.end)
@@ -76,13 +75,9 @@ class Logs:
             self._stop(peer)
         return ()
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
+    def poll(self, _now_us: int) -> Iterable[Send]:
         if not self._transfers and not self._listings:
             return IDLE
-        return self._due()
-
-    def _due(self) -> list[Send]:
         sends: list[Send] = []
         for listing in list(self._listings.values()):
             sends += self._entries(listing)

@@ -256,8 +256,7 @@ class MissionService:
         answer = self._uploads.acknowledged(peer, fields.mission_type, fields.type, now_us)
         return () if answer is None else [answer]
 
-    def _clear_all(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        del now_us
+    def _clear_all(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
         plan_type = fields.mission_type
         if plan_type not in (*PLAN_TYPES, ALL):
             return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)]
@@ -267,16 +266,14 @@ class MissionService:
             self.load(each, ())
         return [ack(peer, ACCEPTED, plan_type)]
 
-    def _set_current(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+    def _set_current(self, fields: Any, _peer: Peer, _now_us: int) -> Iterable[Send]:
         """Set the item; broadcast the result ("Set Current Mission Item")."""
-        del peer, now_us
         refusal = self._vehicle.set_current(fields.seq, False)
         if refusal is not None:
             return self._text.say(WARNING, refusal.reason)
         self._announce()
         return ()
 
-    def _partial(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+    def _partial(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
         """Refuse partial lists: "not an official/standardised part of the mission service"."""
-        del now_us
         return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]

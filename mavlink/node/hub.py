@@ -108,9 +108,6 @@ class Hub:
         if number is not None:
             self._forget(number)
 
-    def accept_only(self, names: frozenset[str] | None) -> None:
-        self.accepts_only = names
-
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
     ) -> None:

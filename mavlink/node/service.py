@@ -38,14 +38,14 @@ class Service(Protocol):
 
     handles: frozenset[str]
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]: ...
+    def receive(self, message: Message, peer: Peer, now_us: int, /) -> Iterable[Send]: ...
 
 
 @runtime_checkable
 class PolledService(Service, Protocol):
     """A microservice that also sends by itself, or later."""
 
-    def poll(self, now_us: int) -> Iterable[Send]:
+    def poll(self, now_us: int, /) -> Iterable[Send]:
         """Return the due messages, or `IDLE`; called at every frame of the plant."""
 
 

@@ -100,9 +100,6 @@ class CommandService:
         self._answered: dict[tuple[Peer, int], _Answered] = {}
         self._said: tuple[str, int] = ("", -SAME_REASON_AFTER_US)
 
-    def close(self, reason: str) -> None:
-        self.closed = reason
-
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "COMMAND_CANCEL":

@@ -33,8 +33,7 @@ class OriginService:
         self._setters = setters
         self._text = text
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del peer
+    def receive(self, message: Message, _peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "SET_MODE":
             return self._refused(self._setters.mode(fields.base_mode, fields.custom_mode))

@@ -34,8 +34,7 @@ class Shell:
         self._lines: dict[Peer, bytes] = {}
         self._answers: dict[Peer, bytes] = {}
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del now_us
+    def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
         if fields.device != _SHELL or fields.flags & _REPLY:
             return ()
@@ -51,11 +50,9 @@ class Shell:
             self._answers[peer] = (self._answers.get(peer, b"") + text.encode(errors="replace"))[:MAX_ANSWER_BYTES]
         return ()
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        del now_us
-        return self._due() if self._answers else IDLE
-
-    def _due(self) -> list[Send]:
+    def poll(self, _now_us: int) -> Iterable[Send]:
+        if not self._answers:
+            return IDLE
         sends: list[Send] = []
         for peer, text in list(self._answers.items()):
             for start in range(0, min(len(text), MESSAGES_A_POLL * DATA_BYTES), DATA_BYTES):

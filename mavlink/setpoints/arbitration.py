@@ -51,7 +51,7 @@ class StreamedService(ABC, Generic[Value]):
             self.source = peer
 
     @abstractmethod
-    def _decode(self, message: Message, peer: Peer, now_us: int) -> Value | None:
+    def _decode(self, message: Message, peer: Peer, now_us: int, /) -> Value | None:
         """Return the setpoint in a message, if any.
 
         Raises:

@@ -44,8 +44,7 @@ class Follow(StreamedService[TargetState]):
         target = self._latest(now_us, timeout_us)
         return target.at(now_us, GOES_ON_US) if target else None
 
-    def _decode(self, message: Message, peer: Peer, now_us: int) -> TargetState:
-        del peer
+    def _decode(self, message: Message, _peer: Peer, now_us: int) -> TargetState:
         fields = message.fields
         if not fields.est_capabilities & POSITION_KNOWN:
             raise Refused("no position")

@@ -109,8 +109,7 @@ def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoi
     )
 
 
-def decode_attitude(fields: Any, here: Whereabouts, now_us: int) -> AttitudeSetpoint:
-    del here
+def decode_attitude(fields: Any, _here: Whereabouts, now_us: int) -> AttitudeSetpoint:
     mask = fields.type_mask
     masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
     wire = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
@@ -267,6 +266,5 @@ class Offboard(StreamedService[OffboardSetpoint]):
     def latest(self, now_us: int, timeout_us: int) -> OffboardSetpoint | None:
         return self._latest(now_us, timeout_us)
 
-    def _decode(self, message: Message, peer: Peer, now_us: int) -> OffboardSetpoint:
-        del peer
+    def _decode(self, message: Message, _peer: Peer, now_us: int) -> OffboardSetpoint:
         return _DECODERS[message.name](message.fields, self._here, now_us)

@@ -30,10 +30,6 @@ class HeartbeatService:
         self._sent_at_us = -EVERY_US
         self.station_us: int | None = None
 
-    def expect(self, now_us: int) -> None:
-        """Expect a ground station that was connected before a restart."""
-        self.station_us = now_us
-
     def update(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
 
@@ -42,8 +38,7 @@ class HeartbeatService:
         if self._snapshot is not None:
             self._snapshot = self._snapshot._replace(custom_mode=custom_mode, armed=armed)
 
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del peer
+    def receive(self, message: Message, _peer: Peer, now_us: int) -> Iterable[Send]:
         if message.fields.type == mav.MAV_TYPE_GCS:
             self.station_us = now_us
         return ()

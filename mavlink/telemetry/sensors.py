@@ -2,6 +2,7 @@
 
 from colibri.common.earth.atmosphere import pressure_pa, temperature_c
 from colibri.common.types import Vector
+from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import MILLI_G, boot_ms, in_body_frd, times
 from colibri.mavlink.telemetry.snapshot import Snapshot
@@ -22,24 +23,28 @@ UPDATED = bits(
 
 def highres_imu(s: Snapshot) -> Fields:
     """HIGHRES_IMU (105): m/s², rad/s, gauss, hPa, m, °C."""
-    altitude_m = altitude_amsl_m(s)
-    air = (static_hpa(s), 0.0, altitude_m, air_c(s))
-    return (s.time_us, *specific_force_frd(s), *measured_rate_frd(s), *field_frd(s), *air, UPDATED, 0)
+    m = _measured(s)
+    motion = (*frd_from_flu(m.specific_force_flu_m_s2), *frd_from_flu(m.rate_flu_rad_s))
+    air = (m.pressure_pa / 100.0, 0.0, _altitude_amsl_m(s), m.temperature_c)
+    return (s.time_us, *motion, *frd_from_flu(m.magnetic_field_flu_gauss), *air, UPDATED, 0)
 
 
 def scaled_imu(s: Snapshot) -> Fields:
     """SCALED_IMU (26): mG, mrad/s, mgauss, centidegrees Celsius."""
-    return (boot_ms(s), *_thousandths(s), _temperature_cdeg(s))
+    m = _measured(s)
+    return (boot_ms(s), *_thousandths(m), _temperature_cdeg(m))
 
 
 def raw_imu(s: Snapshot) -> Fields:
     """RAW_IMU (27): the counts equal SCALED_IMU's units."""
-    return (s.time_us, *_thousandths(s), 0, _temperature_cdeg(s))
+    m = _measured(s)
+    return (s.time_us, *_thousandths(m), 0, _temperature_cdeg(m))
 
 
 def scaled_pressure(s: Snapshot) -> Fields:
     """SCALED_PRESSURE (29): hPa, centidegrees Celsius."""
-    return (boot_ms(s), static_hpa(s), 0.0, _temperature_cdeg(s), 0)
+    m = _measured(s)
+    return (boot_ms(s), m.pressure_pa / 100.0, 0.0, _temperature_cdeg(m), 0)
 
 
 def vibration(s: Snapshot) -> Fields:
@@ -47,41 +52,27 @@ def vibration(s: Snapshot) -> Fields:
     return (s.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
-def specific_force_frd(s: Snapshot) -> Vector:
+def _measured(s: Snapshot) -> SensorFrame:
+    """Return the sensors' measurements; under state feedback, those of ideal sensors."""
     if s.sensed is not None:
-        return frd_from_flu(s.sensed.specific_force_flu_m_s2)
+        return s.sensed
     east, north, up = s.acceleration_enu_m_s2
-    return in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2))
-
-
-def field_frd(s: Snapshot) -> Vector:
-    if s.sensed is not None:
-        return frd_from_flu(s.sensed.magnetic_field_flu_gauss)
+    force = frd_from_flu(in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2)))
     north, east, down = EARTH_FIELD_NED_GAUSS
-    return in_body_frd(s.attitude, (east, north, -down))
+    field = frd_from_flu(in_body_frd(s.attitude, (east, north, -down)))
+    altitude_m = _altitude_amsl_m(s)
+    return SensorFrame(0, 0, force, s.rate_flu_rad_s, field, pressure_pa(altitude_m), temperature_c(altitude_m))
 
 
-def measured_rate_frd(s: Snapshot) -> Vector:
-    return frd_from_flu(s.rate_flu_rad_s if s.sensed is None else s.sensed.rate_flu_rad_s)
-
-
-def static_hpa(s: Snapshot) -> float:
-    return (pressure_pa(altitude_amsl_m(s)) if s.sensed is None else s.sensed.pressure_pa) / 100.0
-
-
-def air_c(s: Snapshot) -> float:
-    return temperature_c(altitude_amsl_m(s)) if s.sensed is None else s.sensed.temperature_c
-
-
-def altitude_amsl_m(s: Snapshot) -> float:
+def _altitude_amsl_m(s: Snapshot) -> float:
     return s.origin.altitude_m + s.position_enu_m[2]
 
 
-def _thousandths(s: Snapshot) -> tuple[float, ...]:
-    rate = times(1e3, measured_rate_frd(s))
-    return (*times(MILLI_G, specific_force_frd(s)), *rate, *times(1e3, field_frd(s)))
+def _thousandths(m: SensorFrame) -> tuple[float, ...]:
+    force, rate = frd_from_flu(m.specific_force_flu_m_s2), frd_from_flu(m.rate_flu_rad_s)
+    return (*times(MILLI_G, force), *times(1e3, rate), *times(1e3, frd_from_flu(m.magnetic_field_flu_gauss)))
 
 
-def _temperature_cdeg(s: Snapshot) -> int:
+def _temperature_cdeg(m: SensorFrame) -> int:
     # Zero would mean that no temperature is known.
-    return round(100.0 * air_c(s)) or 1
+    return round(100.0 * m.temperature_c) or 1

@@ -9,7 +9,6 @@ from typing import TypeAlias
 import numpy as np
 
 from colibri.common.types import Array, Vector
-from colibri.mavlink.ulog.topics import Records
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
 BLOCK_ROWS = 16
@@ -76,10 +75,6 @@ class Turned:
     def __call__(self, table: Array) -> Array:
         turned: Array = table[:, self._picked] * self._signs
         return turned
-
-
-def put_valid(records: Records, position: str) -> None:
-    records[position, "xy_valid"][:] = True
 
 
 def attitude_ned(attitude: Array) -> Array:

@@ -3,7 +3,6 @@
 The file's format, packing, reading, CSV columns and `docs/files.md` are derived from these tables.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, groupby
@@ -84,15 +83,13 @@ class Topic:
     @cached_property
     def _runs(self) -> list[tuple[str, slice]]:
         """Consecutive columns of one type, by the name of the first."""
-        return list(self._found_runs())
-
-    def _found_runs(self) -> Iterator[tuple[str, slice]]:
         kinds = [(each.kind, name) for each in self.columns for name in each.names.split()]
-        begin = 1
+        runs, begin = [], 1
         for _, run in groupby(kinds, key=lambda each: each[0]):
             names = [name for _, name in run]
-            yield names[0], slice(begin, begin + len(names))
+            runs.append((names[0], slice(begin, begin + len(names))))
             begin += len(names)
+        return runs
 
 
 _STATE = (

@@ -60,13 +60,9 @@ class FlightFile:
         yield self._log[:]
 
     def inputs(self) -> Iterator[InputRecord]:
-        yield from decode_inputs(self._chunks())
-
-    def _chunks(self) -> Iterator[bytes]:
         size = messages.HEAD_BYTES + CONTENT_BYTES
-        for begin, count in self._runs[INPUT_NUMBER]:
-            for chunk in range(begin, begin + count * size, size):
-                yield self._log[chunk + messages.HEAD_BYTES : chunk + size]
+        places = (at for begin, count in self._runs[INPUT_NUMBER] for at in range(begin, begin + count * size, size))
+        return decode_inputs(self._log[at + messages.HEAD_BYTES : at + size] for at in places)
 
     def _index(self) -> None:
         log, end = self._log, self._size

@@ -49,8 +49,8 @@ class Recorder:
         if not self._thinning.is_due(snapshot.time_us):
             return
         self._log.add(self._samples, sample_row(snapshot))
-        row = sensing_row(snapshot)
-        if row is not None:
+        if snapshot.sensed is not None and snapshot.estimator is not None:
+            row = sensing_numbers(snapshot.time_us, snapshot.sensed, snapshot.estimator)
             self._log.add(self._sensings, row)
 
     def say(self, time_us: int, severity: int, text: str) -> None:
@@ -64,16 +64,17 @@ class Recorder:
         changed: Mapping[str, Value] = {name: value for name, value in values.items() if known.get(name) != value}
         self._log.append(messages.SYNC + messages.parameters(changed))
 
-    def _record_status(self, snapshot: Snapshot) -> None:
+    def _record_status(self, s: Snapshot) -> None:
         """Record a new status, or every second; with it the battery, and flush the log."""
-        now_us, status = snapshot.time_us, status_of(snapshot)
+        now_us = s.time_us
+        status = Status(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
             return
         self._status, self._status_us = status, now_us
         self._log.flush()
         self._log.append(status_message(now_us, status, self._system_id))
-        if snapshot.battery is not None and self._with_battery:
-            self._log.append(battery_message(now_us, snapshot.battery))
+        if s.battery is not None and self._with_battery:
+            self._log.append(battery_message(now_us, s.battery))
 
 
 def sample_row(s: Snapshot) -> tuple[float, ...]:
@@ -90,16 +91,6 @@ def sample_row(s: Snapshot) -> tuple[float, ...]:
         *(solver.slack, *solver.active, s.delay_us, solver.mass_kg, solver.path_lag_s),
         nan if solver.iterations < 0 else solver.iterations,
     )
-
-
-def sensing_row(s: Snapshot) -> tuple[float, ...] | None:
-    if s.sensed is None or s.estimator is None:
-        return None
-    return sensing_numbers(s.time_us, s.sensed, s.estimator)
-
-
-def status_of(s: Snapshot) -> Status:
-    return Status(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
 
 
 def battery_message(time_us: int, battery: BatteryState) -> bytes:

@@ -6,7 +6,7 @@ from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
-from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw, put_valid
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw
 from colibri.mavlink.ulog.topics import Records
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
@@ -61,7 +61,7 @@ class SampleBlocks(Blocks):
         super().__init__(len(COLUMNS))
         _quaternions(np.zeros((1, 3)))
         self._records = Records(BLOCK_ROWS, *_TOPICS)
-        put_valid(self._records, topics.POSITION)
+        self._records[topics.POSITION, "xy_valid"][:] = True
         self._records[topics.MOTORS, "control"][:] = np.nan
 
     def encode(self, table: Array) -> bytes:

@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
-from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, put_valid
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned
 from colibri.mavlink.ulog.flight_topics import TRUTH
 from colibri.mavlink.ulog.topics import Records, record
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
@@ -38,7 +38,7 @@ class TruthBlocks(Blocks):
         self._records = Records(
             BLOCK_ROWS, topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS
         )
-        put_valid(self._records, topics.POSITION_TRUTH)
+        self._records[topics.POSITION_TRUTH, "xy_valid"][:] = True
         self._records[topics.ESCS, "esc_count"][:] = (_ROTORS, _ALL_OF_THEM, _ALL_OF_THEM)
 
     def encode(self, table: Array) -> bytes:

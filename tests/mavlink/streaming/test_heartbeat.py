@@ -79,7 +79,7 @@ def test_nothing_is_said_before_anything_is_known() -> None:
 
 def test_when_a_ground_station_was_received_last(service: HeartbeatService) -> None:
     assert service.station_us is None
-    service.expect(1_000_000)
+    service.station_us = 1_000_000
     receive(service, Peer(3, 1, 158), 2_000_000, mav.MAV_TYPE_CAMERA)
     assert service.station_us == 1_000_000
     receive(service, Peer(1, 255, 190), 3_000_000)
