@@ -1,4 +1,4 @@
-"""Types, arithmetic, geometry and process support that every package may use; independent of vehicles and MAVLink."""
+"""Types, arithmetic, geometry and process support for every package."""
 
 from typing import TYPE_CHECKING
 

@@ -19,11 +19,7 @@ def toml_names(folder: Path) -> list[str]:
 
 
 def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Error]) -> T:
-    """Read the TOML file of that name in `folder`, or the file at a path that ends in `.toml`.
-
-    Raises:
-        error: The name is unknown, or a key is missing, unknown or invalid.
-    """
+    """Read the TOML file of that name in `folder`, or at a path that ends in `.toml`."""
     if name_or_path.endswith(".toml"):
         return read_toml(Path(name_or_path), kind, error)
     return read_toml(_named(what, folder, name_or_path, error), kind, error)
@@ -41,11 +37,7 @@ def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
 
 
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
-    """Read a TOML file into a strict structure.
-
-    Raises:
-        error: The file is unreadable, or a key is missing, unknown or invalid; names file and key.
-    """
+    """Read a strict structure; raise `error`, with file and key, if a key is missing, unknown or invalid."""
     try:
         return msgspec.toml.decode(path.read_bytes(), type=kind)
     except OSError as reason:
@@ -60,7 +52,6 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
 
 
 def _choices(kind: Any, key: str) -> str:
-    """Return the valid words of a key as the end of an error message; empty if any value is accepted."""
     found: Any = msgspec.inspect.type_info(kind)
     for name in key.replace("[", ".[").split("."):
         parts = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
@@ -77,7 +68,7 @@ Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class SettingsError(Error):
-    """A missing, unknown or invalid key of a table; the message names it."""
+    """A missing, unknown or invalid key of a table."""
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -110,11 +101,7 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
 
 
 def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
-    """Return a copy with another value at a dotted key (`body.mass_kg`, `rotors.strength.0`), validated like a file.
-
-    Raises:
-        error: The key is unknown or the value invalid; names the key.
-    """
+    """Return a copy with another, validated value at a dotted key: `body.mass_kg`, `rotors.strength.0`."""
     tree = _tree(table)
     parent, last = _place(tree, key, error)
     parent[last] = value

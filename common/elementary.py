@@ -1,13 +1,11 @@
-"""Elementary functions with the same bits on every computer.
+"""Elementary functions with the same bits on every computer, unlike the C library's.
 
-The C library's differ: glibc chooses code with or without fused multiply-add by the CPU. Here each function is an
-argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt` is exact everywhere;
-`math.hypot` and `math.dist` are Python's own code.
+Each is an argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt` is exact
+everywhere; `math.hypot` and `math.dist` are Python's own code. `kernels` has the same functions compiled, `elementwise`
+for arrays.
 
-Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (measured by the
-tests against 60 digits). Outside its domain a function returns nan or infinity, never raises.
-
-`kernels` has the same functions compiled, `elementwise` for arrays.
+Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (tested against 60
+digits). Outside its domain a function returns nan or infinity, never raises.
 
 Reductions with head and tail (the head's rounding error) follow W. J. Cody and W. Waite, Software Manual for the
 Elementary Functions, 1980, and K. C. Ng, Argument Reduction for Huge Arguments, 1992.
@@ -73,7 +71,7 @@ ATAN = (
 
 
 def series(coefficients: tuple[float, ...], x: Real) -> Real:
-    """Return c₀ + c₁ x + c₂ x² …, evaluated from the highest power."""
+    """Return c₀ + c₁ x + c₂ x² …, from the highest power."""
     total = coefficients[-2] + x * coefficients[-1]
     for k in range(len(coefficients) - 3, -1, -1):
         total = coefficients[k] + x * total
@@ -104,14 +102,14 @@ def cosine(x: Real, tail: Real) -> Real:
 
 
 def arctangent(x: Real, c: Real, head: Real, tail: Real) -> Real:
-    """Return atan(x), 0 <= x <= 1, from a nearby atan(c) = head + tail: atan c + atan((x - c) / (1 + x c))."""
+    """Return atan(x), 0 <= x <= 1, from a nearby atan(c) = head + tail."""
     t = (x - c) / (1.0 + x * c)
     z = t * t
     return head + (t + (tail + t * z * series(_ARCTANGENT, z)))
 
 
 def turned_sine(x: float, quarters: int) -> float:
-    """Return the sine of `x` rad plus `quarters` right angles; nan unless finite."""
+    """Return the sine of `x` rad plus `quarters` right angles."""
     if not abs(x) < inf:
         return nan
     if abs(x) > MAX_RAD:
@@ -135,7 +133,7 @@ def tan(x: float) -> float:
 
 
 def atan2(y: float, x: float) -> float:
-    """Return the angle of the point (x, y), rad, in [-π, π]; signed zeros and infinities as in C."""
+    """Return an angle in [-π, π]; signed zeros and infinities as in C."""
     if isnan(x) or isnan(y):
         return nan
     across, along = abs(y), abs(x)
@@ -184,12 +182,10 @@ def exp(x: float) -> float:
 
 
 def expm1(x: float) -> float:
-    """Return e to the power of `x`, minus 1, exact for small `x`."""
     return _growth(x, 0.0) if abs(x) < _SMALL_EXP else exp(x) - 1.0
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of `x`; minus infinity at 0, nan below."""
     if isnan(x) or x < 0.0:
         return nan
     if x == 0.0:

@@ -1,4 +1,4 @@
-"""The functions of `elementary` for arrays, bit for bit: NumPy chooses its code by the CPU."""
+"""The functions of `elementary` for arrays of finite numbers, bit for bit: NumPy chooses its code by the CPU."""
 
 from math import pi
 
@@ -12,21 +12,18 @@ _HEADS, _TAILS = np.array(one.ATAN).T.copy()
 
 
 def sin(x: Array) -> Array:
-    """Return the sines of finite angles, rad."""
     quarter, sine, cosine = _both(x)
     value = np.where(quarter & 1, cosine, sine)
     return np.where(quarter & 2, -value, value)
 
 
 def cos(x: Array) -> Array:
-    """Return the cosines of finite angles, rad."""
     quarter, sine, cosine = _both(x)
     value = np.where(quarter & 1, sine, cosine)
     return np.where((quarter + 1) & 2, -value, value)
 
 
 def atan2(y: Array, x: Array) -> Array:
-    """Return the angles of finite points (x, y), rad, in [-π, π]."""
     across, along = np.abs(y), np.abs(x)
     steep = across > along
     larger, smaller = np.where(steep, across, along), np.where(steep, along, across)
@@ -44,7 +41,7 @@ def exp(x: Array) -> Array:
 
 
 def _both(x: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return each angle's quarter turn, and sine and cosine of the remainder."""
+    """Return each angle's quarter turn, and sine and cosine of its remainder."""
     x = np.where(np.abs(x) > one.MAX_RAD, x % (2.0 * pi), x)
     n: Array = np.floor(x * one.QUARTERS_PER_RAD + 0.5)
     head, tail = one.reduced(x, n)

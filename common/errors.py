@@ -6,18 +6,17 @@ from collections.abc import Iterable
 class Error(Exception):
     """Something that a user can put right; the message is the one line of what, where and how.
 
-    Below it is one base a package: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`, `CompanionError`. What
-    derives from none of them belongs to `common`, or to what a user runs. A mistake in this program is another
-    exception, a traceback.
+    Each package has a base below it: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`, `CompanionError`. A
+    mistake in this program is another exception, with a traceback.
     """
 
 
 class ForeignError(Error):
-    """An exception in code of another package, kept as `__cause__` with the traceback for its author."""
+    """An exception of another package's code, `__cause__`, shown with its traceback."""
 
 
 class InFlightError(Error):
-    """A flight that was begun and came to no end, in whichever package; what was logged is there."""
+    """A flight that was begun and could not be finished; its logs are kept."""
 
 
 def unknown(what: str, given: object, known: Iterable[str]) -> str:

@@ -21,23 +21,17 @@ _Tuple = TypeVar("_Tuple", bound=NamedTuple)
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function at its first call, and keep the machine code on disk for later processes.
+    """Compile a function at its first call, and cache the machine code on disk.
 
-    The copy on disk is renewed when the function's file changes, or that of a kernel it calls.
-
-    Arithmetic is IEEE 754 in the order written, so that a kernel gives the same bits on every computer; division by
-    zero
-    gives infinity, as in numpy.
+    The cache is renewed when the function's file changes, or that of a kernel it calls. Arithmetic is IEEE 754 in the
+    order
+    written, for the same bits on every computer; division by zero gives infinity.
     """
     return cast(_Function, _kernel(function))
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a function into every kernel that calls it.
-
-    There the shapes of a record's arrays are constants and the arrays do not overlap, so loops over several are
-    vectorised.
-    """
+    """Compile a function into its callers, where array shapes are constants and loops over several are vectorised."""
     return cast(_Function, _kernel(function, forceinline=True))
 
 
@@ -55,7 +49,7 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 
 def packed(parameters: NamedTuple) -> Packed:
-    """Return the record of `parameters`, (1,): one pointer for a kernel instead of many arguments.
+    """Return the record of `parameters`, (1,): one pointer for a kernel.
 
     Arrays are aligned to cache lines: a value across two lines takes twice as long to load.
     """
@@ -68,7 +62,7 @@ def packed(parameters: NamedTuple) -> Packed:
 
 
 def opened(record: Packed, kind: type[_Tuple]) -> _Tuple:
-    """Return a record's arrays as the named tuple that was packed, sharing its memory; nested records as tuples."""
+    """Return a record's arrays as the named tuple that was packed, sharing its memory."""
     return kind._make(_opened(record[name]) for name in kind._fields)
 
 
@@ -92,12 +86,12 @@ def _layout(parameters: Any) -> np.dtype[np.void]:
 
 @cache
 def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
-    """Return the first equal type: a kernel takes three times as long to recognise a copy."""
+    """Return the first equal type: kernels recognise it three times as fast as a copy."""
     return layout
 
 
 def on_compile(report: Callable[[int], None]) -> None:
-    """Call `report` with the number of functions compiled so far as each compilation begins."""
+    """Report the number of functions compiled so far as each compilation begins."""
     register("numba:compile", _Compiling(report))  # type: ignore[no-untyped-call]
 
 

@@ -1,4 +1,4 @@
-"""The functions of `elementary`, compiled: for other kernels, and ten times as fast from Python."""
+"""The functions of `elementary`, compiled, for other kernels and for Python."""
 
 from types import FunctionType
 

@@ -9,11 +9,7 @@ from typing import Any
 
 
 def public(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return `__getattr__` and `__dir__` of a package.
-
-    Public names (and `__all__`) are the imports of its `__init__.py` under `if TYPE_CHECKING:`, read at the first
-    access.
-    """
+    """Return `__getattr__` and `__dir__` of a package with the names that it imports under `if TYPE_CHECKING:`."""
 
     @cache
     def places() -> dict[str, str]:

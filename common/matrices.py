@@ -1,9 +1,8 @@
 """Small dense matrices in double precision with a fixed order of operations: the same bits on every computer.
 
-BLAS and LAPACK choose their code by the CPU, and with it the order of sums and the use of fused multiply-add. At sizes
-of 3 to 100 they are not faster.
-
-Matrices may have any strides but must be writable float64; results are new and C-ordered.
+BLAS and LAPACK choose their code by the CPU; at sizes of 3 to 100 they are not faster. Matrices may have any strides
+but
+must be writable float64; results are new and C-ordered.
 """
 
 from math import sqrt
@@ -22,7 +21,7 @@ _TAYLOR_NORM = 0.5
 
 @compiled
 def put(values: Array, out: Array) -> None:
-    """Write `values`, (n,), into `out`; `out[:] = values` takes seconds to compile for its error path."""
+    """Write `values` into `out`; `out[:] = values` takes seconds to compile for its error path."""
     for i in range(out.shape[0]):
         out[i] = values[i]
 
@@ -59,13 +58,12 @@ def dot(x: Array, y: Array) -> float:
 
 @compiled_for(f"float64({_VECTOR})")
 def norm(x: Array) -> float:
-    """Return the Euclidean length of x, (n,)."""
     return sqrt(dot(x, x))
 
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
 def solve(A: Array, B: Array) -> Array:
-    """Return X of A X = B, (n, m), by elimination with partial pivoting; not finite if A (n, n) is singular."""
+    """Return X of A X = B by elimination with partial pivoting; not finite if A is singular."""
     n, m = B.shape
     U, X = A.copy(), B.copy()
     for column in range(n):
@@ -94,7 +92,6 @@ def solve(A: Array, B: Array) -> Array:
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
 def inverse(A: Array) -> Array:
-    """Return the inverse of A, (n, n); not finite if A is singular."""
     return solve(A, np.eye(A.shape[0]))
 
 
@@ -111,7 +108,7 @@ def _max_column_sum(A: Array) -> float:
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
 def expm(A: Array) -> Array:
-    """Return the exponential of A, (n, n), by scaling and squaring of the Taylor series."""
+    """Return the exponential of A by scaling and squaring of the Taylor series."""
     squarings, size = 0, _max_column_sum(A)
     while _TAYLOR_NORM < size < np.inf:
         size, squarings = 0.5 * size, squarings + 1

@@ -1,8 +1,7 @@
 """Rotations of vectors and attitudes between body (FLU) and earth (ENU).
 
-Vectors and quaternions are tuples of floats: at these sizes several times faster than arrays, and immutable.
-Quaternions are wxyz, Hamilton, and rotate body vectors into the earth frame. Euler angles are Z-Y'-X'': yaw psi,
-pitch theta, roll phi.
+Vectors and quaternions are tuples of floats, several times faster than arrays at these sizes. Quaternions are wxyz,
+Hamilton, and rotate body vectors into the earth frame. Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
 """
 
 from math import degrees, floor, pi, sqrt
@@ -12,11 +11,6 @@ from colibri.common.types import Matrix, Quaternion, Vector
 
 
 def normalized(q: Quaternion) -> Quaternion:
-    """Scale a quaternion to unit length.
-
-    Raises:
-        ValueError: The quaternion is zero.
-    """
     w, x, y, z = q
     norm = sqrt(w * w + x * x + y * y + z * z)
     if norm == 0.0:
@@ -35,19 +29,17 @@ def rotation_matrix(q: Quaternion) -> Matrix:
 
 
 def tilt_deg(q: Quaternion) -> float:
-    """Return the angle between the body's z axis and the vertical, degrees."""
+    """Return the angle between the body's z axis and the vertical."""
     return degrees(acos(min(1.0, max(-1.0, rotation_matrix(q)[2][2]))))
 
 
 def earth_from_body(q: Quaternion, vector: Vector) -> Vector:
-    """Rotate a body vector into the earth frame."""
     (a, b, c), (d, e, f), (g, h, i) = rotation_matrix(q)
     x, y, z = vector
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
-    """Return the quaternion of roll `phi`, pitch `theta`, yaw `psi` (rad, Z-Y'-X'')."""
     cr, sr = cos(0.5 * phi), sin(0.5 * phi)
     cp, sp = cos(0.5 * theta), sin(0.5 * theta)
     cy, sy = cos(0.5 * psi), sin(0.5 * psi)
@@ -60,7 +52,7 @@ def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
 
 
 def euler_from_quaternion(q: Quaternion) -> Vector:
-    """Return (phi, theta, psi) in rad of a unit quaternion: theta in [-pi/2, pi/2], phi and psi in (-pi, pi]."""
+    """Return phi, theta, psi in rad: theta in [-pi/2, pi/2], the others in (-pi, pi]."""
     w, x, y, z = q
     phi = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     theta = asin(min(1.0, max(-1.0, 2.0 * (w * y - x * z))))
@@ -69,10 +61,7 @@ def euler_from_quaternion(q: Quaternion) -> Vector:
 
 
 def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
-    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7], of body `rate` (FLU, rad/s).
-
-    Singular at theta = ±pi/2.
-    """
+    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7]; singular at theta = ±pi/2."""
     p, q, r = rate
     s, c = sin(phi), cos(phi)
     swing = s * q + c * r
@@ -80,5 +69,5 @@ def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
 
 
 def nearest_turn(angle: float, reference: float) -> float:
-    """Add full turns to `angle` (rad) to bring it within half a turn of `reference` (rad)."""
+    """Add full turns to `angle`, rad, to bring it within half a turn of `reference`."""
     return angle - 2.0 * pi * floor((angle - reference) / (2.0 * pi) + 0.5)

@@ -14,7 +14,7 @@ def to_bytes(data: Any) -> bytes:
 
 
 def of_bytes(kind: type[Data], content: bytes) -> Data | None:
-    """Return the data of type `kind` encoded by `to_bytes`; `None` if the content is invalid."""
+    """Decode `to_bytes`; `None` if the content is invalid."""
     try:
         return msgspec.msgpack.decode(content, type=kind, dec_hook=_decoded)
     except (msgspec.DecodeError, TypeError, ValueError):
@@ -28,11 +28,7 @@ def _encoded(value: Any) -> Any:
 
 
 def _decoded(_kind: Any, value: Any) -> Any:
-    """Return an array, the only type that msgspec cannot decode itself.
-
-    Raises:
-        ValueError: Size and shape disagree.
-    """
+    """Return an array, the only type that msgspec cannot decode itself."""
     shape, content = value
     return np.frombuffer(content, dtype=np.float64).reshape(shape).copy()
 

@@ -1,7 +1,5 @@
 """Options of a flight as typed fields of frozen dataclasses, read from a command line, keywords or JSON.
 
-Command lines, keywords and checks are derived from a field's `Option`:
-
     latency: Annotated[float, Option("the delay of the link, one way", least=0.0, most=1000.0, unit="ms")] = 0.0
 
 Values are Python's, or command-line texts: `wind="5@270"`, `start={"x": 1.0}`.
@@ -28,50 +26,32 @@ S = TypeVar("S")
 
 
 class SpecError(Error):
-    """An unknown option or an invalid value; the message names both."""
+    """An unknown option or an invalid value."""
 
 
 class Option(NamedTuple):
-    """Description of an option beyond type and default.
-
-    Attributes:
-        help: One line for a user.
-        metavar: Placeholder on the command line; by default choices or unit.
-        unit: Of a number, in error messages.
-        least, above, most: Range of a number.
-        endless: Whether a number may be infinite, `max` as text.
-        read: Parser of a text; by default chosen by type.
-        flag: Name on the command line, if different.
-        on_command_line: Whether command lines have it.
-        keyword: Whether Python and campaigns have it.
-    """
+    """Description of an option beyond type and default."""
 
     help: str
-    metavar: str | None = None
+    metavar: str | None = None  # default: choices or name
     unit: str = ""
     least: float = -inf
     above: float = -inf
     most: float = inf
-    endless: bool = False
-    read: Callable[[str], Any] | None = None
-    flag: str | None = None
+    endless: bool = False  # may be infinite, `max` as text
+    read: Callable[[str], Any] | None = None  # parser of a text; default: by type
+    flag: str | None = None  # name on the command line, if different
     on_command_line: bool = True
-    keyword: bool = True
+    keyword: bool = True  # for Python and campaigns
 
 
 class Field(NamedTuple):
-    """An option of a specification.
-
-    Attributes:
-        kind: Type of the value, or of each of several, without `None`.
-        repeated: Whether the value is a tuple.
-        default: MISSING if a value is required.
-    """
+    """An option of a specification."""
 
     name: str
-    kind: Any
-    repeated: bool
-    default: Any
+    kind: Any  # of the value, or of each of several; without None
+    repeated: bool  # a tuple of values
+    default: Any  # MISSING if required
     option: Option
 
     @property
@@ -86,11 +66,7 @@ class Field(NamedTuple):
         return get_args(self.kind) if get_origin(self.kind) is Union else (self.kind,)
 
     def read(self, given: Any) -> Any:
-        """Return the value of a `given` Python value or text; `None` is the default.
-
-        Raises:
-            ArgumentTypeError: The value is invalid.
-        """
+        """Return the validated value of a Python value or text; `None` is the default."""
         if given is None or given == "":
             return self.default
         if not self.repeated:
@@ -99,11 +75,7 @@ class Field(NamedTuple):
         return tuple(map(self._one, given if several else (given,)))
 
     def read_text(self, text: str) -> Any:
-        """Return the value of a text (one item of a repeated option).
-
-        Raises:
-            ArgumentTypeError: The value is invalid.
-        """
+        """Return the value of a text, or of one of several."""
         if self.option.read is not None:
             return self.option.read(text)
         if self.choices:
@@ -203,13 +175,10 @@ def add_options(
     """Add the options of a specification to a command line.
 
     Args:
-        parser: Of the command line.
-        spec: The specification.
         leave_out: Fields to omit.
-        defaults: Defaults that replace the fields' own.
         shown: Defaults in words, by field.
         given_only: Whether omitted options set no attribute.
-        keywords_only: Whether the command has only the options of Python and campaigns, as it flies many flights.
+        keywords_only: Whether to add only the options of Python and campaigns.
     """
     for field in fields_of(spec).values():
         wanted = field.option.keyword if keywords_only else field.option.on_command_line
@@ -238,7 +207,6 @@ def _add(parser: ArgumentParser, field: Field, shown: Mapping[str, str], *, give
 
 
 def described(field: Field, default: str | None = None) -> str:
-    """Return an option's help with its default."""
     words = field.option.help
     if default is not None:
         return f"{words} (default: {default})"
@@ -250,7 +218,6 @@ def described(field: Field, default: str | None = None) -> str:
 
 
 def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:
-    """Return the specification of a parsed command line; `others` are further values."""
     given = vars(args) | others
     values = {name: given[name] for name in fields_of(spec) if name in given}
     return spec(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
@@ -262,11 +229,7 @@ def from_values(
     error: type[Error] = SpecError,
     only: Collection[str] | None = None,
 ) -> S:
-    """Return the specification of named values: Python's or command-line texts.
-
-    Raises:
-        error: An option is unknown, not in `only`, or invalid; names it.
-    """
+    """Return the specification of Python values or texts; raise `error` on an unknown or invalid option."""
     return spec(**read_values(spec, values, error, only))
 
 
@@ -276,7 +239,6 @@ def read_values(
     error: type[Error] = SpecError,
     only: Collection[str] | None = None,
 ) -> dict[str, Any]:
-    """Return validated values by name, see `from_values`."""
     known = fields_of(spec)
     for name in values:
         if name not in (known if only is None else only):
@@ -295,7 +257,6 @@ def _checked(field: Field, value: Any, error: type[Error]) -> Any:
 
 
 def keywords_of(spec: type) -> list[str]:
-    """Return the names of the options of Python and campaigns, sorted."""
     return sorted(name for name, field in fields_of(spec).items() if field.option.keyword)
 
 
@@ -310,11 +271,7 @@ def part_of(spec: object, kind: type[S], **others: Any) -> S:
 
 
 def plain_values(spec: object, *, whole: bool = False) -> dict[str, Any]:
-    """Return values as JSON types, without defaults unless `whole`; infinity is `max`.
-
-    Raises:
-        SpecError: A value is a Python object without a JSON form.
-    """
+    """Return values as JSON types, without defaults unless `whole`; raise `SpecError` for other objects."""
     values = {}
     for name, field in fields_of(type(spec)).items():
         value = getattr(spec, name)
@@ -336,20 +293,10 @@ def _plain(value: Any) -> Any:
 
 
 def to_json(spec: object) -> bytes:
-    """Return a specification as JSON.
-
-    Raises:
-        SpecError: A value is a Python object without a JSON form.
-    """
     return msgspec.json.encode(plain_values(spec))
 
 
 def from_json(spec: type[S], text: bytes) -> S:
-    """Return the specification encoded by `to_json`.
-
-    Raises:
-        SpecError: The text is invalid.
-    """
     try:
         values = msgspec.json.decode(text, type=dict[str, Any])
     except msgspec.MsgspecError as error:

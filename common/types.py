@@ -1,4 +1,4 @@
-"""Type aliases shared by all packages: arrays, vectors, values per rotor, addresses."""
+"""Type aliases shared by all packages."""
 
 from typing import TypeAlias
 

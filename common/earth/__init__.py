@@ -1,1 +1,1 @@
-"""The earth under a vehicle: geodesy, standard atmosphere, magnetic field, home."""
+"""Geodesy, standard atmosphere, magnetic field, home."""

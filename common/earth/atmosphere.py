@@ -12,21 +12,20 @@ METRES_PER_PASCAL = 0.0832
 
 
 def pressure_pa(altitude_m: float) -> float:
-    """Return the static pressure at an altitude above mean sea level; 0 above the model's top."""
+    """Return the static pressure at an altitude above mean sea level."""
     return _SEA_LEVEL_PA * power(max(0.0, 1.0 - _LAPSE_K_M * altitude_m / _SEA_LEVEL_K), _EXPONENT)
 
 
 def altitude_m(pressure_pa: float) -> float:
-    """Return the altitude above mean sea level of a static pressure; negative pressures count as 0."""
+    """Return the altitude above mean sea level of a static pressure; negative counts as 0."""
     return _SEA_LEVEL_K / _LAPSE_K_M * (1.0 - power(max(0.0, pressure_pa) / _SEA_LEVEL_PA, 1.0 / _EXPONENT))
 
 
 def altitude_slope_m_pa(pressure_pa: float) -> float:
-    """Return the (negative) derivative of `altitude_m`, m/Pa, at a positive pressure."""
+    """Return the derivative of `altitude_m`, m/Pa, at a positive pressure."""
     ratio = power(pressure_pa / _SEA_LEVEL_PA, 1.0 / _EXPONENT)
     return -_SEA_LEVEL_K / _LAPSE_K_M * ratio / (_EXPONENT * pressure_pa)
 
 
 def temperature_c(altitude_m: float) -> float:
-    """Return the temperature at an altitude above mean sea level, degrees Celsius."""
     return _SEA_LEVEL_K - _LAPSE_K_M * altitude_m - _ZERO_CELSIUS_K

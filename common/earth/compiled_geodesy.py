@@ -1,4 +1,4 @@
-"""The conversions of `geodesy`, compiled, for every GPS fix; the same bits."""
+"""The conversions of `geodesy`, compiled; the same bits."""
 
 from functools import partial
 

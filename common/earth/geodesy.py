@@ -1,6 +1,6 @@
 """Latitude and longitude ⇄ metres east and north of an origin: the azimuthal equidistant projection of a sphere.
 
-Projection and radius are PX4's and its ground stations', so that all agree on a waypoint. Altitude is not projected.
+Projection and radius are PX4's and its ground stations'. Altitude is not projected.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,6 @@ def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
 def offset_m(
     latitude_deg: float, longitude_deg: float, first_latitude_deg: float, first_longitude_deg: float
 ) -> tuple[float, float]:
-    """Return the offset east and north from the first place, m."""
     latitude, first = radians(latitude_deg), radians(first_latitude_deg)
     along = radians(longitude_deg - first_longitude_deg)
     cosine = sin(first) * sin(latitude) + cos(first) * cos(latitude) * cos(along)
@@ -53,7 +52,7 @@ def offset_m(
 def place_deg(
     east_m: float, north_m: float, distance_m: float, first_latitude_deg: float, first_longitude_deg: float
 ) -> tuple[float, float]:
-    """Return latitude and longitude at an offset (of positive length `distance_m`) from the first place."""
+    """Return latitude and longitude of an offset with positive length `distance_m`."""
     angle, first = distance_m / EARTH_RADIUS_M, radians(first_latitude_deg)
     latitude = asin(cos(angle) * sin(first) + north_m * sin(angle) * cos(first) / distance_m)
     longitude = radians(first_longitude_deg) + atan2(
@@ -63,7 +62,7 @@ def place_deg(
 
 
 def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[float, float]] = offset_m) -> Vector:
-    """Return the position of `place` from `origin`, m, ENU; `offset` may be a compiled `offset_m`."""
+    """Return the position of `place` from `origin`, m, ENU."""
     east, north = offset(place.latitude_deg, place.longitude_deg, origin.latitude_deg, origin.longitude_deg)
     return (east, north, place.altitude_m - origin.altitude_m)
 
@@ -71,7 +70,6 @@ def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[flo
 def geodetic_of(
     position_enu_m: Vector, origin: Geodetic, *, place: Callable[..., tuple[float, float]] = place_deg
 ) -> Geodetic:
-    """Return the place at `position_enu_m` from `origin`; `place` may be a compiled `place_deg`."""
     east, north, up = position_enu_m
     distance = hypot(east, north)
     latitude_deg, longitude_deg, altitude_m = origin

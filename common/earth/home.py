@@ -10,17 +10,12 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -500.0, 10_000.0
 
 
 class HomePlace(NamedTuple):
-    """Initial place of the vehicle, and origin of the ENU frame.
-
-    Attributes:
-        altitude_m: Above mean sea level.
-        yaw_deg: Heading, clockwise from north.
-    """
+    """Initial place of the vehicle, and origin of the ENU frame."""
 
     latitude_deg: float
     longitude_deg: float
-    altitude_m: float
-    yaw_deg: float
+    altitude_m: float  # above mean sea level
+    yaw_deg: float  # clockwise from north
 
     @property
     def origin(self) -> Geodetic:

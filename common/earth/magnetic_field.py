@@ -21,10 +21,7 @@ _MIN_HEIGHT_KM, _MAX_HEIGHT_KM = -1.0, 850.0
 
 @lru_cache(maxsize=64)
 def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
-    """Return the magnetic field at `place`, gauss, ENU of true north.
-
-    The altitude is clamped to the model's range, -1 to 850 km; `year` is decimal, 2025 to 2030.
-    """
+    """Return the field in ENU of true north; the altitude is clamped to -1 to 850 km, `year` is decimal."""
     altitude_km = min(max(place.altitude_m / 1e3, _MIN_HEIGHT_KM), _MAX_HEIGHT_KM)
     field = GeoMag(coefficients_data=WMM_2025).calculate(
         glat=place.latitude_deg, glon=place.longitude_deg, alt=altitude_km, time=year
@@ -33,5 +30,5 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
 
 
 def _gauss(field_nt: float) -> float:
-    """Return a component rounded far below the model's accuracy: the last bits of libm differ by computer."""
+    """Round far below the model's accuracy: the last bits of libm differ by computer."""
     return round(field_nt, _DECIMALS_NT) * _GAUSS_PER_NT

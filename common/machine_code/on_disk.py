@@ -25,10 +25,7 @@ _NOWHERE = (
 
 
 class MachineCode:
-    """The machine code of one kernel. The folder is located on first use.
-
-    Most kernels never need it: their code is part of their callers'.
-    """
+    """The machine code of one kernel, located on first use: most kernels are part of their callers' code."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
@@ -61,7 +58,7 @@ class _OnDisk(FunctionCache):
 
 @cache
 def _use_private_folder() -> bool:
-    """Keep machine code of this process and its children in the private folder; return success."""
+    """Use the private folder in this process and its children, if possible."""
     folder = private_folder()
     if folder is not None:
         config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]
@@ -89,5 +86,4 @@ def files_of(function: Callable[..., Any]) -> set[str]:
 
 @cache
 def hash_of(file: str) -> str:
-    """Return the hash of a file at the first call."""
     return sha256(Path(file).read_bytes()).hexdigest()

@@ -1,4 +1,4 @@
-"""A private temporary folder, the fallback if all other folders are read-only."""
+"""A private temporary folder, for read-only homes."""
 
 import os
 from pathlib import Path
@@ -7,10 +7,7 @@ from tempfile import gettempdir
 
 
 def private_folder() -> Path | None:
-    """Return this user's temporary folder, created if missing; `None` if impossible.
-
-    Code in it is executed, so the folder must belong to this user and be writable by this user only.
-    """
+    """Return this user's temporary folder, or `None`. As its code is executed, only the user may write to it."""
     try:
         folder = Path(gettempdir()) / f"colibri-{os.getuid()}"
         folder.mkdir(0o700, exist_ok=True)

@@ -1,7 +1,7 @@
-"""Compilation results on disk, in a form that loads without numba's front end.
+"""Compilation results on disk, loaded without numba's front end.
 
-By default, numba imports its compiler and SciPy before it loads the first kernel, and parses each kernel's intermediate
-code, which only the compilation of a caller needs.
+numba itself imports its compiler and SciPy before it loads the first kernel, and parses intermediate code that only the
+compilation of a caller needs.
 """
 
 from functools import cache
@@ -18,36 +18,24 @@ _EMPTY = Environment({})
 
 
 class _Kept(NamedTuple):
-    """A kernel that can be loaded without numba's front end.
-
-    Attributes:
-        name: Of its code library.
-        intermediate_code: For inlining into callers.
-        defined: Names of its functions and globals.
-        needed: Names of external symbols: of Python, the C library, numba's runtime.
-        environments: Names of further environments it uses; they are empty.
-        description: Of arguments and result.
-        environment: The Python objects that it uses.
-        signature: The types.
-    """
+    """A kernel that can be loaded without numba's front end."""
 
     name: str
     machine_code: bytes
-    intermediate_code: bytes
-    defined: list[str]
-    needed: list[str]
-    environments: list[str]
-    description: Any
-    environment: Any
+    intermediate_code: bytes  # for inlining into callers
+    defined: list[str]  # its functions and globals
+    needed: list[str]  # external symbols
+    environments: list[str]  # further ones that it uses, all empty
+    description: Any  # of arguments and result
+    environment: Any  # the Python objects that it uses
     signature: Any
 
 
 class Results(CompileResultCacheImpl):
     """Writer and reader of compilation results for numba.
 
-    Attributes:
-        version: Of all inputs of a result. It is stored with each result: two versions that write at once may leave the
-            index of one and the result of the other.
+    `version` covers all inputs. It is stored with each result: two versions that write at once may mix index and
+    result.
     """
 
     version: tuple[str, ...] = ()
@@ -65,7 +53,7 @@ class Results(CompileResultCacheImpl):
         return super().rebuild(target_context, kept)
 
     def _kept(self, cres: Any) -> Any:
-        """Return a `_Kept` if it holds all of the result, otherwise numba's own reduction."""
+        """Return a `_Kept` if it suffices, otherwise numba's own reduction."""
         whole = super().reduce(cres)
         (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
         object_mode, lifted, _, reload_init, environments = others
@@ -104,8 +92,6 @@ def _loaded(target_context: Any, kept: _Kept) -> Any:
 
 
 class _Library(JITCodeLibrary):
-    """A kernel's code from disk; intermediate code is parsed when a caller is compiled."""
-
     def __init__(self, codegen: Any, kept: _Kept) -> None:
         super().__init__(codegen, kept.name)
         self._intermediate_code = kept.intermediate_code
@@ -122,12 +108,12 @@ class _Library(JITCodeLibrary):
 
 @cache
 def _name_runtime() -> None:
-    """Register numba's runtime with LLVM; numba's own registration also compiles the runtime."""
+    """Register numba's runtime with LLVM; numba would also compile it."""
     for name, address in _nrt_python.c_helpers.items():
         add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 @cache
 def _is_loaded(name: str) -> bool:
-    """Return whether a symbol exists in this process: LLVM aborts on a missing one."""
+    """Check a symbol: LLVM aborts on a missing one."""
     return address_of_symbol(name) is not None

@@ -10,7 +10,7 @@ from colibri.common.process.lifecycle import fail
 
 
 class ArgumentParser(argparse.ArgumentParser):
-    """A parser with one-line errors and exit code 2, and with values like `-33.9,` accepted."""
+    """A parser with one-line errors and exit code 2; `-33.9,` is a value."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)

@@ -21,7 +21,6 @@ def keep_failure(error: Error, folder: Path | None) -> str:
 
 
 def failure_text(error: Error, file: str) -> tuple[str, str]:
-    """Return an error's line for the user, and the content of its `file`."""
     line, raised = str(error), ""
     if isinstance(error, ForeignError) and error.__cause__ is not None:
         line, raised = f"{line}; its traceback is in {file}", "".join(format_exception(error.__cause__))
@@ -29,7 +28,6 @@ def failure_text(error: Error, file: str) -> tuple[str, str]:
 
 
 def kept_failure(folder: Path) -> str | None:
-    """Return the reason of an early end of the flight in `folder`, if recorded."""
     try:
         return (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0] or None
     except (OSError, UnicodeDecodeError):

@@ -8,19 +8,14 @@ from colibri.common.errors import Error
 
 
 class FolderInUseError(Error):
-    """The folder is locked by another process; the message names it."""
+    """The folder is locked by another process."""
 
 
 class FolderLock:
-    """An exclusive lock on a folder, without a lock file; released by the system when the process ends."""
+    """An exclusive lock on a folder, released by the system when the process ends."""
 
     def __init__(self, folder: Path, option: str) -> None:
-        """Lock `folder`, created if missing; errors name its command-line `option`.
-
-        Raises:
-            FolderInUseError: The folder is locked by another process.
-            OSError: The folder cannot be created or read.
-        """
+        """Lock `folder`, created if missing, or raise `FolderInUseError` with the command-line `option`."""
         folder.mkdir(parents=True, exist_ok=True)
         self._folder: int | None = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:

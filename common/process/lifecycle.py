@@ -1,4 +1,4 @@
-"""Process life cycle: one-line errors, exit codes, quick end, one thread, no garbage-collection pauses."""
+"""Process life cycle: errors, exit codes, quick end, one thread, no garbage-collection pauses."""
 
 import atexit
 import gc
@@ -17,28 +17,24 @@ EXIT_INTERRUPTED = 130
 
 
 def use_one_thread() -> None:
-    """Limit linear algebra to one thread; call before numpy is loaded.
-
-    At a dozen states further threads only spin, on cores that the flight needs.
-    """
+    """Limit linear algebra, before numpy is loaded: at a dozen states further threads only take cores."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def use_safe_path() -> None:
-    """Keep the working directory off the module path of child processes: its files must not shadow modules."""
+    """Keep the working directory, with possible namesakes, off the module path of child processes."""
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
 def escape_what_no_stream_encodes() -> None:
-    """Escape characters that standard output and error cannot encode, instead of raising."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def nudge_m() -> float:
-    """Return the offset of every flight's start, m: COLIBRI_NUDGE_M, which tests the tests; default 0."""
+    """Return the offset of every flight's start, m: COLIBRI_NUDGE_M, which tests the tests."""
     return float(os.environ.get("COLIBRI_NUDGE_M", "0"))
 
 
@@ -58,8 +54,9 @@ def loading() -> Iterator[None]:
 def gc_frozen() -> Iterator[None]:
     """Exclude all existing objects from garbage collection, to save flight time.
 
-    Existing garbage, about a thousand objects, stays until the end: collecting it would add 0.15 s to every start. If
-    objects are already frozen (in a process with many flights), this changes nothing.
+    Collecting their garbage, about a thousand objects, would add 0.15 s to every start. Objects that are frozen already
+    stay
+    so.
     """
     ours = not gc.get_freeze_count()
     if ours:
@@ -73,10 +70,7 @@ def gc_frozen() -> Iterator[None]:
 
 
 def freeze_once() -> None:
-    """Freeze all objects at the first call; afterwards collect the garbage of previous flights.
-
-    For processes with many flights: freezing each one's garbage would leak it.
-    """
+    """Freeze all objects at the first call; later calls collect the garbage of previous flights."""
     if gc.get_freeze_count():
         gc.collect()
     else:
@@ -85,7 +79,7 @@ def freeze_once() -> None:
 
 
 def end_quickly() -> None:
-    """Skip the final garbage collection over all loaded modules, which takes a third of a second."""
+    """Skip the final garbage collection, a third of a second."""
     atexit.unregister(gc.freeze)
     atexit.register(gc.freeze)
 
@@ -101,14 +95,12 @@ _PARENT_EVERY = 8
 
 
 class Stop:
-    """True once the process should end: on SIGINT, SIGTERM, or optionally the parent's death."""
+    """True once the process should end: on SIGINT, SIGTERM, or the parent's death."""
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
-        """Handle SIGINT and SIGTERM; with `starting` they end the process at once until the first check.
+        """Handle signals; with `starting` they end the process at once until the first check.
 
-        A loading process has nothing to clean up, and may not check for seconds. The parent passes its own id because
-        it may
-        die before this process reads it.
+        The parent passes its own id because it may die before this process reads it.
         """
         self._signalled = False
         self._starting = starting

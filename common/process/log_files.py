@@ -10,17 +10,11 @@ from colibri.common.process.lifecycle import fail
 
 
 class LogError(InFlightError):
-    """A log can no longer be written; the message names its file."""
+    """A log can no longer be written."""
 
 
 def set_aside(*paths: Path) -> None:
-    """Rename finished logs so that new ones can begin: flight.ulg becomes flight-1.ulg.
-
-    All get the same number, the first that is free for each; missing files are skipped.
-
-    Raises:
-        LogError: A file cannot be renamed.
-    """
+    """Rename finished logs, with one free number for all: flight.ulg becomes flight-1.ulg."""
     number = 1
     while any(_numbered(path, number).exists() for path in paths):
         number += 1
@@ -39,7 +33,6 @@ class LogFile:
     """A file of records, each written whole or not at all, in order."""
 
     def __init__(self, path: Path, how: Literal["wb", "ab"] = "wb") -> None:
-        """Open the file and create its folder, or end the process with one line."""
         self._path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -48,11 +41,7 @@ class LogFile:
             fail(f"cannot write {path}: {error.strerror}")
 
     def append(self, *records: bytes) -> None:
-        """Append records at once; ignored after a failure.
-
-        Raises:
-            LogError: The write failed, for instance on a full disk; the file keeps all whole records.
-        """
+        """Append records at once, ignored after a failure; raise `LogError` if the disk is full."""
         if self._file.closed:
             return
         block, written = b"".join(records), 0
@@ -70,7 +59,7 @@ class LogFile:
 
 
 class BlockLog(LogFile):
-    """A file written `BLOCK` records at a time: a killed process loses the records since the last block."""
+    """A file written `BLOCK` records at a time: a killed process loses those since the last block."""
 
     BLOCK = 64
 
@@ -89,7 +78,7 @@ class BlockLog(LogFile):
             self.append(*waiting)
 
     def close(self) -> None:
-        """Write pending records if possible, and close; call `flush` first to detect failure."""
+        """Write pending records if possible, and close; `flush` first to detect failure."""
         with suppress(LogError):
             self.flush()
         super().close()

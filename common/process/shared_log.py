@@ -8,19 +8,10 @@ from colibri.common.process.log_files import LogError, LogFile
 
 
 class SharedLog(LogFile):
-    """A log that continues while any process has it open, so a restarted autopilot appends to its flight's log."""
+    """A log that continues while any process has it open, for restarted autopilots."""
 
     def __init__(self, path: Path, beginning: bytes, *, goes_on: bool = False) -> None:
-        """Open the file and create its folder, or end the process with one line.
-
-        Args:
-            path: The file.
-            beginning: Written first in a new file.
-            goes_on: Whether to append to an existing file even if it is not open in any process.
-
-        Raises:
-            LogError: The beginning cannot be written.
-        """
+        """Open the file; write `beginning` if it is new; with `goes_on` append even if it is not open elsewhere."""
         super().__init__(path, "ab")
         try:
             is_alone = _is_alone(self._file.fileno())
@@ -34,17 +25,13 @@ class SharedLog(LogFile):
 
 
 def remove_unused(path: Path) -> None:
-    """Remove a shared log that no process has open."""
     with suppress(OSError), path.open("rb") as file:
         if _is_alone(file.fileno()):
             path.unlink()
 
 
 def _is_alone(file: int) -> bool:
-    """Return whether the file is open here only, and then lock others out; wait for a process that is creating it.
-
-    Without file locks this is unknown: return False.
-    """
+    """Return whether the file is open here only, and then lock others out; `False` without file locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,7 +1,7 @@
 """A file of two slots that survives a crash at any instant with the last complete write.
 
-The file is memory-mapped, so the system has a write at once, even if the process is killed right after. Slots are
-written alternately with number and checksum, so one is always whole. Only a power failure may lose more.
+The file is memory-mapped, so the system has a write at once. Slots are written alternately with number and checksum, so
+one is always whole. Only a power failure may lose more.
 """
 
 from mmap import mmap
@@ -18,16 +18,10 @@ MAX_BYTES = SLOT - _HEAD.size
 
 
 class Slots:
-    """The newest of a sequence of contents, on disk."""
+    """The newest content, on disk."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file; create it if it is missing or has another size.
-
-        All of it is written once: a page without disk space would later end the process by SIGBUS.
-
-        Raises:
-            OSError: The file cannot be created, read or written.
-        """
+        """Open or create the file. All of it is written: a page without disk space would later raise SIGBUS."""
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("r+b" if path.exists() else "w+b") as file:
             content = file.read()
@@ -44,7 +38,7 @@ class Slots:
         return max(self._whole(), default=(0, None))[1]
 
     def write(self, content: bytes) -> bool:
-        """Replace the older slot by `content`; return whether it fits."""
+        """Replace the older slot by `content`, if it fits."""
         if len(content) > MAX_BYTES:
             return False
         number = self._number + 1

@@ -31,15 +31,10 @@ class ProcessSpec:
 
 
 class Starter(NamedTuple):
-    """The starter of a process.
+    """The starter of a process, which ends with its `parent`."""
 
-    Attributes:
-        as_json: Whether the starter reads status as JSON lines on standard output.
-        parent: Process id; this process ends with it. `None` if started by a user.
-    """
-
-    as_json: bool = False
-    parent: int | None = None
+    as_json: bool = False  # status as JSON lines on standard output
+    parent: int | None = None  # process id
 
 
 def add_process_options(parser: ArgumentParser) -> None:
@@ -51,10 +46,7 @@ def add_process_options(parser: ArgumentParser) -> None:
 
 
 def read_process(spec: type[S], args: Namespace) -> tuple[S, Starter]:
-    """Return specification and starter from the command line, or with `--spec` from JSON on standard input.
-
-    An invalid specification ends the process with one line.
-    """
+    """Read the command line, or with `--spec` JSON from standard input."""
     starter = Starter(args.json, args.parent)
     if not args.spec:
         return from_namespace(spec, args), starter

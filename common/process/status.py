@@ -15,7 +15,7 @@ class Status:
         self._stream: TextIO | None = None
 
     def take_standard_output(self) -> None:
-        """Reserve standard output for status lines; redirect other output to standard error."""
+        """Reserve standard output for status; redirect other output to standard error."""
         self._stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
 
@@ -36,7 +36,7 @@ class Silent(Status):
 
 
 def _print(stream: TextIO, line: str) -> None:
-    """Print a line; if the reader has gone, discard all further output: `Stop` detects the parent's end."""
+    """Print a line; if the reader has gone, discard all further output."""
     try:
         stream.write(line + "\n")
         stream.flush()

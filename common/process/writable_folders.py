@@ -7,7 +7,7 @@ from colibri.common.machine_code.private_folder import private_folder
 
 
 def use_writable_folders() -> None:
-    """Move matplotlib's settings and fonts to the private folder if the home is read-only: it would warn."""
+    """Move matplotlib's cache to the private folder if the home is read-only."""
     if os.environ.get("MPLCONFIGDIR"):
         return
     try:
@@ -24,6 +24,6 @@ def use_writable_folders() -> None:
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Return whether files can be created in a folder, which may not exist yet."""
+    """Whether files can be created in a folder, which may be missing."""
     there = next(path for path in (folder, *folder.absolute().parents) if os.path.exists(path))
     return there.is_dir() and os.access(there, os.W_OK | os.X_OK)

@@ -10,21 +10,16 @@
 
 Theory
 ------
-MAVLink datagrams may be lost, duplicated and reordered. Losing one of a stream costs little. Requests
-(https://mavlink.io/en/services/) are repeated by the client until the vehicle answers, and the vehicle recognises
-repetitions. So a `Conversation` is a state machine with two inputs: `poll(now)` returns the current request when it is
-due, first at once and then after each silence; `receive(message)` reads an answer, which ends the conversation or moves
-it to its next request. After too many unanswered requests the result is UNANSWERED. `receive` never sends, so
-duplicate answers cause one request only.
+MAVLink datagrams may be lost, duplicated and reordered. Requests (https://mavlink.io/en/services/) are repeated by the
+client until the vehicle answers, and the vehicle recognises repetitions. So a `Conversation` has two inputs:
+`poll(now)` returns the current request when it is due, first at once and then after each silence; `receive(message)`
+reads an answer, which ends the conversation or moves it to its next request. `receive` never sends, so duplicate
+answers cause one request only.
 
-An answer does not identify its request: a COMMAND_ACK has only the number of the command, a MISSION_ACK the type of the
-plan. Conversations with indistinguishable answers share a *lane* and take turns; different lanes run side by side. An
-old answer may still arrive during the next conversation of its lane. It is ignored if its content shows its age (an
-acknowledgement before the last item was sent, the value from before the change); an old answer to a repeated command
-cannot be recognised.
-
-A vehicle is found by its HEARTBEAT and lost after a silence. With a key (`Signing`) the client signs its messages and
-drops unsigned ones.
+An answer does not identify its request: a COMMAND_ACK has only the number of the command. Conversations with
+indistinguishable answers share a *lane* and take turns; different lanes run side by side. An old answer that arrives
+during the next conversation of its lane is ignored if its content shows its age (an acknowledgement before the last
+item was sent, the value from before the change); for a repeated command this is impossible.
 """
 
 from collections import Counter, deque
@@ -52,33 +47,23 @@ Talk = TypeVar("Talk", bound=Conversation)
 
 
 class Vehicle(NamedTuple):
-    """Identity of a vehicle.
-
-    Attributes:
-        system: System id.
-        autopilot: MAV_AUTOPILOT.
-        kind: MAV_TYPE.
-        heartbeat_us: Arrival of its last HEARTBEAT.
-        capabilities: MAV_PROTOCOL_CAPABILITY bits of its AUTOPILOT_VERSION; `None` before the first.
-        uid2: Unique id of its AUTOPILOT_VERSION; empty before the first.
-    """
+    """Identity of a vehicle."""
 
     system: int
-    autopilot: int
-    kind: int
-    heartbeat_us: int
+    autopilot: int  # MAV_AUTOPILOT
+    kind: int  # MAV_TYPE
+    heartbeat_us: int  # of the last HEARTBEAT
     lost: bool = False
-    capabilities: int | None = None
+    capabilities: int | None = None  # MAV_PROTOCOL_CAPABILITY bits
     uid2: bytes = b""
 
     @property
     def target(self) -> tuple[int, int]:
-        """System and component of its autopilot."""
         return self.system, AUTOPILOT_COMPONENT
 
 
 class Found(NamedTuple):
-    """The first HEARTBEAT of a vehicle, or the first after it was lost."""
+    """A vehicle's first HEARTBEAT, or the first after it was lost."""
 
     vehicle: Vehicle
 
@@ -99,13 +84,7 @@ Event: TypeAlias = Found | Lost | Ended
 
 
 class Client:
-    """A MAVLink component in conversation with any number of vehicles.
-
-    Attributes:
-        source: Own system and component id.
-        vehicles: By system id, in the order of discovery.
-        dropped: Malformed or badly signed input, counted by reason.
-    """
+    """A MAVLink component in conversation with any number of vehicles."""
 
     def __init__(
         self,
@@ -117,14 +96,11 @@ class Client:
         only: int = 0,
         all_components: bool = False,
     ) -> None:
-        """Create a component of MAV_TYPE `kind`; `only`, unless 0, is the one system id to receive.
-
-        With `all_components`, `receive` also returns messages of components other than autopilots.
-        """
-        self.source = (system, component)
-        self.vehicles: dict[int, Vehicle] = {}
+        """Create a component of MAV_TYPE `kind`; by default it receives all systems, but only autopilots."""
+        self.source = (system, component)  # own system and component id
+        self.vehicles: dict[int, Vehicle] = {}  # by system id
         self._codec = Codec(system, component)
-        self.dropped: Counter[str] = self._codec.dropped
+        self.dropped: Counter[str] = self._codec.dropped  # invalid input, by reason
         self._heartbeat_every_us = heartbeat_every_us
         self._kind, self._only, self._all_components = kind, only, all_components
         self._heartbeat_at_us: int | None = None
@@ -138,7 +114,7 @@ class Client:
         return next(iter(self.vehicles.values()), None)
 
     def sign_with(self, signing: Signing | None) -> None:
-        """Sign outgoing messages and drop those without a valid signature; `None` turns both off."""
+        """Sign outgoing messages and drop those without a valid signature."""
         self._signing = signing
         self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
 
@@ -148,7 +124,6 @@ class Client:
         return conversation
 
     def cancel(self, conversation: Conversation) -> None:
-        """Abandon a conversation without an event; ignored if it has ended."""
         key = (conversation.target, conversation.lane)
         lane = self._lanes.get(key, [])
         if conversation in lane:
@@ -160,7 +135,6 @@ class Client:
         return self._codec.encode(name, *fields)
 
     def receive(self, datagram: bytes, now_us: int) -> list[Message]:
-        """Return the vehicles' messages in a datagram."""
         self._now_us = now_us
         messages = []
         for message in self._codec.decode(datagram):
@@ -181,7 +155,6 @@ class Client:
         return messages
 
     def poll(self, now_us: int) -> list[bytes]:
-        """Return the due datagrams: HEARTBEAT and requests."""
         self._now_us = now_us
         datagrams = []
         if self._heartbeat_every_us is not None and now_us >= (self._heartbeat_at_us or now_us):
@@ -206,7 +179,6 @@ class Client:
         return datagrams
 
     def take_events(self) -> list[Event]:
-        """Return the events since the last call; of very many the newest."""
         events = list(self._events)
         self._events.clear()
         return events

@@ -1,8 +1,8 @@
 """Estimation of the vehicle's clock offset and of round-trip time by TIMESYNC.
 
-Of recent exchanges the quickest gives the offset, as delay disturbs the others (clock filter of RFC 5905, section 10).
-An older exchange must be quicker by the possible drift since. A simulator's clock may drift by percents, so a
-significant drift is estimated and compensated. https://mavlink.io/en/services/timesync.html
+The quickest of recent exchanges gives the offset, as delay disturbs the others (clock filter of RFC 5905, section 10).
+An older exchange must be quicker by the possible drift since. A significant drift (of simulators, percents) is
+estimated and compensated. https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
@@ -55,23 +55,18 @@ class VehicleClock:
 
     @property
     def round_trip_us(self) -> int:
-        """The median round-trip time, µs; 0 before the first exchange."""
+        """The median round-trip time, µs."""
         trips = sorted(exchange.round_trip_us for exchange in self._exchanges)
         return trips[len(trips) // 2] if trips else 0
 
     def own_us(self, vehicle_us: int) -> int:
-        """Convert a time of the vehicle's clock to the own clock.
-
-        Raises:
-            ValueError: Before the first exchange.
-        """
+        """Convert a time of the vehicle's clock to the own; raise `ValueError` before the first exchange."""
         if self._best is None:
             raise ValueError("no TIMESYNC has been answered")
         own_us = vehicle_us - self._best.offset_us
         return own_us - round(self._drift * (own_us - self._best.received_us))
 
     def request(self, now_us: int) -> tuple[int, int] | None:
-        """Return the fields of a TIMESYNC if one is due."""
         if self._next_us is not None and now_us < self._next_us:
             return None
         self._next_us = now_us + _EVERY_US
@@ -100,7 +95,7 @@ class VehicleClock:
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
-        """Return whether delay cannot explain the change of the offset: the vehicle was restarted."""
+        """Whether delay cannot explain the change of the offset: the vehicle was restarted."""
         best = self._best
         if best is None:
             return False

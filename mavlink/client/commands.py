@@ -14,19 +14,14 @@ _PARAMS, _INT_PARAMS = 7, 4
 
 
 class Command(Conversation):
-    """A COMMAND_LONG; `result` is its MAV_RESULT.
-
-    Attributes:
-        number: MAV_CMD.
-        progress: Percent, once reported.
-    """
+    """A COMMAND_LONG; `result` is its MAV_RESULT."""
 
     answers = frozenset({"COMMAND_ACK"})
 
     def __init__(self, target: Target, number: int, *params: float, repeat: Repeat = USUALLY) -> None:
         super().__init__(target, ("command", number), repeat)
         self.number = number
-        self.progress: int | None = None
+        self.progress: int | None = None  # percent
         self._params = padded(params, _PARAMS)
 
     def _read(self, message: Message) -> None:

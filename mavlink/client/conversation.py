@@ -19,15 +19,10 @@ _AT_ONCE = -(2**63)
 
 
 class Repeat(NamedTuple):
-    """Repetition of requests.
-
-    Attributes:
-        every_us: Time between requests, and after the last one until the vehicle counts as silent.
-        tries: Requests without any answer.
-    """
+    """Repetition of requests."""
 
     every_us: int = 500_000
-    tries: int = 10
+    tries: int = 10  # without any answer
 
 
 USUALLY = Repeat()
@@ -37,19 +32,14 @@ class Conversation(ABC):
     """A request to a vehicle and its course until the result.
 
     A subclass returns the messages of its current request and reads the answers.
-
-    Attributes:
-        lane: Distinguishes its answers from others'; see `client`.
-        answers: Names of the messages that answer it.
-        result: The protocol's result code, or UNANSWERED; `None` until the end.
     """
 
-    answers: ClassVar[frozenset[str]]
+    answers: ClassVar[frozenset[str]]  # names of messages
 
     def __init__(self, target: Target, lane: Hashable, repeat: Repeat) -> None:
         self.target = target
-        self.lane = lane
-        self.result: int | None = None
+        self.lane = lane  # distinguishes its answers from others', see `client`
+        self.result: int | None = None  # the protocol's code, or UNANSWERED
         self._repeat = repeat
         self._sent = self._now_us = 0
         self._due_us = _AT_ONCE
@@ -80,9 +70,7 @@ class Conversation(ABC):
         """Return the current request; `_sent` counts its transmissions including this one."""
 
     def _go_on(self) -> None:
-        """Send the next request at the next poll."""
         self._sent, self._due_us = 0, _AT_ONCE
 
     def _wait(self, longer_us: int) -> None:
-        """Wait for the rest of an answer."""
         self._sent, self._due_us = 0, self._now_us + longer_us

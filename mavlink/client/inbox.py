@@ -8,14 +8,10 @@ from colibri.mavlink.wire.dialect import Message, mav
 
 
 class Heard(dict[str, list[Any]]):
-    """Fields of received messages by name, the latest last; empty for messages not received yet."""
+    """Fields of received messages by name; empty for messages not received yet."""
 
     def __missing__(self, name: str) -> list[Any]:
-        """Return an empty list for a message of the dialect.
-
-        Raises:
-            ValueError: The name is unknown.
-        """
+        """Return an empty list, or raise `ValueError` for a name outside the dialect."""
         names = [it.msgname for it in mav.mavlink_map.values()]
         if name not in names:
             near = get_close_matches(name, names)
@@ -25,22 +21,15 @@ class Heard(dict[str, list[Any]]):
 
 
 class Inbox:
-    """The messages received from a vehicle.
-
-    Attributes:
-        heard: Fields of messages by name, the latest last.
-        counts: Numbers of received messages by name.
-        acks: Every COMMAND_ACK, in order, for any receiver.
-        texts: Every STATUSTEXT, in order.
-    """
+    """The messages received from a vehicle."""
 
     def __init__(self, remembers: int = 20_000) -> None:
-        """Keep at most `remembers` messages of a name; on overflow the older half is deleted."""
+        """Keep at most `remembers` messages of a name; on overflow delete the older half."""
         self._remembers = remembers
-        self.heard = Heard()
+        self.heard = Heard()  # fields by name, the latest last
         self.counts: Counter[str] = Counter()
-        self.acks: list[Any] = []
-        self.texts: list[str] = []
+        self.acks: list[Any] = []  # every COMMAND_ACK, for any receiver
+        self.texts: list[str] = []  # every STATUSTEXT
 
     def latest(self, name: str) -> Any:
         """Return the last message of a name, as its fields."""

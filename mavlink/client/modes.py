@@ -10,17 +10,11 @@ _CUSTOM = float(mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
 
 
 class FlightMode(NamedTuple):
-    """A flight mode of an autopilot.
-
-    Attributes:
-        name: As in its ground stations.
-        custom: `custom_mode` of its HEARTBEAT.
-        command: Parameters 1 to 3 of MAV_CMD_DO_SET_MODE.
-    """
+    """A flight mode, named as in ground stations."""
 
     name: str
-    custom: int
-    command: tuple[float, float, float]
+    custom: int  # `custom_mode` of HEARTBEAT
+    command: tuple[float, float, float]  # MAV_CMD_DO_SET_MODE's parameters 1 to 3
 
 
 def _px4(name: str, main: int, sub: int = 0) -> FlightMode:
@@ -75,6 +69,5 @@ def mode_named(autopilot: int | None, name: str) -> FlightMode | None:
 
 
 def mode_name(autopilot: int, custom_mode: int) -> str:
-    """Return the name of a HEARTBEAT's mode, or its number if unknown."""
     names = (mode.name for mode in MODES.get(autopilot, {}).values() if mode.custom == custom_mode)
     return next(names, f"mode {custom_mode}")

@@ -1,6 +1,6 @@
 """Parameters of a vehicle, read, set and listed: https://mavlink.io/en/services/parameter.html.
 
-Every value travels in a 32-bit float. Integers are either copied into it byte by byte (PX4, Colibri; `by_bits` here) or
+Every value travels in a 32-bit float. Integers are copied into it byte by byte (PX4, Colibri; `by_bits` here) or
 converted to a number (ArduPilot).
 """
 
@@ -33,14 +33,10 @@ _LAYOUTS = {
 
 
 class Held(NamedTuple):
-    """A parameter of a vehicle.
-
-    Attributes:
-        kind: MAV_PARAM_TYPE.
-    """
+    """A parameter of a vehicle."""
 
     value: Value
-    kind: int
+    kind: int  # MAV_PARAM_TYPE
 
 
 def held_in(message: Message, *, by_bits: bool = True) -> Held:
@@ -54,11 +50,7 @@ def held_in(message: Message, *, by_bits: bool = True) -> Held:
 
 
 def on_wire(value: Value, kind: int, *, by_bits: bool = True) -> Bits | float:
-    """Return a value in PARAM_SET's form; integers are rounded.
-
-    Raises:
-        ValueError: The type cannot hold it.
-    """
+    """Return a value, integers rounded, as in PARAM_SET; raise `ValueError` if the type cannot hold it."""
     layout = _LAYOUTS.get(kind)
     if layout is None or (not by_bits and kind != _REAL):
         return float(round(value))
@@ -140,11 +132,7 @@ class SetParameter(ReadParameter):
 
 
 class ListParameters(Conversation):
-    """Read all parameters into `held` by name; lost ones are requested one by one.
-
-    Attributes:
-        count: Their number; `None` before the first answer.
-    """
+    """Read all parameters into `held` by name; lost ones are requested one by one."""
 
     answers = frozenset({"PARAM_VALUE"})
 

@@ -8,16 +8,12 @@ from colibri.mavlink.wire.dialect import Message
 
 
 class _PlanConversation(Conversation):
-    """A conversation about one plan; `result` is a MAV_MISSION_RESULT.
-
-    Attributes:
-        opaque_id: The vehicle's id of the plan; 0 without one.
-    """
+    """A conversation about one plan; `result` is a MAV_MISSION_RESULT."""
 
     def __init__(self, target: Target, plan: int, repeat: Repeat) -> None:
         super().__init__(target, ("plan", plan), repeat)
         self.plan = plan
-        self.opaque_id = 0
+        self.opaque_id = 0  # the vehicle's id of the plan
 
     def _read(self, message: Message) -> None:
         if message.fields.mission_type != self.plan:
@@ -36,11 +32,7 @@ class _PlanConversation(Conversation):
 
 
 class Upload(_PlanConversation):
-    """An upload: the vehicle requests each item, then accepts or refuses the plan.
-
-    Attributes:
-        seq: The last item sent, the subject of a refusal; `None` before the first.
-    """
+    """An upload: the vehicle requests each item, then accepts or refuses the plan."""
 
     answers = frozenset({"MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"})
 
@@ -49,7 +41,7 @@ class Upload(_PlanConversation):
     ) -> None:
         super().__init__(target, plan, repeat)
         self.items = tuple(items)
-        self.seq: int | None = None
+        self.seq: int | None = None  # the last item sent, the subject of a refusal
         self._highest = -1
 
     def _acknowledge(self, result: int) -> None:
@@ -72,11 +64,7 @@ class Upload(_PlanConversation):
 
 
 class Download(_PlanConversation):
-    """A download, item by item, acknowledged by the client.
-
-    Attributes:
-        count: Announced number of items; `None` before.
-    """
+    """A download, item by item, acknowledged by the client."""
 
     answers = frozenset({"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"})
 
@@ -87,7 +75,6 @@ class Download(_PlanConversation):
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """The received items, in order."""
         return tuple(item for _, item in sorted(self._items.items()))
 
     def _take(self, message: Message) -> None:

@@ -26,36 +26,23 @@ _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 
 @dataclass
 class VehicleReport:
-    """The last reports of a vehicle.
-
-    Attributes:
-        autopilot: MAV_AUTOPILOT.
-        mode: `custom_mode`.
-        system_status: MAV_STATE.
-        landed_state: MAV_LANDED_STATE.
-        battery: Remaining charge, 0..1; nan if unknown.
-        estimator_ok: Whether attitude, velocity and position are estimated; `None` before a report.
-        prearm_ok: Whether arming checks pass; `None` if not reported.
-        altitude_amsl_m: Above mean sea level; nan if unknown.
-        origin: Of its local frame.
-        texts: STATUSTEXT lines.
-    """
+    """The last reports of a vehicle."""
 
     heartbeat_us: int | None = None
-    autopilot: int = -1
-    mode: int = -1
+    autopilot: int = -1  # MAV_AUTOPILOT
+    mode: int = -1  # `custom_mode`
     mode_us: int | None = None
     mode_reports_us: list[int] = field(default_factory=list)
     armed: bool = False
-    system_status: int = 0
-    landed_state: int = _UNKNOWN_LANDED
-    battery: float = nan
-    estimator_ok: bool | None = None
-    prearm_ok: bool | None = None
+    system_status: int = 0  # MAV_STATE
+    landed_state: int = _UNKNOWN_LANDED  # MAV_LANDED_STATE
+    battery: float = nan  # remaining charge, 0..1
+    estimator_ok: bool | None = None  # attitude, velocity and position are estimated
+    prearm_ok: bool | None = None  # arming checks pass
     fence_breached: bool = False
     altitude_amsl_m: float = nan
     home: Geodetic | None = None
-    origin: Geodetic | None = None
+    origin: Geodetic | None = None  # of its local frame
     texts: list[str] = field(default_factory=list)
     _told: int = 0
     _sequence: int | None = None
@@ -63,11 +50,9 @@ class VehicleReport:
 
     @property
     def airborne(self) -> bool | None:
-        """Whether it flies; `None` if not reported."""
         return None if self.landed_state == _UNKNOWN_LANDED else self.landed_state in _AIRBORNE
 
     def take_new_texts(self) -> list[str]:
-        """Return the STATUSTEXT lines since the last call."""
         new, self._told = self.texts[self._told :], len(self.texts)
         return new
 
@@ -111,7 +96,7 @@ class VehicleReport:
         self.mode_reports_us = [at_us for at_us in self.mode_reports_us if now_us - at_us < 1_000_000] + [now_us]
 
     def _is_newest(self, message: Message) -> bool:
-        """Return whether this is the newest message so far: a link may reorder two modes."""
+        """Whether this is the newest message so far: a link may reorder two modes."""
         sequence = sequence_of(message.frame)
         if self._sequence is not None and (sequence - self._sequence) % 256 >= _OLDER_FROM:
             return False

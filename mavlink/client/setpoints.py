@@ -33,12 +33,9 @@ def position_target(
     *,
     time_us: int = 0,
 ) -> Encoded:
-    """Return a setpoint in m, m/s and m/s^2, local ENU; missing groups are masked.
+    """Return a setpoint in m, m/s, m/s^2 and rad, local ENU; missing groups are masked.
 
-    Args:
-        yaw: Counter-clockwise from east, rad.
-        yaw_rate: Counter-clockwise, rad/s.
-        time_us: The sender's clock.
+    Yaw is counter-clockwise from east.
     """
     groups = (position, velocity, acceleration)
     mask = sum(ignored for ignored, group in zip(_GROUPS, groups, strict=True) if group is None)
@@ -66,7 +63,7 @@ def attitude_target(
 def manual_control(
     system: int, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0
 ) -> Encoded:
-    """Return stick positions: forward, right, up (0..1, centre 0.5), clockwise, the others -1..1."""
+    """Return stick positions: forward, right, up (0..1), clockwise, the others -1..1."""
     return "MANUAL_CONTROL", (system, *(round(1000.0 * axis) for axis in (pitch, roll, thrust, yaw)), 0)
 
 

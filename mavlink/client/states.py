@@ -19,38 +19,27 @@ HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSIT
 
 
 class TimedState(NamedTuple):
-    """The vehicle's own estimate of its state.
+    """The vehicle's own estimate of its state, in its local frame."""
 
-    Attributes:
-        vehicle_us: By the vehicle's clock.
-        position_enu_m, velocity_enu_m_s: In the vehicle's local frame, converted to ENU.
-        attitude: FLU to ENU.
-        rate_flu_rad_s: Body rates.
-    """
-
-    vehicle_us: int
+    vehicle_us: int  # by the vehicle's clock
     position_enu_m: Vector
     velocity_enu_m_s: Vector
-    attitude: Quaternion
+    attitude: Quaternion  # FLU to ENU
     rate_flu_rad_s: Vector
 
 
 class StateAssembler:
-    """Assembler of states from messages.
-
-    Attributes:
-        refused: Number of states with non-finite values.
-    """
+    """Assembler of states from messages."""
 
     def __init__(self) -> None:
         self._last_us = -1
         self._odometry_us: int | None = None
         self._place: tuple[int, Vector, Vector] | None = None
         self._quaternion_us: int | None = None
-        self.refused = 0
+        self.refused = 0  # states with non-finite values
 
     def receive(self, message: Message, now_us: int) -> TimedState | None:
-        """Return the state completed by a message, if any and newer than the last."""
+        """Return the state completed by a message, if newer than the last."""
         name, fields = message.name, message.fields
         if name == "ODOMETRY":
             state = _of_odometry(fields)
@@ -94,7 +83,6 @@ class StateAssembler:
 
 
 def _of_odometry(fields: Any) -> TimedState | None:
-    """Return the state of an ODOMETRY in the local frame; `None` for other frames."""
     if fields.frame_id != _EARTH:
         return None
     attitude = _unit(ned_frd_from_enu_flu(tuple(fields.q)))

@@ -9,20 +9,15 @@ WRITE_EVERY_US = 1_000_000
 
 
 class FlightLog:
-    """Writer of logs into a folder; removes the oldest for new ones.
-
-    Attributes:
-        name: Of the open file; `None` between flights.
-        refusal: Why the last write failed and ended the log.
-    """
+    """Writer of logs into a folder; removes the oldest for new ones."""
 
     def __init__(self, files: Files, folder: Names = (), kept: int = KEPT) -> None:
         """Write into `folder` and keep the last `kept` logs, the open one included."""
         self._files = files
         self._folder = folder
         self._kept = kept
-        self.name: str | None = None
-        self.refusal: FileRefusal | None = None
+        self.name: str | None = None  # of the open file
+        self.refusal: FileRefusal | None = None  # of the last write, which ended the log
         self._armed = False
         self._waiting = bytearray()
         self._size = 0
@@ -89,6 +84,5 @@ class FlightLog:
 
 
 def _number(name: str) -> int:
-    """Return the number of a log; 0 for other files."""
     number = name.removesuffix(SUFFIX)
     return int(number) if name != number and number.isascii() and number.isdigit() else 0

@@ -1,4 +1,4 @@
-"""Files in a folder on disk: the only I/O of the vehicle's files.
+"""Files in a folder on disk.
 
 Paths are walked name by name from the folder's own handle without following links, so files outside are unreachable
 whatever a client requests or another process changes. Only regular files and folders are shown.
@@ -51,7 +51,7 @@ class _RefusedError(Exception):
 def _refusing(
     method: Callable[Concatenate["Folder", _Arguments], _Result],
 ) -> Callable[Concatenate["Folder", _Arguments], _Result | FileRefusal]:
-    """Return `method` with system errors converted to refusals."""
+    """Convert system errors to refusals."""
 
     @wraps(method)
     def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | FileRefusal:
@@ -68,17 +68,9 @@ def _refusing(
 
 
 class Folder:
-    """Files in a folder on disk, see `Files`.
-
-    Its size is measured once and then updated with each operation: other writers are not expected.
-    """
+    """Files in a folder on disk, see `Files`; other writers are not expected."""
 
     def __init__(self, path: Path, quota: Quota = DEFAULT_QUOTA) -> None:
-        """Open the folder, created if missing.
-
-        Raises:
-            OSError: It cannot be created or read.
-        """
         path.mkdir(parents=True, exist_ok=True)
         self._quota = quota
         self._root = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -175,7 +167,6 @@ class Folder:
             raise _RefusedError(FileRefusal.NO_SPACE)
 
     def _existing(self, folder: int, name: str) -> os.stat_result:
-        """Return the status of a regular file or folder."""
         status = os.stat(name, dir_fd=folder, follow_symlinks=False)
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
             raise _RefusedError(FileRefusal.NOT_FOUND)
@@ -183,7 +174,6 @@ class Folder:
 
     @contextmanager
     def _open_folder(self, names: Names) -> Iterator[int]:
-        """Open the folder at `names` without following links."""
         folder = os.open(".", _FOLDER, dir_fd=self._root)
         try:
             for name in names:
@@ -196,7 +186,6 @@ class Folder:
 
     @contextmanager
     def _open_parent(self, names: Names) -> Iterator[tuple[int, str]]:
-        """Open the parent of `names`; the root itself cannot be changed."""
         if not names:
             raise _RefusedError(FileRefusal.PROTECTED)
         with self._open_folder(names[:-1]) as folder:
@@ -219,7 +208,6 @@ class Folder:
             os.close(file)
 
     def _measure(self) -> tuple[int, int]:
-        """Return the present number of bytes, and of files and folders."""
         size = entries = 0
         for _, folders, files, folder in os.fwalk(".", dir_fd=self._root):
             entries += len(folders) + len(files)
@@ -228,14 +216,13 @@ class Folder:
 
 
 def _plain(name: str) -> str:
-    """Return `name` if it can only name an entry of its folder."""
+    """Refuse a name that leads out of its folder."""
     if name in ("", ".", "..") or "/" in name:
         raise _RefusedError(FileRefusal.NOT_FOUND)
     return name
 
 
 def _kind(folder: int, name: str) -> int | None:
-    """Return the mode of an entry, of a link itself; `None` if missing."""
     try:
         return os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode
     except FileNotFoundError:
@@ -243,7 +230,6 @@ def _kind(folder: int, name: str) -> int | None:
 
 
 def _entry_of(found: os.DirEntry[str]) -> Entry | None:
-    """Return a regular file or folder, otherwise `None`."""
     try:
         status = found.stat(follow_symlinks=False)
     except OSError:

@@ -2,9 +2,9 @@
 
 Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice, or clients deviate:
 
-- The client chooses the session number when it opens a file (PX4 and MAVSDK only support session 0; MAVProxy picks a
-  fresh one for each transfer). So sessions are per client, and every answer echoes the request's session.
-- A client that reopens a session number after a moment's idleness takes it over, having lost track of it. Before, the
+- The client chooses the session number (PX4 and MAVSDK only support 0; MAVProxy picks a fresh one for each transfer).
+  So sessions are per client, and every answer echoes the request's session.
+- A client that reopens a session number after a moment's idleness has lost track of it and takes it over. Before, the
   session may still be in use, so the request is refused.
 - MAVSDK repeats a request with a new sequence number, so operations are idempotent where possible.
 """
@@ -62,7 +62,7 @@ class _Session:
 
 @dataclass(slots=True)
 class _Burst:
-    """A burst in progress. Its packets' sequence numbers follow the request's."""
+    """A burst in progress; its sequence numbers follow the request's."""
 
     request: Request
     reading: Reading
@@ -160,7 +160,6 @@ class Ftp:
         return done
 
     def _forget(self, now_us: int) -> None:
-        """Drop idle sessions and expired answers."""
         for key, session in list(self._sessions.items()):
             if now_us - session.used_us > SESSION_ENDS_AFTER_US:
                 self._close(key)
@@ -169,7 +168,7 @@ class Ftp:
                 del self._remembered[asked]
 
     def _close(self, key: Key) -> None:
-        """Close a session, and forget its answers: the next client of this number may repeat the same requests."""
+        """Close a session, and forget its answers, as the next client may repeat the same requests."""
         self._sessions.pop(key, None)
         self._bursts.pop(key, None)
         for peer, payload in list(self._remembered):
@@ -177,7 +176,7 @@ class Ftp:
                 del self._remembered[peer, payload]
 
     def _terminate(self, request: Request) -> bytes:
-        """Close a session; succeeds if it is closed already, so the request may be repeated."""
+        """Close a session; succeeds if it is closed already."""
         self._close(request.key)
         return b""
 
@@ -258,7 +257,6 @@ class Ftp:
         return session.reading.read(request.offset, count) or Nak(Error.END_OF_FILE)
 
     def _begin_burst(self, request: Request) -> Outcome:
-        """Begin a burst, replacing the session's current one."""
         session = self._used(request)
         if session is None or session.reading is None:
             return Nak(Error.INVALID_SESSION)
@@ -329,7 +327,6 @@ class Ftp:
 
 
 def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], Outcome]:
-    """Return a handler of requests that carry a path."""
 
     def obey_request(request: Request) -> Outcome:
         names = path_in(request.data)
@@ -339,7 +336,6 @@ def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], O
 
 
 def _sum(checksum: _Checksum) -> bytes | FileRefusal | None:
-    """Process the next part of the file; return the answer at the end."""
     reading = checksum.reading
     data = reading.read(checksum.done, min(CHECKSUM_BYTES_A_POLL, reading.size - checksum.done))
     if isinstance(data, FileRefusal):

@@ -62,12 +62,7 @@ Key: TypeAlias = tuple[Peer, int]
 
 
 class Request(NamedTuple):
-    """A request of a client.
-
-    Attributes:
-        size: Length of the data, or number of bytes to read.
-        offset: In a file, or among the entries of a folder.
-    """
+    """A request of a client."""
 
     peer: Peer
     now_us: int
@@ -75,8 +70,8 @@ class Request(NamedTuple):
     sequence: int
     session: int
     opcode: int
-    size: int
-    offset: int
+    size: int  # of the data, or number of bytes to read
+    offset: int  # in a file, or among the entries of a folder
     data: bytes
 
     @property
@@ -133,10 +128,7 @@ def path_in(data: bytes) -> Names | FileRefusal:
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:
-    """Return a folder's entry in a listing (List Directory, List Directory with Timestamps).
-
-    An unlistable entry becomes "S" (skip), so that later entries keep their numbers.
-    """
+    """Return a folder's entry in a listing; an unlistable one is "S" (skip), to keep later entries' numbers."""
     name = entry.name.encode(errors="replace")
     kind = b"D" if entry.is_folder else b"F"
     facts = b"\t%d\t%d" % (entry.size, entry.modified_s) if with_time else b"\t%d" % entry.size

@@ -1,8 +1,7 @@
 """Flight logs: listed, downloaded and erased.
 
 Specification: messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html.
-Logs are the files of one folder sorted by name; a log's id is its index. A client's ids are those of its last list,
-whatever is added or removed later.
+Logs are the files of one folder sorted by name; a log's id is its index in the client's last list.
 """
 
 from collections import deque
@@ -55,7 +54,6 @@ class Logs:
     def __init__(
         self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None
     ) -> None:
-        """Serve the files in `folder`; the one `being_written` is not erased."""
         self._files = files
         self._folder = folder
         self._being_written = being_written

@@ -29,29 +29,19 @@ class FileRefusal(Enum):
 
 
 class Entry(NamedTuple):
-    """A file or folder in a folder.
-
-    Attributes:
-        size: Bytes; 0 for a folder.
-        modified_s: Last modification, Unix time, s; 0 if unknown.
-    """
+    """A file or folder in a folder."""
 
     name: str
     is_folder: bool
-    size: int = 0
-    modified_s: int = 0
+    size: int = 0  # bytes
+    modified_s: int = 0  # Unix time; 0 if unknown
 
 
 class Reading(NamedTuple):
-    """A file open for reading.
+    """A file open for reading."""
 
-    Attributes:
-        size: Bytes when it was opened.
-        read: (offset, count) -> bytes, fewer at the end of the file.
-    """
-
-    size: int
-    read: Callable[[int, int], bytes | FileRefusal]
+    size: int  # bytes when opened
+    read: Callable[[int, int], bytes | FileRefusal]  # (offset, count) -> bytes, fewer at the end
 
 
 class Quota(NamedTuple):
@@ -64,11 +54,9 @@ class Quota(NamedTuple):
 class Files(Protocol):
     """Files in folders."""
 
-    def list(self, names: Names) -> list[Entry] | FileRefusal:
-        """Return the entries of a folder, sorted by name."""
+    def list(self, names: Names) -> list[Entry] | FileRefusal: ...
 
-    def open(self, names: Names) -> Reading | FileRefusal:
-        """Open a file for reading."""
+    def open(self, names: Names) -> Reading | FileRefusal: ...
 
     def create(self, names: Names) -> FileRefusal | None:
         """Create an empty file, or empty an existing one."""
@@ -91,7 +79,7 @@ class Files(Protocol):
 
 
 def names_of(path: str) -> Names | FileRefusal:
-    """Return the names in a path, with or without a leading slash; ".." is refused."""
+    """Return the names in a path; ".." is refused."""
     names = tuple(name for name in path.split("/") if name not in ("", "."))
     if ".." in names or "\0" in path:
         return FileRefusal.NOT_FOUND
@@ -118,7 +106,7 @@ Generator: TypeAlias = Callable[[str], bytes]
 
 
 class Tree:
-    """Generated files, mounted folders, and a root for the rest, in one tree."""
+    """Generated (read-only) files, mounted folders, aliases of folders, and a root for the rest, in one tree."""
 
     def __init__(
         self,
@@ -127,14 +115,7 @@ class Tree:
         generated: Mapping[str, Generator],
         aliases: Mapping[str, str] | None = None,
     ) -> None:
-        """Compose files by path.
-
-        Args:
-            root: For paths outside all mounts.
-            mounts: By path, "logs".
-            generated: By path, "@PARAM/param.pck"; read-only.
-            aliases: Second paths of folders at the root, "@MAV_LOG": "logs".
-        """
+        """Compose files by path: "logs", "@PARAM/param.pck", "@MAV_LOG"."""
         self._root = root
         self._mounts = {_known(path): files for path, files in mounts.items()}
         self._generated = {_known(path): generator for path, generator in generated.items()}

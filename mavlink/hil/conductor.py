@@ -1,7 +1,7 @@
 """Step messages: all datagrams of stepped ground stations and a vehicle at one time, exchanged between processes.
 
-The process that steps simulated time sends the ground stations' datagrams with each frame of the plant; the vehicle
-answers with its own. So every datagram arrives at a definite frame, however slow either process is.
+The process that steps time sends the stations' datagrams with each frame of the plant; the vehicle answers with its
+own. So every datagram arrives at a definite frame, however slow either process is.
 """
 
 from collections.abc import Sequence
@@ -37,11 +37,7 @@ class StepMessage(NamedTuple):
 
 
 def packets(step_message: StepMessage) -> list[bytes]:
-    """Return a step message as packets that fit datagrams.
-
-    Raises:
-        ValueError: More than 255 packets are needed.
-    """
+    """Return a step message as at most 255 packets that fit datagrams; raise `ValueError` if it needs more."""
     time_us, parcels, custom_mode, armed = step_message
     content = _HEAD.pack(time_us, custom_mode, armed, len(parcels))
     for station, whole in parcels:
@@ -61,7 +57,6 @@ class Gathering:
         self._pieces: dict[int, bytes] = {}
 
     def take(self, packet: bytes) -> StepMessage | None:
-        """Return the step message completed by a packet, if any."""
         time_us, number, count = _PIECE.unpack_from(packet)
         if count == 1:
             return _step_message(packet, _PIECE.size)

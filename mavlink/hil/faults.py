@@ -178,7 +178,6 @@ def kind_name(kind: int) -> str:
 
 
 def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | None:
-    """Return the fault of a command's parameters; `None` if unit, type or instance is not a whole number."""
     p3 = 0.0 if isnan(p3) else p3
     if not all(isfinite(number) and number == int(number) for number in (p1, p2, p3)):
         return None
@@ -199,7 +198,6 @@ def judged(fault: Fault, parts: Collection[Part]) -> Fault | Refusal:
 
 
 def encode_fault(codec: Codec, fault: Fault, target: tuple[int, int]) -> bytes:
-    """Encode a fault as COMMAND_LONG to system and component `target`."""
     return codec.encode("COMMAND_LONG", *target, COMMAND, 0, fault.unit, fault.kind, fault.instance, *fault.values)
 
 

@@ -11,13 +11,11 @@ The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (ATTITUDE_
 for sensor frames) and a HEARTBEAT. The plant begins with the first such call, and resumes with a restarted autopilot.
 
 With its frame the plant sends its battery twice a second and to each new caller, and the delay of the last command's
-effect, if any (NAMED_VALUE_INT cmd_delay, µs). The autopilot may append faults, COMMAND_LONG with
-MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame. Only there are they accepted, so each happens once, at
-that time; the next frame brings their COMMAND_ACK.
+effect, if any (NAMED_VALUE_INT cmd_delay, µs). Faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, are accepted only
+appended to the answer of a frame, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 
-A free-running plant (`FREE_RUNNING` in its HEARTBEAT) does not wait. It sends each frame once, and accepts any answer
-newer than the last; the autopilot continues from the newest frame. The mode is read from the plant's first HEARTBEAT,
-and again after silence. In lockstep a new flight begins at time 0 only.
+A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and accepts any answer newer than the last;
+the autopilot continues from the newest frame. In lockstep a new flight begins at time 0 only.
 """
 
 from colibri.mavlink.hil.feedback import Feedback

@@ -30,12 +30,7 @@ _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
 class AutopilotEnd:
-    """The autopilot's end: calls the plant, returns each new frame once, remembers the last answer.
-
-    Attributes:
-        refused: The plant's MAV_RESULT if it refused the requested frames.
-        repeated: Number of repeated frames.
-    """
+    """The autopilot's end: calls the plant, returns each new frame once, remembers the last answer."""
 
     def __init__(
         self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
@@ -48,8 +43,8 @@ class AutopilotEnd:
         self._made_of = MADE_OF[feedback]
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._runs_freely: bool | None = None
-        self.refused: int | None = None
-        self.repeated = 0
+        self.refused: int | None = None  # MAV_RESULT of the requested frames
+        self.repeated = 0  # frames
         self.dropped: Counter[str] = self._codec.dropped
         self._time_us: int | None = None
         self._answer: bytes | None = None
@@ -154,7 +149,6 @@ class AutopilotEnd:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
 
     def _receive_mode(self, heartbeat: Message, now_s: float) -> None:
-        """Note the plant's mode, which is constant in a flight."""
         if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
             self._runs_freely = heartbeat.fields.custom_mode == FREE_RUNNING
 

@@ -56,12 +56,7 @@ class Outgoing(NamedTuple):
 class PlantEnd:
     """The plant's end: offers a frame and waits for its answer.
 
-    Attributes:
-        peer: Address of the autopilot, once it has called.
-        frame_interval_us: Time between frames, fixed with the first frame.
-        feedback: Kind of frames that the autopilot requests, fixed with the first frame.
-        received: Valid frames of the autopilot; the owner may log and clear it.
-        waits: Whether frames are repeated until answered; otherwise the plant runs freely.
+    Kind and interval of frames are requested by the autopilot before the first frame.
     """
 
     def __init__(
@@ -72,8 +67,8 @@ class PlantEnd:
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
     ) -> None:
-        """Wait for the autopilot of `system_id`, which may request other kinds of frames that the plant `serves`."""
-        self.waits = waits
+        """Wait for the autopilot of `system_id`, which may request the kinds of frames that the plant `serves`."""
+        self.waits = waits  # or runs freely
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
@@ -84,7 +79,7 @@ class PlantEnd:
         self._serves = frozenset(serves)
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
-        self.received: list[bytes] = []
+        self.received: list[bytes] = []  # valid frames; the owner may log and clear it
         self._peer_received_s = 0.0
         self._frames: tuple[bytes, ...] = ()
         self._begun = False
@@ -96,7 +91,6 @@ class PlantEnd:
         self._outbox: list[Outgoing] = []
 
     def sends_battery(self, time_us: int) -> bool:
-        """Whether a frame is sent with the battery; a later caller gets the previous frame's."""
         return time_us % BATTERY_EVERY_US == 0
 
     def offer(

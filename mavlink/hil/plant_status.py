@@ -32,16 +32,11 @@ class FaultResult(NamedTuple):
 
 
 class PlantStatus(NamedTuple):
-    """Status beside a frame.
-
-    Attributes:
-        results: Of the faults in the previous answer, in order.
-        delay_us: From the frame of the last command to its effect on the rotors, µs; `None` if immediate.
-    """
+    """Status beside a frame."""
 
     battery: PlantBattery | None = None
-    results: tuple[FaultResult, ...] = ()
-    delay_us: int | None = None
+    results: tuple[FaultResult, ...] = ()  # of faults in the previous answer
+    delay_us: int | None = None  # from the last command's frame to its effect, if any
 
 
 NOTHING = PlantStatus()
@@ -55,7 +50,7 @@ class ReceivedFrame(NamedTuple):
 
 
 def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
-    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell, mV; cA, mAh, percent."""
+    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell."""
     voltages = (min(round(1e3 * battery.voltage_v), _MAX_MV), *(_NO_CELL,) * 9)
     kind = (0, mav.MAV_BATTERY_FUNCTION_ALL, mav.MAV_BATTERY_TYPE_LIPO, _UNKNOWN_TEMPERATURE)
     current = min(round(100.0 * battery.current_a), 32767)
@@ -65,7 +60,6 @@ def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
 
 
 def decode_battery(message: Message) -> PlantBattery | None:
-    """Decode a BATTERY_STATUS; `None` without voltage, charge or remaining part."""
     fields = message.fields
     cells_mv = [cell for cell in fields.voltages if cell != _NO_CELL]
     if not cells_mv or fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:

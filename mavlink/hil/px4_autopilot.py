@@ -2,7 +2,7 @@
 
 It sends a HEARTBEAT twice a second of wall-clock time, as a simulator restarts after three seconds without. Each
 HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS of the same time that requests lockstep. Time counts from the first
-frame, as a simulator's clock may start anywhere.
+frame.
 
 Quirks of jMAVSim: its HIL_GPS follows the HIL_SENSOR of the same time and belongs to the next; old versions leave
 `fields_updated` empty, which counts as all new.
@@ -30,19 +30,14 @@ _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER |
 
 
 class FlierEnd:
-    """The autopilot's end: returns each new frame once, remembers the last answer.
-
-    Attributes:
-        refused: Always `None`, for compatibility with `AutopilotEnd`.
-        repeated: Number of repeated frames.
-    """
+    """The autopilot's end: returns each new frame once, remembers the last answer."""
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
         """Create the end; `to_motors` converts rotor speeds 0..1 in the vehicle file's order to the simulator's."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
-        self.refused: int | None = None
-        self.repeated = 0
+        self.refused: int | None = None  # always None
+        self.repeated = 0  # frames
         self.dropped: Counter[str] = self._codec.dropped
         self._zero_us: int | None = None
         self._time_us: int | None = None

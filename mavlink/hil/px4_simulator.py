@@ -2,10 +2,10 @@
 
 PX4 calls (over TCP it is the client), begins with a HEARTBEAT and, before or after, requests HIL_STATE_QUATERNION.
 HIL_SENSOR sets its clock; its HIL_ACTUATOR_CONTROLS with bit 0 of `flags` answers it. Until the first such answer,
-while PX4 is starting, the simulator advances at the pace of the wall clock. From then on it waits for each answer.
+while PX4 is starting, the simulator advances at the pace of the wall clock; then it waits for each answer. An answer
+counts if its time differs from the previous one's, as a repeated frame may be answered twice.
 
-An answer counts if its time differs from the previous one's: a repeated frame may be answered twice. Source:
-PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and https://docs.px4.io/main/en/simulation/.
+Source: PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and https://docs.px4.io/main/en/simulation/.
 """
 
 from collections import Counter
@@ -56,25 +56,18 @@ class Truth(NamedTuple):
 
 
 class SimulatorEnd:
-    """The simulator's end: offers frames, receives motor commands.
-
-    Attributes:
-        peer: Address of PX4, from its call until its connection ends.
-        calls: Number of PX4 starts.
-        lockstep: Whether PX4 answers each frame.
-        received: Valid frames of PX4; the owner may log and clear it.
-    """
+    """The simulator's end: offers frames, receives motor commands."""
 
     def __init__(self, *, system_id: int) -> None:
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self.peer: Address | None = None
-        self.calls = 0
-        self.lockstep = False
+        self.calls = 0  # starts of PX4
+        self.lockstep = False  # PX4 answers each frame
         self.answered = True
         self.motors = Motors(_STOPPED, armed=False)
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
-        self.received: list[bytes] = []
+        self.received: list[bytes] = []  # valid frames; the owner may log and clear it
         self._source = b""
         self._answer_us: int | None = None
         self._truth_every_us: int | None = None

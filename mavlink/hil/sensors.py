@@ -1,8 +1,8 @@
 """Sensor frames from plant to autopilot, in SI, ENU/FLU, and their messages of PX4's simulator interface.
 
 HIL_SENSOR has the on-board measurements, with the new groups in `fields_updated`. HIL_GPS has its own rate and is
-delayed; further sensors are rows of `OWN_MESSAGES`. Units and frames are PX4's: https://docs.px4.io/main/en/simulation/
-and https://mavlink.io/en/messages/common.html. Values are unchecked: an autopilot must cope with broken sensors.
+delayed; further sensors are rows of `OWN_MESSAGES`. Units and frames: https://docs.px4.io/main/en/simulation/ and
+https://mavlink.io/en/messages/common.html. Values are unchecked: an autopilot must cope with broken sensors.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,10 +37,7 @@ _altitude_m = lru_cache(maxsize=1)(altitude_m)
 
 
 class Updated:
-    """Groups of HIL_SENSOR.fields_updated; a group is new if all its bits are set.
-
-    Plain numbers: `enum` flags would dominate the time per frame.
-    """
+    """Groups of HIL_SENSOR.fields_updated as plain numbers: `enum` flags would dominate the time per frame."""
 
     ACCELEROMETER = 0x7
     GYROSCOPE = 0x38
@@ -58,55 +55,39 @@ class FixType(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix:
-    """A GPS fix.
+    """A GPS fix."""
 
-    Attributes:
-        time_us: Simulated time of sending; measured the receiver's delay before.
-        fix_type: `FixType`, or any number that a simulator sends.
-        horizontal_accuracy_m, vertical_accuracy_m: Claimed standard deviations.
-    """
-
-    time_us: int
-    fix_type: int
+    time_us: int  # simulated time of sending
+    fix_type: int  # `FixType`, or any number of a simulator
     place: Geodetic
     velocity_enu_m_s: Vector
-    horizontal_accuracy_m: float
-    vertical_accuracy_m: float
+    horizontal_accuracy_m: float  # claimed standard deviation
+    vertical_accuracy_m: float  # likewise
     satellites: int
 
 
 class Distance(NamedTuple):
-    """A sample of a downward rangefinder.
+    """A sample of a downward rangefinder, along the body's axis."""
 
-    Attributes:
-        distance_m: To the ground along the body's axis; infinite if out of range.
-        field_of_view_rad: Angle of its beam's cone.
-    """
-
-    distance_m: float
+    distance_m: float  # infinite if out of range
     min_m: float
     max_m: float
-    field_of_view_rad: float
+    field_of_view_rad: float  # of its beam's cone
 
 
 class SensorFrame(NamedTuple):
     """On-board measurements at one instant of simulated time, and new messages of other sensors.
 
     Groups that are not `updated` hold old values or zeros.
-
-    Attributes:
-        updated: Bits of `Updated`.
-        specific_force_flu_m_s2: (0, 0, 9.81) at rest and level.
-        temperature_c: Of the barometer, degrees Celsius.
     """
 
     time_us: int
-    updated: int
-    specific_force_flu_m_s2: Vector
+    updated: int  # bits of `Updated`
+    specific_force_flu_m_s2: Vector  # (0, 0, 9.81) at rest and level
     rate_flu_rad_s: Vector
     magnetic_field_flu_gauss: Vector
     pressure_pa: float
-    temperature_c: float
+    temperature_c: float  # of the barometer, degrees Celsius
     gps: GpsFix | None = None
     distance: Distance | None = None
 
@@ -115,19 +96,13 @@ class SensorFrame(NamedTuple):
 
 
 class OwnMessage(NamedTuple):
-    """A sensor with a message of its own beside HIL_SENSOR.
+    """A sensor with a message of its own beside HIL_SENSOR."""
 
-    Attributes:
-        field: Of `SensorFrame`; `None` there without a new value.
-        encoded: (value, simulated time in µs) -> fields of the message.
-        passed_on: Whether ground stations receive the same message.
-    """
-
-    field: str
+    field: str  # of `SensorFrame`, where None is no new value
     message: str
-    encoded: Callable[[Any, int], tuple[Any, ...]]
+    encoded: Callable[[Any, int], tuple[Any, ...]]  # (value, µs) -> fields
     decoded: Callable[[Message], Any]
-    passed_on: bool
+    passed_on: bool  # to ground stations
 
 
 Frame: TypeAlias = StateFrame | SensorFrame
@@ -135,7 +110,6 @@ Frame: TypeAlias = StateFrame | SensorFrame
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    """Encode a frame as HIL_SENSOR, with standard pressure altitude, and messages of other new values."""
     messages = [
         _SENSOR.encode(
             codec,
@@ -173,7 +147,6 @@ def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
 
 
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
-    """Decode a HIL_SENSOR and its `OWN_MESSAGES`."""
     own = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
     return _measured(_SENSOR.numbers(sensor.fields), **own)
 
@@ -213,7 +186,6 @@ def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
 
 
 def decode_gps(message: Message) -> GpsFix:
-    """Decode a HIL_GPS; unknown accuracies are nan."""
     return _fix(_GPS.numbers(message.fields))
 
 

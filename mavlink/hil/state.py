@@ -46,15 +46,14 @@ class ActuatorCommand(NamedTuple):
 
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
-    """Encode a frame as ATTITUDE_QUATERNION and LOCAL_POSITION_NED of the same `time_boot_ms`."""
     turning, moving = _numbers(frame)
     return [_ATTITUDE.encode(codec, turning), _POSITION.encode(codec, moving)]
 
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
-    """Return what `read_state` reads of a frame that `encode_state` has written, without the datagram."""
+    """Return the frame as `read_state` reads it after `encode_state`, rounded by the wire."""
     turning, moving = _numbers(frame)
-    return _state(*_ATTITUDE.rounded(turning), *_POSITION.rounded(moving))
+    return _state(_ATTITUDE.rounded(turning), _POSITION.rounded(moving))
 
 
 def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -87,8 +86,8 @@ def _state(attitude: Sequence[Any], position: Sequence[Any]) -> StateFrame | Non
     if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
         return None
     norm = sqrt(squared)
-    attitude = (q1 / norm, q2 / norm, q3 / norm, q4 / norm)
-    state = ned_frd_state((x, y, z), (vx, vy, vz), attitude, (rollspeed, pitchspeed, yawspeed))
+    unit = (q1 / norm, q2 / norm, q3 / norm, q4 / norm)
+    state = ned_frd_state((x, y, z), (vx, vy, vz), unit, (rollspeed, pitchspeed, yawspeed))
     return StateFrame(attitude_ms * 1000, *state)
 
 
@@ -98,10 +97,10 @@ def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
 
 
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
-    """Return what `read_actuators` reads of a command that `encode_actuators` has written, without the datagram."""
+    """Return the command as `read_actuators` reads it after `encode_actuators`, rounded by the wire."""
     time_us, controls, armed = command
     mode = _ARMED if armed else _DISARMED
-    return _command(*_ACTUATORS.rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
+    return _command(_ACTUATORS.rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
 
 
 def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:

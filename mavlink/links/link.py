@@ -31,13 +31,12 @@ class GroundLink(Protocol):
 
     @property
     def target(self) -> Address | None:
-        """The address it calls; `None` if it waits for others."""
+        """The address it calls, if any."""
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send whole frames to `address`, or lose them."""
 
-    def receive_now(self) -> list[tuple[bytes, Address]]:
-        """Return received whole frames with their senders."""
+    def receive_now(self) -> list[tuple[bytes, Address]]: ...
 
     def wait(self, timeout_s: float) -> None:
         """Sleep until input or the timeout."""
@@ -45,8 +44,7 @@ class GroundLink(Protocol):
     def take_opened(self) -> list[Address]:
         """Return new addresses to send to: the called one, or those that connected."""
 
-    def take_closed(self) -> list[Address]:
-        """Return the addresses of ended connections."""
+    def take_closed(self) -> list[Address]: ...
 
     def take_notes(self) -> list[str]:
         """Return new lines for the user."""
@@ -101,7 +99,7 @@ class BlockingReceiver:
 
 
 def receive_soon(link: GroundLink, timeout_s: float) -> list[tuple[bytes, Address]]:
-    """Return input as soon as there is any, or nothing after `timeout_s`; poll without sleep for `SPIN_S`."""
+    """Return input as soon as there is any; poll without sleep for `SPIN_S`."""
     began_s = perf_counter()
     while not (received := link.receive_now()):
         waited_s = perf_counter() - began_s

@@ -1,7 +1,7 @@
 """Endpoints by URL.
 
 `udpin:HOST:PORT` waits for any sender, `udpout:HOST:PORT` exchanges datagrams with that address only; `tcpin:HOST:PORT`
-waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. Plant and autopilot use UDP.
+waits for clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. All raise `LinkError`.
 """
 
 import os
@@ -21,20 +21,12 @@ _SERIAL, _SERIAL_FORM = "serial:", "serial:DEVICE:BAUD"
 
 
 def open_link(url: str) -> UdpLink:
-    """Open a UDP endpoint; port 0 with `udpin:` takes any free port.
-
-    Raises:
-        LinkError: The URL is malformed, the host unknown, or the port taken.
-    """
+    """Open a UDP endpoint, the only kind between plant and autopilot."""
     return _open_udp(url, *_parse(url, _UDP))
 
 
 def open_ground_link(url: str) -> GroundLink:
-    """Open a UDP, TCP or serial endpoint; port 0 takes any free port if it waits.
-
-    Raises:
-        LinkError: The URL is malformed, the host unknown, the port taken, or the device missing.
-    """
+    """Open an endpoint; port 0 takes any free port if it waits."""
     if is_serial(url):
         return SerialLink(url, *_parse_serial(url))
     scheme, host, port = _parse(url, (*_UDP, *_TCP))
@@ -55,11 +47,7 @@ def is_serial(url: str) -> bool:
 
 
 def beyond_loopback(url: str) -> bool:
-    """Whether an endpoint reaches other computers by a network; a serial port does not.
-
-    Raises:
-        LinkError: The URL is malformed, or the host unknown.
-    """
+    """Whether an endpoint reaches other computers by a network; a serial port does not."""
     if is_serial(url):
         _parse_serial(url)
         return False
@@ -68,11 +56,7 @@ def beyond_loopback(url: str) -> bool:
 
 
 def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
-    """Require a key or `insecure` for each URL that reaches the network.
-
-    Raises:
-        LinkError: Neither is given; or a URL is malformed, or its host unknown.
-    """
+    """Require a key or `insecure` for each URL that reaches the network."""
     for url in urls:
         if beyond_loopback(url) and not (signed or insecure):
             raise LinkError(unsigned_refusal(url))

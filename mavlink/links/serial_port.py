@@ -1,7 +1,7 @@
 """A serial port as a non-blocking endpoint, reopened when its device returns.
 
-Frames broken by noise are dropped; beyond the line's speed, whole datagrams are dropped. pyserial opens the port, which
-is then used as a file: pyserial's own `write` blocks on a stalled device in spite of its time-out.
+Broken frames are dropped; beyond the line's speed, whole datagrams are dropped. pyserial only opens the port: its
+`write` blocks on a stalled device in spite of its time-out.
 """
 
 import errno
@@ -42,11 +42,6 @@ class SerialLink(Endpoint):
     target: Address
 
     def __init__(self, url: str, device: str, baud: int, clock: Callable[[], float] = perf_counter) -> None:
-        """Open `device`; `clock`, s, times the reopening.
-
-        Raises:
-            LinkError: It cannot be opened, or pyserial is not installed.
-        """
         super().__init__(url, (device, baud))
         self._clock = clock
         self._queue_bytes = max(MIN_QUEUE_BYTES, round(QUEUE_S * baud / _BITS_PER_BYTE))
@@ -135,11 +130,6 @@ class SerialLink(Endpoint):
 
 
 def _opened(url: str, device: str, baud: int) -> "Serial":
-    """Open a port exclusively.
-
-    Raises:
-        LinkError: It cannot be opened, or pyserial is not installed.
-    """
     if os.name != "posix":
         raise LinkError(f"{url}: serial ports are for Linux and macOS; use udpin: or tcp: here")
     try:

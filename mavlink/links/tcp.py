@@ -1,7 +1,4 @@
-"""Non-blocking TCP endpoints, server and client, for whole frames.
-
-A slow reader loses frames, as over UDP; a dead connection is closed and forgotten.
-"""
+"""Non-blocking TCP endpoints, server and client, for whole frames. A slow reader loses frames, as over UDP."""
 
 import select
 import socket
@@ -208,7 +205,7 @@ class TcpClient(Endpoint):
 
 
 def _established(sock: socket.socket, address: Address) -> Connection | None:
-    """Return the connection of a completed call; `None` if it failed, or connected to itself.
+    """Return the connection of a completed call, unless it failed or connected to itself.
 
     A call to an unused port of the own host may be given just that port as its own.
     """

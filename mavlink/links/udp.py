@@ -27,17 +27,12 @@ class UdpLink(Endpoint):
             self.speak_with(target)
 
     def speak_with(self, target: Address) -> None:
-        """Exchange datagrams with `target` only from now on."""
         self.target = target
         self._connected = _connect(self._socket, target)
         self._opened = [target]
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send to `address` or the target, or lose the datagram.
-
-        Raises:
-            LinkError: The target is unreachable.
-        """
+        """Send to `address` or the target, or lose the datagram; raise `LinkError` if the target is unreachable."""
         destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
         try:
@@ -103,10 +98,7 @@ class UdpLink(Endpoint):
 
 
 def _connect(sock: socket.socket, target: Address) -> bool:
-    """Connect to a loopback target, which saves a fifth of an exchange; return success.
-
-    Other routes may change, and a connected socket's would not.
-    """
+    """Connect to a loopback target, which saves a fifth of an exchange; other routes may change."""
     if not ip_address(target[0]).is_loopback:
         return False
     sock.connect(target)

@@ -26,12 +26,7 @@ _INT32 = range(-(2**31), 2**31)
 
 
 class MissionItem(NamedTuple):
-    """An item of a plan, in wire units.
-
-    Attributes:
-        x, y: Latitude and longitude, degE7; or parameters five and six.
-        z: Altitude, m; or the seventh parameter.
-    """
+    """An item of a plan, in wire units."""
 
     frame: int
     command: int
@@ -40,13 +35,13 @@ class MissionItem(NamedTuple):
     p2: float
     p3: float
     p4: float
-    x: int
-    y: int
-    z: float
+    x: int  # latitude, degE7, or parameter five
+    y: int  # longitude, degE7, or parameter six
+    z: float  # altitude, m, or parameter seven
 
 
 class Plan(NamedTuple):
-    """The stored items of one type; the opaque id changes with them and is 0 without items."""
+    """The stored items of one type; the opaque id changes with them."""
 
     items: tuple[MissionItem, ...] = ()
     id: int = 0
@@ -63,7 +58,7 @@ def plan_of(items: Sequence[MissionItem]) -> Plan:
 
 
 def item_of(message_name: str, fields: Any) -> MissionItem | int:
-    """Return the item in a MISSION_ITEM_INT or MISSION_ITEM; a MAV_MISSION_RESULT if its place fits no integer."""
+    """Return the item in a message; a MAV_MISSION_RESULT if its place fits no integer."""
     x, y = fields.x, fields.y
     if message_name == "MISSION_ITEM":
         scale = 1e7 if fields.frame in GLOBAL_FRAMES else 1.0

@@ -1,7 +1,6 @@
 """The mission microservice: plans up and down, the current item, progress.
 
-Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans, each
-stored and handled by itself. Uploads are in `upload`.
+Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -47,10 +46,7 @@ class _Reading(NamedTuple):
 
 
 class Downloads:
-    """Answers MISSION_REQUEST_LIST, MISSION_REQUEST_INT and MISSION_REQUEST for any number of readers.
-
-    A reader gets the announced plan even if it is replaced meanwhile: "Download a Mission from the Vehicle".
-    """
+    """Answers readers with the announced plan even if it is replaced meanwhile."""
 
     def __init__(self) -> None:
         self._readings: dict[tuple[Peer, int], _Reading] = {}
@@ -61,10 +57,7 @@ class Downloads:
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
     def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
-        """Return an item of the announced or newest plan; `current` is the newest plan's item being flown.
-
-        MISSION_REQUEST, too, is answered by a MISSION_ITEM_INT: "Deprecated Types: MISSION_ITEM".
-        """
+        """Return an item as MISSION_ITEM_INT, also for MISSION_REQUEST: "Deprecated Types: MISSION_ITEM"."""
         reading = self._readings.get((peer, plan_type))
         plan = newest
         if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
@@ -98,19 +91,12 @@ Receiver: TypeAlias = Callable[[Any, Peer, int], Iterable[Send]]
 
 
 class Vehicle(NamedTuple):
-    """The service's interface to the vehicle.
+    """The service's interface to the vehicle."""
 
-    Attributes:
-        load: (plan type, plan): take a new plan; empty if cleared.
-        progress: Called at every poll; best returns the same object while unchanged.
-        set_current: (seq or -1 for the current, reset the counters).
-        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME).
-    """
-
-    load: Callable[[int, Plan], None]
-    progress: Callable[[], Progress]
-    set_current: Callable[[int, bool], Refusal | None]
-    guided_goto: Callable[[float, float, float, int], Refusal | None]
+    load: Callable[[int, Plan], None]  # (plan type, plan)
+    progress: Callable[[], Progress]  # called at every poll
+    set_current: Callable[[int, bool], Refusal | None]  # (seq or -1 for the current, reset the counters)
+    guided_goto: Callable[[float, float, float, int], Refusal | None]  # (degrees, degrees, m, MAV_FRAME)
 
 
 class MissionService:

@@ -3,8 +3,9 @@
 Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to the Vehicle", "Canceling Operations",
 "Timeouts and Retries". Two choices follow PX4, because clients rely on them:
 
-- The specification recommends five retries of 250 ms. With a fifth of the datagrams lost each way, two of three uploads
-  of 500 items would then fail; so the vehicle repeats its request every 250 ms for five seconds.
+- Requests are repeated every 250 ms for five seconds. The recommended five retries would let two of three uploads of
+500
+  items fail over a link that loses a fifth of the datagrams each way.
 - Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent: not for strays, and not for an
   upload that the ground station has abandoned for another transfer.
 """
@@ -26,12 +27,7 @@ NEVER_US = 2**63
 
 
 class Rules(NamedTuple):
-    """Limits of a plan of one type.
-
-    Attributes:
-        check_item: (item) -> MAV_MISSION_RESULT, of an item by itself.
-        check_plan: (items) -> MAV_MISSION_RESULT, of all, each checked before.
-    """
+    """Limits of a plan of one type, by MAV_MISSION_RESULT."""
 
     check_item: Callable[[MissionItem], int]
     check_plan: Callable[[Sequence[MissionItem]], int]
@@ -63,10 +59,7 @@ class _Upload:
         self._last_form = False
 
     def ask(self, now_us: int) -> Send:
-        """Request the next item in the form that the ground station supports.
-
-        Some only support MISSION_REQUEST, some nack it (MAVSDK): the new form comes first.
-        """
+        """Request the next item; first in the new form, as some nack MISSION_REQUEST (MAVSDK) and some require it."""
         old = bool(self._old_form)
         if self._old_form is None and self._asked >= OLD_FORM_AFTER:
             old = self._asked % 2 == 0

@@ -1,4 +1,4 @@
-"""A channel: one remote address on one link, with counts and queued frames."""
+"""A channel: one remote address on one link."""
 
 from colibri.common.types import Address
 from colibri.mavlink.node.router import SOURCES, Source
@@ -10,27 +10,18 @@ _SEQUENCES = 256
 
 
 class Channel:
-    """Numbering, packing and counting of the traffic with one remote address.
-
-    Attributes:
-        fixed: Whether it stays open when silent.
-        codec: Its own, as sequence numbers are counted per channel.
-        sent: Sent messages, including forwarded ones.
-        lost: Missing messages, by gaps in sequence numbers.
-        sources_us: Simulated time of each source's last message.
-        active_us: Simulated time of opening or the last message.
-    """
+    """Numbering, packing and counting of the traffic with one remote address."""
 
     def __init__(self, number: int, link: int, address: Address | None, codec: Codec, now_us: int) -> None:
         self.number = number
         self.link = link
         self.address = address
-        self.fixed = False
-        self.codec = codec
+        self.fixed = False  # open even when silent
+        self.codec = codec  # its own, for its sequence numbers
         self.active_us = now_us
         self.received = 0
-        self.sent = 0
-        self.lost = 0
+        self.sent = 0  # including forwarded messages
+        self.lost = 0  # by gaps in sequence numbers
         self._sequences: dict[Source, int] = {}
         self.sources_us: dict[Source, int] = {}
         self._pending: list[bytes] = []
@@ -56,7 +47,6 @@ class Channel:
         self._pending.append(frame)
 
     def take(self) -> list[bytes]:
-        """Return the queued frames in as few datagrams as possible."""
         if not self._pending:
             return []
         datagrams: list[bytes] = []

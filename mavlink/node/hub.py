@@ -46,9 +46,6 @@ class Hub:
     """A component on any number of links.
 
     A channel is one remote address on one link. It opens with the first valid message from there.
-
-    Attributes:
-        accepts_only: Messages dispatched to services for the time being; `None` for all.
     """
 
     def __init__(
@@ -61,10 +58,7 @@ class Hub:
         observers: Sequence[ChannelObserver] = (),
         caught: Caught | None = None,
     ) -> None:
-        """Create a component; without `signing` SETUP_SIGNING is refused.
-
-        An exception of a service goes to `caught` and the others continue; without `caught` it is raised.
-        """
+        """Create a component; without `signing` SETUP_SIGNING is refused, without `caught` exceptions are raised."""
         self._own = (system_id, component_id)
         self._polled = tuple(service for service in services if isinstance(service, PolledService))
         self._awake = self._polled
@@ -78,7 +72,7 @@ class Hub:
         self._channels: dict[int, Channel] = {}
         self._numbers: dict[tuple[int, Address | None], int] = {}
         self._next_number = 0
-        self.accepts_only: frozenset[str] | None = None
+        self.accepts_only: frozenset[str] | None = None  # messages dispatched to services
         self._now_us = 0
         self._tidy_at_us = 0
         self._dropped_before: Counter[str] = Counter()

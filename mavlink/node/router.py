@@ -55,10 +55,7 @@ def _leads_to(target: Source, sources: dict[Source, None]) -> bool:
 
 
 def target_of(fields: object) -> Source:
-    """Return the target's system and component id, 0 for all.
-
-    MANUAL_CONTROL has another field for it, `target`, a system id.
-    """
+    """Return the target's system and component id, 0 for all; MANUAL_CONTROL has a field of its own for it."""
     system = getattr(fields, "target_system", None)
     if system is None:
         return getattr(fields, "target", 0), 0

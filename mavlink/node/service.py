@@ -1,7 +1,7 @@
 """The interface of a microservice: messages and the simulated time in, messages out.
 
-A service receives only messages of other components to this component or to all: the hub filters them. Field values are
-unchecked: NaN, infinities, unknown enumerations and wrong counts must be refused, and never raise.
+A service receives only messages of other components to this component or to all. Field values are unchecked: NaN,
+infinities, unknown enumerations and wrong counts must be refused, and never raise.
 """
 
 from collections.abc import Iterable, Sequence

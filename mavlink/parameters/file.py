@@ -28,11 +28,7 @@ def write(parameters: Parameters, system_id: int = 1) -> str:
 
 
 def read(text: str, parameters: Parameters) -> dict[str, Value]:
-    """Return the valid values of a file, without other components' and read-only parameters.
-
-    Raises:
-        ParameterFileError: A line is malformed, or a parameter is unknown, repeated, or has an invalid value.
-    """
+    """Return the valid values of a file, without other components' and read-only parameters."""
     values: dict[str, Value] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.startswith("#"):
@@ -85,5 +81,4 @@ def _choices(parameter: Parameter) -> str:
 
 
 def _text(parameter: Parameter, value: Value) -> str:
-    """Return a value with all 32 bits."""
     return str(value) if parameter.kind == Kind.INT else f"{value:.9g}"

@@ -36,7 +36,6 @@ class Metadata:
         return {GENERAL: lambda _: self.general, PARAMETERS: lambda _: self._parameters}
 
     def provide(self, peer: Peer, now_us: int) -> list[Send]:
-        """Answer MAV_CMD_REQUEST_MESSAGE for COMPONENT_METADATA (397)."""
         time_boot_ms = now_us // 1000 & _UINT32_MAX
         return [to(peer, "COMPONENT_METADATA", time_boot_ms, checksum(self.general), f"mftp:///{GENERAL}".encode())]
 

@@ -1,7 +1,4 @@
-"""`@PARAM/param.pck`: all parameters in one compact file, fetched by FTP.
-
-Specification: https://mavlink.io/en/services/parameter_ftp.html.
-"""
+"""`@PARAM/param.pck`, all parameters in one file: https://mavlink.io/en/services/parameter_ftp.html."""
 
 from struct import Struct
 

@@ -48,7 +48,7 @@ class ParameterService:
         return self._set(fields.param_id, fields.param_type, param_bits(message), peer)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Send the due parameters of each list: "allow breaks between each message" (read all parameters)."""
+        """Send the due parameters of each list: "allow breaks between each message"."""
         if not self._listings:
             return IDLE
         return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
@@ -104,9 +104,7 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamErr
     """Return the value of a PARAM_SET.
 
     Clients of the packed file (MAVProxy), or without types (DroneKit), send integers as REAL32 and expect conversion
-    (https://mavlink.io/en/services/parameter_ftp.html). That is accepted if the float stands for one integer only;
-    other
-    types must match.
+    (https://mavlink.io/en/services/parameter_ftp.html), which is unambiguous for small ones. Other types must match.
     """
     if wire_type not in tuple(Kind):
         return ParamError.TYPE_UNSUPPORTED

@@ -49,26 +49,20 @@ Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """Definition of a parameter. Numbers are rounded to 32 bits.
+    """Definition of a parameter. Numbers are rounded to 32 bits."""
 
-    Attributes:
-        name: At most 16 capitals, digits and underscores.
-        decimals: For display in a ground station.
-        values: Valid values and their meanings; empty if all between the bounds are valid.
-    """
-
-    name: str
+    name: str  # at most 16 capitals, digits and underscores
     kind: Kind
     default: Value
     minimum: Value = -FLOAT32_MAX
     maximum: Value = FLOAT32_MAX
     unit: str = ""
-    decimals: int = 3
+    decimals: int = 3  # for display
     description: str
     details: str = ""
     group: str = ""
     reboot_required: bool = False
-    values: tuple[tuple[int, str], ...] = ()
+    values: tuple[tuple[int, str], ...] = ()  # the valid ones with meanings, if not all
     read_only: bool = False
 
     def __post_init__(self) -> None:
@@ -94,11 +88,7 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters sorted by name, and their values; `prepare` is called before a change.
-
-    Attributes:
-        revision: Number of changes so far.
-    """
+    """The parameters sorted by name, and their values; `prepare` is called before a change."""
 
     def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
         self._definitions = tuple(sorted(definitions, key=lambda parameter: parameter.name))
@@ -108,10 +98,10 @@ class Parameters:
         self._values = {parameter.name: parameter.default for parameter in self._definitions}
         self._made: object | None = None
         self.prepare = prepare
-        self.revision = 0
+        self.revision = 0  # number of changes so far
 
     def trial(self, values: Mapping[str, Value]) -> "Parameters":
-        """Return a copy with other values, for a trial; `prepare` is not called."""
+        """Return a copy with other values; `prepare` is not called."""
         trial = Parameters(self._definitions)
         trial.load(values)
         return trial
@@ -145,7 +135,7 @@ class Parameters:
         return self._index.get(name)
 
     def set(self, name: str, value: Value) -> ParamError | None:
-        """Change a value, if valid and accepted by `prepare`; return the refusal. The present value is always valid."""
+        """Change a value, if valid and accepted by `prepare`; return the refusal."""
         index = self._index.get(name)
         if index is None:
             return ParamError.DOES_NOT_EXIST
@@ -196,7 +186,6 @@ def float32(value: float) -> float:
 
 
 def bits_of(kind: Kind, value: Value) -> int:
-    """Return the 32 bits of a value as an unsigned integer."""
     (bits,) = _BITS.unpack(_INT.pack(value) if kind == Kind.INT else _REAL.pack(value))
     return int(bits)
 

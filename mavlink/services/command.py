@@ -185,7 +185,7 @@ class CommandService:
 
 
 def _goes_to_a_place(number: int) -> bool:
-    """Whether x and y of a command are a place by MAVLink's definition; only then its frame counts."""
+    """Whether x and y of a command are a place; only then its frame counts."""
     definition = mav.enums["MAV_CMD"].get(number)
     return definition is not None and definition.has_location
 

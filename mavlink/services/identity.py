@@ -45,9 +45,9 @@ def version_of(text: str) -> Triple:
 def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fields:
     """Return the fields of AUTOPILOT_VERSION (148).
 
-    The custom version is patch, minor and major of Colibri, the place of a vendor's version, then its name. Versions
-    are
-    never marked as official: ground stations would offer an update to PX4's latest.
+    The custom version is patch, minor and major of Colibri, then its name. Versions are never marked as official:
+    ground
+    stations would offer an update to PX4's latest.
     """
     major, minor, patch = version
     own = _packed(version)

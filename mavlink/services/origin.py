@@ -17,7 +17,7 @@ _MIN_HEIGHT_MM, _MAX_HEIGHT_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
-    """Handlers that return a refusal or `None`. `mode` takes base mode and custom mode."""
+    """Handlers of the messages. `mode` takes base mode and custom mode."""
 
     origin: Callable[[Geodetic], Refusal | None]
     home: Callable[[Geodetic], Refusal | None]

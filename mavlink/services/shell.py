@@ -1,7 +1,4 @@
-"""A shell over SERIAL_CONTROL with a few commands that only report; without access to the system.
-
-Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#SERIAL_CONTROL, device SHELL.
-"""
+"""A shell over SERIAL_CONTROL (126), device SHELL, with a few commands that only report."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias

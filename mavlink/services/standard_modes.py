@@ -66,7 +66,6 @@ class StandardModes:
         return (len(self._modes), index, mode.standard_mode, mode.custom_mode, properties, name)
 
     def _set_standard_mode(self, command: Command) -> Refusal | None:
-        """Obey MAV_CMD_DO_SET_STANDARD_MODE: "FAILED if the mode is not supported by the vehicle"."""
         for mode in self._modes:
             if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
                 return self._set_mode(mode.custom_mode, command)

@@ -1,8 +1,7 @@
 """Services of streamed setpoints, and arbitration between clients of the same kind.
 
 The first client that streams is obeyed until it is silent for a time-out; then the next one that streams. A client that
-engages the stream's mode takes over, if it streams. A client is a channel, a system and a component, so equal ids on
-two links are two clients.
+engages the stream's mode takes over, if it streams. Equal ids on two links are two clients.
 """
 
 from abc import ABC, abstractmethod
@@ -52,18 +51,13 @@ class StreamedService(ABC, Generic[Value]):
 
     @abstractmethod
     def _decode(self, message: Message, peer: Peer, now_us: int, /) -> Value | None:
-        """Return the setpoint in a message, if any.
-
-        Raises:
-            Refused: It is invalid.
-        """
+        """Return the setpoint in a message, if any; raise `Refused` if it is invalid."""
 
     def _latest(self, now_us: int, timeout_us: int) -> Value | None:
         """Return the obeyed client's latest setpoint, if not older than `timeout_us`."""
         return None if self.source is None else self._value(self.source, now_us, timeout_us)
 
     def _value(self, peer: Peer, now_us: int, timeout_us: int) -> Value | None:
-        """Return one client's latest setpoint, if not older than `timeout_us`."""
         time_us, value = self._received.get(peer, (now_us + 1, None))
         return value if 0 <= now_us - time_us <= timeout_us else None
 

@@ -1,8 +1,7 @@
 """Follow-me: the target's state from FOLLOW_TARGET.
 
-Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Only the position bit of
-`est_capabilities` is required: clients that send velocity omit its bit, and by the message's text a velocity of
-(0, 0, 0) is unknown.
+Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Of `est_capabilities` only the
+position bit is required: clients that send velocity omit its bit, and (0, 0, 0) is an unknown one.
 """
 
 from math import hypot, isfinite, isnan

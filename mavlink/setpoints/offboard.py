@@ -8,8 +8,7 @@ Choices left open by the specification:
 - A group with only NaN in its unmasked fields counts as masked, as in PX4.
 - Undefined bits of a type mask are ignored.
 - Body frames are level: they turn with the heading, not with roll and pitch.
-- If one horizontal axis of a group in a body frame is masked, it means: keep this position, zero velocity, zero
-  acceleration; the earth axes are then both given.
+- One masked horizontal axis of a group in a body frame means: keep this position, zero velocity, zero acceleration.
 - Altitude above terrain is altitude above home: the ground is flat.
 """
 
@@ -170,11 +169,7 @@ def _counted_from_m(frame: int, here: Whereabouts) -> float:
 
 
 def group(wire: Vector, masked: int, maximum: float) -> Vector:
-    """Return a group's fields, nan if masked (bit n of `masked`); the others are at most `maximum` long.
-
-    Raises:
-        Refused: An unmasked field is invalid, unless all are NaN.
-    """
+    """Return a group's fields, nan if masked (bit n of `masked`); the others are at most `maximum` long."""
     given = [value for axis, value in enumerate(wire) if not masked >> axis & 1]
     if all(map(isnan, given)):
         return NOWHERE

@@ -14,18 +14,12 @@ class PositionSetpoint(NamedTuple):
     """A setpoint of position and its derivatives; nan if not given.
 
     An axis without position, velocity and acceleration is held by the vehicle; so is yaw without angle and rate.
-
-    Attributes:
-        position_enu_m: From the origin.
-        velocity_m_s: ENU; with `body`, FLU of a level vehicle along its heading.
-        acceleration_m_s2: In the same axes: feed-forward, or the only demand.
-        yaw_rad: Counter-clockwise from east, -pi..pi.
     """
 
     position_enu_m: Vector = NOWHERE
-    velocity_m_s: Vector = NOWHERE
-    acceleration_m_s2: Vector = NOWHERE
-    yaw_rad: float = nan
+    velocity_m_s: Vector = NOWHERE  # ENU; with `body`, FLU of a level vehicle
+    acceleration_m_s2: Vector = NOWHERE  # in the same axes: feed-forward, or the only demand
+    yaw_rad: float = nan  # counter-clockwise from east, -pi..pi
     yaw_rate_rad_s: float = nan
     body: bool = False
     time_us: int = 0
@@ -42,17 +36,11 @@ class PositionSetpoint(NamedTuple):
 
 
 class AttitudeSetpoint(NamedTuple):
-    """A setpoint of attitude or body rates, and thrust.
+    """A setpoint of attitude or body rates, and thrust."""
 
-    Attributes:
-        attitude: FLU to ENU; `None` if only rates are given.
-        rate_flu_rad_s: nan on axes without a rate; feed-forward beside an attitude.
-        thrust: 0..1 of the largest; nan if not given.
-    """
-
-    attitude: Quaternion | None
-    rate_flu_rad_s: Vector
-    thrust: float
+    attitude: Quaternion | None  # FLU to ENU
+    rate_flu_rad_s: Vector  # nan if not given; feed-forward beside an attitude
+    thrust: float  # 0..1 of the largest; nan if not given
     time_us: int = 0
 
 

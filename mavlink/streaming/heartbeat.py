@@ -60,7 +60,6 @@ class HeartbeatService:
 
 
 def _state(s: Snapshot) -> int:
-    """Return MAV_STATE: terminated, emergency, failsafe, armed or standby."""
     state: int = mav.MAV_STATE_ACTIVE if s.armed else mav.MAV_STATE_STANDBY
     if s.failsafe:
         state = mav.MAV_STATE_CRITICAL

@@ -91,7 +91,6 @@ class StreamService:
         return self._schedule.interval_us((channel, name))
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Handle REQUEST_DATA_STREAM: the rate of a group of messages, or its end."""
         fields = message.fields
         names = ALL_GROUPS if fields.req_stream_id == mav.MAV_DATA_STREAM_ALL else GROUPS.get(fields.req_stream_id, ())
         rate_hz = fields.req_message_rate if fields.start_stop else 0

@@ -117,6 +117,7 @@ def _row(point: Forecast) -> tuple[float, ...]:
 
 
 def _spread(horizon: tuple[Forecast, ...]) -> list[Forecast]:
+    """-"""
     count = min(POINTS, len(horizon))
     return [horizon[(number + 1) * len(horizon) // count - 1] for number in range(count)]
 

@@ -25,10 +25,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:
-    """Return `encoder` of message `name` with numbers rounded and clamped to the fields' types.
-
-    A message with a non-finite integer or an invalid place is omitted: `None`.
-    """
+    """Return `encoder` with numbers rounded and clamped to the fields' types; it omits a message with invalid ones."""
     kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
 
@@ -77,7 +74,7 @@ for _bits in (8, 16, 32, 64):
 
 
 def boot_ms(s: Snapshot) -> int:
-    """Return the time since the start, ms, wrapped to a uint32 (49 days)."""
+    """Return the time since the start, ms, wrapped to a uint32."""
     return s.time_us // 1000 % 2**32
 
 
@@ -108,13 +105,13 @@ def height_above_home_m(s: Snapshot) -> float:
 
 
 def yaw_ned(yaw_enu_rad: float) -> float:
-    """Return yaw clockwise from north, rad in (-pi, pi]; nan stays nan."""
+    """Return yaw clockwise from north, rad in (-pi, pi]."""
     turned = (pi / 2 - yaw_enu_rad) % (2.0 * pi)
     return turned - 2.0 * pi if turned > pi else turned
 
 
 def compass_cdeg(angle_rad: float) -> int:
-    """Return the compass direction, 0 to 35999 centidegrees, of an angle counter-clockwise from east."""
+    """Return the compass direction, centidegrees, of an angle counter-clockwise from east."""
     return round(100.0 * degrees(pi / 2 - angle_rad)) % FULL_TURN_CDEG
 
 

@@ -16,10 +16,10 @@ CHARGE_OK = 1
 
 
 class Home(NamedTuple):
-    """The place of return; yaw is counter-clockwise from east."""
+    """The place of return."""
 
     position_enu_m: Vector
-    yaw_rad: float
+    yaw_rad: float  # counter-clockwise from east
 
 
 class BatteryState(NamedTuple):
@@ -60,50 +60,31 @@ class Forecast(NamedTuple):
 
 
 class SolverState(NamedTuple):
-    """Result of the control law's last decision.
+    """Result of the control law's last decision."""
 
-    Attributes:
-        status: Code of `colibri.autopilot.control.qp.QpStatus`, 0 is solved; -1 without a QP.
-        fallback: Code of `colibri.autopilot.control.interface.Fallback`, or -1.
-        iterations: Of the solver; -1 if not reported.
-        slack: Largest excess of a soft limit, in parts of it.
-        active: Active constraints: rotors, increments, angles, rates.
-        planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
-        mass_kg: Estimate; nan for a law without one.
-        path_lag_s: Lag of the path time behind the clock; nan for a law that follows the clock.
-    """
-
-    status: int = -1
-    fallback: int = -1
-    iterations: int = -1
+    status: int = -1  # `QpStatus`, 0 is solved; -1 without a QP
+    fallback: int = -1  # `Fallback`; -1 without
+    iterations: int = -1  # -1 if not reported
     solve_time_s: float = 0.0
     step_time_s: float = 0.0
     cost: float = 0.0
-    slack: float = 0.0
-    active: tuple[int, int, int, int] = (0, 0, 0, 0)
-    planned_squared: tuple[FourRotors, ...] = ()
+    slack: float = 0.0  # largest excess of a soft limit, in parts of it
+    active: tuple[int, int, int, int] = (0, 0, 0, 0)  # constraints: rotors, increments, angles, rates
+    planned_squared: tuple[FourRotors, ...] = ()  # parts of the largest, by step
     horizon: tuple[Forecast, ...] = ()
-    mass_kg: float = nan
-    path_lag_s: float = nan
+    mass_kg: float = nan  # nan for a law without an estimate
+    path_lag_s: float = nan  # nan for a law that follows the clock
 
 
 class EstimatorState(NamedTuple):
-    """Quality of the estimate.
+    """Quality of the estimate."""
 
-    Attributes:
-        flags: ESTIMATOR_STATUS_FLAGS.
-        ratios: Of the last tests of velocity, horizontal position, height, magnetic field, height above the ground and
-            airspeed: rejected above 1.
-        sensors: MAV_SYS_STATUS_SENSOR bits of its sensors.
-        failed_sensors: Bits of the rejected ones.
-    """
-
-    flags: int
-    ratios: tuple[float, ...]
+    flags: int  # ESTIMATOR_STATUS_FLAGS
+    ratios: tuple[float, ...]  # of tests, in the order of ESTIMATOR_STATUS; rejected above 1
     horizontal_accuracy_m: float
     vertical_accuracy_m: float
-    sensors: int
-    failed_sensors: int
+    sensors: int  # MAV_SYS_STATUS_SENSOR bits
+    failed_sensors: int  # likewise
 
 
 NO_SETPOINT = Setpoint()

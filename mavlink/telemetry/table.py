@@ -10,10 +10,7 @@ from colibri.mavlink.telemetry.snapshot import Snapshot
 
 
 def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
-    """Return the encoder of each message by name; `boot_unix_us`: Unix time at the start, 0 if unknown.
-
-    An encoder never raises, and its fields fit their types.
-    """
+    """Return the encoder of each message by name; an encoder never raises."""
     encoders: dict[str, Encoder] = {encoder.__name__.upper(): encoder for encoder in _ENCODERS}
     encoders["SYSTEM_TIME"] = partial(status.system_time, boot_unix_us=boot_unix_us)
     for row in OWN_MESSAGES:

@@ -10,7 +10,6 @@ from colibri.mavlink.ulog.topics import NUMBERS, PARTS, TOPICS
 
 
 def beginning(vehicle: str, parameters: Mapping[str, int | float]) -> bytes:
-    """Return the definitions and subscriptions of a file, valid for all its writers."""
     own = {topic.name: topic.fields for topic in FLIGHT_TOPICS} | {INPUT: INPUT_FIELDS}
     numbers = NUMBERS | {topic.name: topic.number for topic in FLIGHT_TOPICS} | {INPUT: INPUT_NUMBER}
     formats = [messages.format_of(name, fields) for name, fields in {**PARTS, **TOPICS, **own}.items()]

@@ -33,17 +33,12 @@ Turn: TypeAlias = Callable[[Vector], Vector]
 
 
 class Blocks(ABC):
-    """Encoder of rows of some topics.
+    """Encoder of rows of some topics."""
 
-    Attributes:
-        block_rows: Rows of a block.
-        pack: Packs a row as doubles, smaller and with fewer objects than Python's numbers.
-    """
-
-    block_rows = BLOCK_ROWS
+    block_rows = BLOCK_ROWS  # rows of a block
 
     def __init__(self, columns: int) -> None:
-        self.pack = Struct(f"<{columns}d")
+        self.pack = Struct(f"<{columns}d")  # a row as doubles
 
     @abstractmethod
     def encode(self, table: Array) -> bytes:
@@ -51,11 +46,7 @@ class Blocks(ABC):
 
 
 class Turned:
-    """Columns of a table in other frames, converted together.
-
-    Attributes:
-        places: Slice of each named result.
-    """
+    """Columns of a table in other frames, converted together; `places` has the slice of each named result."""
 
     def __init__(self, columns: Sequence[str], **vectors: tuple[Turn, str]) -> None:
         """Convert vectors of three columns each: `POSITION=(ned_from_enu, "x y z")`; several may share a name."""
@@ -78,12 +69,12 @@ class Turned:
 
 
 def attitude_ned(attitude: Array) -> Array:
-    """Convert attitudes from FLU/ENU to FRD/NED, wxyz, (n, 4)."""
+    """Convert attitudes from FLU/ENU to FRD/NED, (n, 4)."""
     qw, qx, qy, qz = attitude.T
     return np.array(ned_frd_from_enu_flu((qw, qx, qy, qz))).T
 
 
 def heading_from_yaw(yaw_rad: Array) -> Array:
-    """Return the heading, -pi to pi clockwise from north, of a yaw counter-clockwise from east, (n,)."""
+    """Return the heading, -pi to pi clockwise from north, of a yaw counter-clockwise from east."""
     heading: Array = pi - np.remainder(pi / 2.0 + yaw_rad, 2.0 * pi)
     return heading

@@ -29,22 +29,14 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A topic as a table: one row per instant, `t` (s) first.
-
-    Attributes:
-        number: In the file, for all processes that write to it.
-        table: Name of the CSV table.
-        rows: Meaning of a row.
-        columns: All except the time.
-        block_rows: Rows written at once.
-    """
+    """A topic as a table: one row per instant, `t` (s) first."""
 
     name: str
-    number: int
-    table: str
-    rows: str
-    columns: tuple[Columns, ...]
-    block_rows: int = 64
+    number: int  # in the file, for all processes that write to it
+    table: str  # name of the CSV table
+    rows: str  # meaning of a row
+    columns: tuple[Columns, ...]  # all except the time
+    block_rows: int = 64  # rows written at once
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -64,7 +56,6 @@ class Topic:
         return message_layout(self.fields)
 
     def encode(self, rows: Array) -> bytes:
-        """Return the messages of rows (n, columns)."""
         encoded = np.zeros(len(rows), self.layout)
         encoded["size"], encoded["kind"], encoded["number"] = head(self.layout, self.number)
         encoded["timestamp"] = np.rint(rows[:, :1] * _US_PER_S)
@@ -73,7 +64,6 @@ class Topic:
         return encoded.tobytes()
 
     def decode(self, encoded: NDArray[np.void]) -> Array:
-        """Return the rows (n, columns) of messages (n,)."""
         rows = np.empty((len(encoded), len(self.names)))
         rows[:, :1] = encoded["timestamp"] / _US_PER_S
         for name, place in self._runs:

@@ -34,13 +34,9 @@ class TopicReader(Protocol):
 
 
 class TopicLog(ABC):
-    """A log of a flight's topics; its methods raise `LogError` if writing fails.
+    """A log of a flight's topics; its methods raise `LogError` if writing fails."""
 
-    Attributes:
-        for_viewers: Whether to record PX4's topics and the inputs for replay.
-    """
-
-    for_viewers = True
+    for_viewers = True  # also PX4's topics, and inputs for replay
 
     def __init__(self) -> None:
         self._waiting: dict[RowEncoder, list[bytes]] = {}
@@ -48,7 +44,6 @@ class TopicLog(ABC):
         self._beginning = b""
 
     def begin(self, beginning: bytes) -> None:
-        """Note the beginning of a file, in case one is written later."""
         self._beginning = beginning
 
     def add(self, encoder: RowEncoder, row: Sequence[float]) -> None:

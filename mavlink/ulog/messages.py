@@ -30,7 +30,6 @@ SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))
 
 
 def header(start_us: int = 0) -> bytes:
-    """Return a file's header with start time, µs, and flag bits."""
     return MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
 
 
@@ -51,7 +50,6 @@ def _information(name: str, fact: str | int) -> bytes:
 
 
 def parameters(values: Mapping[str, int | float]) -> bytes:
-    """Return parameters: initial values in the definitions, changes in the data."""
     return b"".join(_parameter(name, value) for name, value in values.items())
 
 

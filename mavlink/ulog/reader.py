@@ -29,12 +29,7 @@ class FlightFile:
     """A flight log; after a killed process, its last message may be truncated."""
 
     def __init__(self, path: Path) -> None:
-        """Index the messages.
-
-        Raises:
-            OSError: The file cannot be read.
-            LogFormatError: It is not a ULog, or lacks this version's topics.
-        """
+        """Index the messages; raise `LogFormatError` if it is not a ULog, or lacks this version's topics."""
         self._path = path
         with path.open("rb") as file:
             self._size = path.stat().st_size
@@ -104,7 +99,6 @@ class FlightFile:
         return count
 
     def _release(self) -> None:
-        """Release the memory of pages read so far."""
         if isinstance(self._log, mmap):
             self._log.madvise(MADV_DONTNEED)
 

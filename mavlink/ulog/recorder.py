@@ -26,10 +26,7 @@ class Recorder:
     def __init__(
         self, log: TopicLog, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool
     ) -> None:
-        """Record `vehicle`, without battery if the plant records it in the same file.
-
-        Snapshots are thinned, except changes of the status.
-        """
+        """Record `vehicle`, without battery if the plant records it in the same file."""
         self._log, self._vehicle, self._system_id, self._parameters = log, vehicle, system_id, parameters
         self._with_battery = with_battery
         self._samples, self._sensings = SampleBlocks(), SensingBlocks()
@@ -78,7 +75,6 @@ class Recorder:
 
 
 def sample_row(s: Snapshot) -> tuple[float, ...]:
-    """Return the row of `samples.COLUMNS`."""
     steered, solver = s.setpoint, s.solver
     attitude = _NO_REFERENCE if s.solver.step_time_s == 0.0 else euler_from_quaternion(steered.attitude)
     return (

@@ -46,7 +46,6 @@ _RATES, _PLACE, _REFERENCE = _turned.places.values()
 
 @compiled
 def _quaternions(euler: Array) -> Array:
-    """Return attitudes, wxyz, (n, 4), of phi, theta, psi, (n, 3)."""
     quaternions = np.empty((euler.shape[0], 4))
     for row in range(euler.shape[0]):
         w, x, y, z = quaternion_from_euler(euler[row, 0], euler[row, 1], euler[row, 2])

@@ -37,12 +37,10 @@ class Status(NamedTuple):
 
 
 def nav_state(custom_mode: int) -> int:
-    """Return PX4's nav_state of a mode, or 31."""
     return _NAV_STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF), 31)
 
 
 def status_message(time_us: int, status: Status, system_id: int) -> bytes:
-    """Return the status behind a mark for resynchronising readers."""
     mode = nav_state(status.custom_mode)
     who = (_ROTARY_WING, mav.MAV_TYPE_QUADROTOR, system_id, AUTOPILOT_COMPONENT)
     times_us, arming = (time_us, status.armed_us, status.takeoff_us), _ARMED if status.armed else _DISARMED

@@ -61,19 +61,12 @@ def bits(prefix: str, names: str) -> int:
 
 
 class Message(NamedTuple):
-    """A decoded message with a valid CRC; its values are unchecked.
-
-    Attributes:
-        name: In MAVLink's spelling, "HEARTBEAT".
-        source: System and component id.
-        fields: Attributes in wire units and frames; text is a str, an array a tuple or a list.
-        frame: The received bytes, including a signature.
-    """
+    """A decoded message with a valid CRC; its values are unchecked."""
 
     name: str
-    source: tuple[int, int]
-    fields: Any
-    frame: bytes
+    source: tuple[int, int]  # system and component id
+    fields: Any  # attributes, in wire units and frames
+    frame: bytes  # received bytes with signature
 
 
 class Bits(NamedTuple):
@@ -83,11 +76,7 @@ class Bits(NamedTuple):
 
 
 def param_bits(message: Message) -> int:
-    """Return the 32 bits of `param_value` of a PARAM_SET or PARAM_VALUE.
-
-    Integers are copied bytewise into that float (https://mavlink.io/en/services/parameter.html); `message.fields` has
-    another value if they form a signalling NaN.
-    """
+    """Return the bits of `param_value`: as a float, an integer's may be a signalling NaN, which Python changes."""
     return int.from_bytes(payload(message.frame)[: _PARAM_VALUE.size], "little")
 
 
@@ -98,7 +87,6 @@ def payload(frame: bytes) -> bytes:
 
 
 def sequence_of(frame: bytes) -> int:
-    """Return the sequence number of a frame of MAVLink 1 or 2."""
     return frame[4] if frame[0] == MARKER else frame[2]
 
 
@@ -113,37 +101,28 @@ def intact(frame: bytes) -> bool | None:
 
 
 class Codec:
-    """Encoder for one component, decoder for any.
+    """Encoder for one component, decoder for any; signatures are not checked.
 
     MAVLink 2 frames, the only ones in flight, are read and written here, several times as fast as by pymavlink. MAVLink
     1
-    and malformed input are left to pymavlink. Signatures are not checked.
-
-    Attributes:
-        source: Own system and component id.
-        seal: Signs a frame; `None` to send unsigned.
-        dropped: Invalid input, counted by reason.
+    and malformed input are left to pymavlink.
     """
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
-        """Encode as a component.
-
-        With `keep_unknown`, messages outside the dialect are returned as `UNKNOWN`, without fields and with unchecked
-        CRC.
-        """
+        """Create a codec; with `keep_unknown`, it returns messages outside the dialect, unchecked, as `UNKNOWN`."""
         self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
         self._sequence = 0
         self._keep_unknown = keep_unknown
-        self.source = (system_id, component_id)
+        self.source = (system_id, component_id)  # own system and component id
         self._source_bytes = bytes(self.source)
-        self.seal: Callable[[bytes], bytes] | None = None
-        self.dropped: Counter[str] = Counter()
+        self.seal: Callable[[bytes], bytes] | None = None  # signs a frame
+        self.dropped: Counter[str] = Counter()  # invalid input, by reason
 
     def encode(self, name: str, *fields: Any) -> bytes:
         """Encode message `name` with fields in the order of the MAVLink definition, in wire units and frames.
 
-        Text is bytes, or a str that is sent as UTF-8; longer text is cut. `param_value` may be `Bits`.
+        Text is bytes or UTF-8, cut to its length. `param_value` may be `Bits`.
         """
         layout = _layout_named(name)
         return self.framed(layout.payload(fields), layout.message_id, layout.crc_extra)
@@ -165,7 +144,6 @@ class Codec:
         return sequence
 
     def decode(self, datagram: bytes) -> list[Message]:
-        """Return the messages of a datagram of whole frames."""
         messages = _whole_messages(datagram)
         return self._parsed(datagram) if messages is None else messages
 
@@ -313,7 +291,6 @@ def _layout(message_id: int) -> _Layout | None:
 
 
 def _places(lengths: Sequence[int]) -> Iterator[int | slice]:
-    """Yield the position of each field's numbers in a payload."""
     at = 0
     for length in lengths:
         yield slice(at, at + length) if length else at

@@ -20,11 +20,8 @@ class FixedFrame:
     def __init__(self, name: str, fields: str) -> None:
         """Lay out the first fields of message `name`, in wire order, separated by spaces; the rest is zero.
 
-        "controls[4]" is the first four numbers of an array. "fields_updated:H" has another size, by its `struct`
-        letter: trailing zero bytes are not sent.
-
-        Raises:
-            ValueError: The dialect has other fields there.
+        "controls[4]" is the first four numbers of an array; "fields_updated:H" has another size, without trailing zero
+        bytes.
         """
         definition = definition_of(name)
         of_dialect = zip(definition.ordered_fieldnames, findall(r"\d*\w", definition.unpacker.format), strict=True)

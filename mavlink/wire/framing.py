@@ -13,18 +13,15 @@ _OTHER_BYTES = 12
 
 
 class Framer:
-    """Splitter of a stream; buffers at most one frame.
+    """Splitter of a stream into frames with valid CRC; buffers at most one.
 
-    A frame needs a valid CRC. A message outside the dialect, with unverifiable CRC, counts as a frame if it is followed
-    by
-    another one or by silence.
+    A message outside the dialect, with unverifiable CRC, counts as a frame if followed by another one or by silence.
     """
 
     def __init__(self) -> None:
         self._rest = b""
 
     def take(self, chunk: bytes) -> list[bytes]:
-        """Return the frames completed by `chunk`."""
         frames: list[bytes] = []
         data, at = self._rest + chunk, 0
         while marker := _MARKERS.search(data, at):

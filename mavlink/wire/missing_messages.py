@@ -56,7 +56,6 @@ LATER = {
 
 
 def add_to(dialect: Any) -> None:
-    """Add the missing messages to pymavlink's module `dialect`."""
     for definition in MISSING:
         if definition.id not in dialect.mavlink_map:
             kind = _class_of(definition, dialect)

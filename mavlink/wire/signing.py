@@ -33,11 +33,7 @@ class SigningError(MavlinkError):
 
 
 def parse_key(content: bytes) -> bytes:
-    """Return the key of a key file: 32 bytes, or 64 hexadecimal digits with surrounding white space.
-
-    Raises:
-        SigningError: It is neither, or all zeros, which means unsigned.
-    """
+    """Return the key of a key file: 32 bytes, or 64 hexadecimal digits with surrounding white space."""
     if len(content) == KEY_BYTES:
         key = content
     else:
@@ -53,7 +49,6 @@ def parse_key(content: bytes) -> bytes:
 
 
 def tick_at(unix_s: float) -> int:
-    """Return the timestamp of a wall-clock time."""
     return min(max(round((unix_s - EPOCH_S) * 1e6 / TICK_US), 0), LAST_TICK)
 
 
@@ -62,10 +57,6 @@ class Signing:
 
     The own timestamp advances with simulated time, with each signed frame and each later accepted one; it never
     decreases.
-
-    Attributes:
-        timestamp: Ticks; to be stored, and passed at the next start.
-        key_changed: Set by SETUP_SIGNING; the owner may store the key and reset this.
     """
 
     def __init__(self, key: bytes | None, start: int, now_us: int = 0) -> None:
@@ -75,8 +66,8 @@ class Signing:
         self._start = start - now_us // TICK_US
         self._streams: dict[tuple[int, int, int], int] = {}
         self._forgotten = -1
-        self.timestamp = start
-        self.key_changed = False
+        self.timestamp = start  # ticks; to be stored for the next start
+        self.key_changed = False  # by SETUP_SIGNING; the owner may reset this
 
     @property
     def active(self) -> bool:
@@ -94,7 +85,7 @@ class Signing:
         return head + self._digest(frame + head)
 
     def refusal(self, name: str, frame: bytes, now_us: int) -> str | None:
-        """Return the reason to reject a frame, or `None`."""
+        """Return the reason to reject a frame."""
         if not self.active:
             return None
         if frame[0] != MARKER or not frame[_FLAGS_AT] & SIGNED:

@@ -23,11 +23,7 @@ class TlogError(MavlinkError):
 
 
 def decode(log: bytes) -> Iterator[Logged]:
-    """Yield the frames of a log, the last of which may be truncated.
-
-    Raises:
-        TlogError: A frame is malformed.
-    """
+    """Yield the frames of a log, the last of which may be truncated; raise `TlogError` on a malformed one."""
     at = 0
     while at + STAMP.size < len(log):
         begin = at + STAMP.size
