@@ -24,8 +24,7 @@ def compiled(function: _Function) -> _Function:
     """Compile a function at its first call, and cache the machine code on disk.
 
     The cache is renewed when the function's file changes, or that of a kernel it calls. Arithmetic is IEEE 754 in the
-    order
-    written, for the same bits on every computer; division by zero gives infinity.
+    order written, for the same bits on every computer; division by zero gives infinity.
     """
     return cast(_Function, _kernel(function))
 
@@ -49,10 +48,7 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 
 def packed(parameters: NamedTuple) -> Packed:
-    """Return the record of `parameters`, (1,): one pointer for a kernel.
-
-    Arrays are aligned to cache lines: a value across two lines takes twice as long to load.
-    """
+    """Return the record of `parameters`, (1,), a kernel's argument, aligned to cache lines for speed."""
     layout = _layout(parameters)
     memory = np.zeros(layout.itemsize + _LINE, dtype=np.uint8)
     begin = -memory.ctypes.data % _LINE

@@ -1,8 +1,7 @@
 """Small dense matrices in double precision with a fixed order of operations: the same bits on every computer.
 
 BLAS and LAPACK choose their code by the CPU; at sizes of 3 to 100 they are not faster. Matrices may have any strides
-but
-must be writable float64; results are new and C-ordered.
+but must be writable float64; results are new and C-ordered.
 """
 
 from math import sqrt
@@ -108,7 +107,7 @@ def _max_column_sum(A: Array) -> float:
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
 def expm(A: Array) -> Array:
-    """Return the exponential of A by scaling and squaring of the Taylor series."""
+    """Return the exponential of A by scaling and squaring."""
     squarings, size = 0, _max_column_sum(A)
     while _TAYLOR_NORM < size < np.inf:
         size, squarings = 0.5 * size, squarings + 1

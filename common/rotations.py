@@ -29,7 +29,6 @@ def rotation_matrix(q: Quaternion) -> Matrix:
 
 
 def tilt_deg(q: Quaternion) -> float:
-    """Return the angle between the body's z axis and the vertical."""
     return degrees(acos(min(1.0, max(-1.0, rotation_matrix(q)[2][2]))))
 
 

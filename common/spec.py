@@ -56,7 +56,6 @@ class Field(NamedTuple):
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The valid words, if the value is one of a list."""
         if get_origin(self.kind) is Literal:
             return get_args(self.kind)
         return tuple(self.kind) if isinstance(self.kind, type) and issubclass(self.kind, StrEnum) else ()
@@ -75,7 +74,6 @@ class Field(NamedTuple):
         return tuple(map(self._one, given if several else (given,)))
 
     def read_text(self, text: str) -> Any:
-        """Return the value of a text, or of one of several."""
         if self.option.read is not None:
             return self.option.read(text)
         if self.choices:
@@ -175,7 +173,6 @@ def add_options(
     """Add the options of a specification to a command line.
 
     Args:
-        leave_out: Fields to omit.
         shown: Defaults in words, by field.
         given_only: Whether omitted options set no attribute.
         keywords_only: Whether to add only the options of Python and campaigns.

@@ -62,7 +62,6 @@ def place_deg(
 
 
 def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[float, float]] = offset_m) -> Vector:
-    """Return the position of `place` from `origin`, m, ENU."""
     east, north = offset(place.latitude_deg, place.longitude_deg, origin.latitude_deg, origin.longitude_deg)
     return (east, north, place.altitude_m - origin.altitude_m)
 

@@ -58,7 +58,6 @@ class _OnDisk(FunctionCache):
 
 @cache
 def _use_private_folder() -> bool:
-    """Use the private folder in this process and its children, if possible."""
     folder = private_folder()
     if folder is not None:
         config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]

@@ -34,8 +34,7 @@ class _Kept(NamedTuple):
 class Results(CompileResultCacheImpl):
     """Writer and reader of compilation results for numba.
 
-    `version` covers all inputs. It is stored with each result: two versions that write at once may mix index and
-    result.
+    `version` is stored with each result: two versions that write at once may mix index and result.
     """
 
     version: tuple[str, ...] = ()
@@ -53,7 +52,6 @@ class Results(CompileResultCacheImpl):
         return super().rebuild(target_context, kept)
 
     def _kept(self, cres: Any) -> Any:
-        """Return a `_Kept` if it suffices, otherwise numba's own reduction."""
         whole = super().reduce(cres)
         (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
         object_mode, lifted, _, reload_init, environments = others
@@ -108,7 +106,7 @@ class _Library(JITCodeLibrary):
 
 @cache
 def _name_runtime() -> None:
-    """Register numba's runtime with LLVM; numba would also compile it."""
+    """Register numba's runtime with LLVM without compiling it."""
     for name, address in _nrt_python.c_helpers.items():
         add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 

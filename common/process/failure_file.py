@@ -10,7 +10,7 @@ FAILURE = "failure.txt"
 
 
 def keep_failure(error: Error, folder: Path | None) -> str:
-    """Write the reason of a flight's end to `folder`, if any; return the line for the user."""
+    """Write the reason of a flight's end to `folder`; return the line for the user."""
     if folder is None:
         return str(error)
     path = folder / FAILURE

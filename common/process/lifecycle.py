@@ -54,9 +54,7 @@ def loading() -> Iterator[None]:
 def gc_frozen() -> Iterator[None]:
     """Exclude all existing objects from garbage collection, to save flight time.
 
-    Collecting their garbage, about a thousand objects, would add 0.15 s to every start. Objects that are frozen already
-    stay
-    so.
+    Collecting their garbage would add 0.15 s to every start.
     """
     ours = not gc.get_freeze_count()
     if ours:
@@ -100,7 +98,7 @@ class Stop:
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
         """Handle signals; with `starting` they end the process at once until the first check.
 
-        The parent passes its own id because it may die before this process reads it.
+        The parent passes its own id: it may die before this process reads it.
         """
         self._signalled = False
         self._starting = starting

@@ -11,7 +11,7 @@ class SharedLog(LogFile):
     """A log that continues while any process has it open, for restarted autopilots."""
 
     def __init__(self, path: Path, beginning: bytes, *, goes_on: bool = False) -> None:
-        """Open the file; write `beginning` if it is new; with `goes_on` append even if it is not open elsewhere."""
+        """Open the file; write `beginning` if it is new; `goes_on` keeps the content in any case."""
         super().__init__(path, "ab")
         try:
             is_alone = _is_alone(self._file.fileno())

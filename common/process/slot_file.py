@@ -1,7 +1,7 @@
 """A file of two slots that survives a crash at any instant with the last complete write.
 
-The file is memory-mapped, so the system has a write at once. Slots are written alternately with number and checksum, so
-one is always whole. Only a power failure may lose more.
+The file is memory-mapped, so the system has a write at once. Slots are written alternately with number and checksum.
+Only a power failure may lose more.
 """
 
 from mmap import mmap
@@ -52,7 +52,6 @@ class Slots:
         self._map.close()
 
     def _whole(self) -> list[tuple[int, bytes]]:
-        """Return number and content of each intact slot."""
         slots = []
         for at in (0, SLOT):
             number, length, checksum = _HEAD.unpack_from(self._map, at)

@@ -24,6 +24,5 @@ def use_writable_folders() -> None:
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Whether files can be created in a folder, which may be missing."""
     there = next(path for path in (folder, *folder.absolute().parents) if os.path.exists(path))
     return there.is_dir() and os.access(there, os.W_OK | os.X_OK)

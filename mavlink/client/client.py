@@ -10,16 +10,16 @@
 
 Theory
 ------
-MAVLink datagrams may be lost, duplicated and reordered. Requests (https://mavlink.io/en/services/) are repeated by the
-client until the vehicle answers, and the vehicle recognises repetitions. So a `Conversation` has two inputs:
-`poll(now)` returns the current request when it is due, first at once and then after each silence; `receive(message)`
-reads an answer, which ends the conversation or moves it to its next request. `receive` never sends, so duplicate
-answers cause one request only.
+MAVLink datagrams may be lost, duplicated and reordered. Requests (https://mavlink.io/en/services/) are repeated until
+the vehicle answers. So a `Conversation` has two inputs: `poll(now)` returns the current request when it is due, first
+at
+once and then after each silence; `receive(message)` reads an answer, which ends the conversation or moves it to its
+next request. `receive` never sends, so duplicate answers cause one request only.
 
 An answer does not identify its request: a COMMAND_ACK has only the number of the command. Conversations with
-indistinguishable answers share a *lane* and take turns; different lanes run side by side. An old answer that arrives
-during the next conversation of its lane is ignored if its content shows its age (an acknowledgement before the last
-item was sent, the value from before the change); for a repeated command this is impossible.
+indistinguishable answers share a *lane* and take turns. An old answer during the next conversation of its lane is
+ignored if its content shows its age (an acknowledgement before the last item was sent, the value from before the
+change); for a repeated command this is impossible.
 """
 
 from collections import Counter, deque
@@ -114,7 +114,6 @@ class Client:
         return next(iter(self.vehicles.values()), None)
 
     def sign_with(self, signing: Signing | None) -> None:
-        """Sign outgoing messages and drop those without a valid signature."""
         self._signing = signing
         self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
 

@@ -2,7 +2,7 @@
 
 The quickest of recent exchanges gives the offset, as delay disturbs the others (clock filter of RFC 5905, section 10).
 An older exchange must be quicker by the possible drift since. A significant drift (of simulators, percents) is
-estimated and compensated. https://mavlink.io/en/services/timesync.html
+compensated. https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
@@ -55,7 +55,6 @@ class VehicleClock:
 
     @property
     def round_trip_us(self) -> int:
-        """The median round-trip time, µs."""
         trips = sorted(exchange.round_trip_us for exchange in self._exchanges)
         return trips[len(trips) // 2] if trips else 0
 

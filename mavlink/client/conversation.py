@@ -29,10 +29,7 @@ USUALLY = Repeat()
 
 
 class Conversation(ABC):
-    """A request to a vehicle and its course until the result.
-
-    A subclass returns the messages of its current request and reads the answers.
-    """
+    """A request to a vehicle and its course until the result."""
 
     answers: ClassVar[frozenset[str]]  # names of messages
 

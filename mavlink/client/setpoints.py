@@ -33,10 +33,7 @@ def position_target(
     *,
     time_us: int = 0,
 ) -> Encoded:
-    """Return a setpoint in m, m/s, m/s^2 and rad, local ENU; missing groups are masked.
-
-    Yaw is counter-clockwise from east.
-    """
+    """Return a setpoint in SI, local ENU; missing groups are masked."""
     groups = (position, velocity, acceleration)
     mask = sum(ignored for ignored, group in zip(_GROUPS, groups, strict=True) if group is None)
     mask |= _NO_YAW * (yaw is None) | _NO_YAW_RATE * (yaw_rate is None)

@@ -39,7 +39,6 @@ class StateAssembler:
         self.refused = 0  # states with non-finite values
 
     def receive(self, message: Message, now_us: int) -> TimedState | None:
-        """Return the state completed by a message, if newer than the last."""
         name, fields = message.name, message.fields
         if name == "ODOMETRY":
             state = _of_odometry(fields)

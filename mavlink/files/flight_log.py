@@ -12,7 +12,6 @@ class FlightLog:
     """Writer of logs into a folder; removes the oldest for new ones."""
 
     def __init__(self, files: Files, folder: Names = (), kept: int = KEPT) -> None:
-        """Write into `folder` and keep the last `kept` logs, the open one included."""
         self._files = files
         self._folder = folder
         self._kept = kept

@@ -1,7 +1,7 @@
 """Files in a folder on disk.
 
-Paths are walked name by name from the folder's own handle without following links, so files outside are unreachable
-whatever a client requests or another process changes. Only regular files and folders are shown.
+Paths are walked name by name from the folder's own handle without following links, so files outside are unreachable.
+Only regular files and folders are shown.
 """
 
 import os
@@ -41,8 +41,6 @@ _Result = TypeVar("_Result")
 
 
 class _RefusedError(Exception):
-    """An operation was refused."""
-
     def __init__(self, refusal: FileRefusal) -> None:
         super().__init__(refusal.value)
         self.refusal = refusal
@@ -51,7 +49,6 @@ class _RefusedError(Exception):
 def _refusing(
     method: Callable[Concatenate["Folder", _Arguments], _Result],
 ) -> Callable[Concatenate["Folder", _Arguments], _Result | FileRefusal]:
-    """Convert system errors to refusals."""
 
     @wraps(method)
     def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | FileRefusal:

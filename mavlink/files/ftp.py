@@ -4,8 +4,8 @@ Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice
 
 - The client chooses the session number (PX4 and MAVSDK only support 0; MAVProxy picks a fresh one for each transfer).
   So sessions are per client, and every answer echoes the request's session.
-- A client that reopens a session number after a moment's idleness has lost track of it and takes it over. Before, the
-  session may still be in use, so the request is refused.
+- A client that reopens a session number after a moment's idleness has lost track of it and takes it over; before, it is
+  refused.
 - MAVSDK repeats a request with a new sequence number, so operations are idempotent where possible.
 """
 
@@ -62,8 +62,6 @@ class _Session:
 
 @dataclass(slots=True)
 class _Burst:
-    """A burst in progress; its sequence numbers follow the request's."""
-
     request: Request
     reading: Reading
     packets_left: int = MAX_BURST_PACKETS
@@ -71,8 +69,6 @@ class _Burst:
 
 @dataclass(slots=True)
 class _Checksum:
-    """A checksum in progress."""
-
     request: Request
     names: Names
     reading: Reading
@@ -176,12 +172,10 @@ class Ftp:
                 del self._remembered[peer, payload]
 
     def _terminate(self, request: Request) -> bytes:
-        """Close a session; succeeds if it is closed already."""
         self._close(request.key)
         return b""
 
     def _reset(self, request: Request) -> bytes:
-        """Forget this client's sessions and answers."""
         peers = [*self._sessions, *((peer, payload[2]) for peer, payload in self._remembered)]
         for key in peers:
             if key[0] == request.peer:

@@ -28,8 +28,6 @@ _UINT32_MAX = 0xFFFFFFFF
 
 @dataclass(slots=True)
 class _Listing:
-    """A list being sent."""
-
     peer: Peer
     next: int
     last: int
@@ -37,8 +35,6 @@ class _Listing:
 
 @dataclass(slots=True)
 class _Transfer:
-    """A part of a log being sent, up to `end`."""
-
     peer: Peer
     id: int
     reading: Reading
@@ -108,7 +104,7 @@ class Logs:
             self._listings.pop(listing.peer, None)
 
     def _look(self, peer: Peer) -> list[Entry]:
-        """Return the present logs, and fix their ids for this client."""
+        """Fix the present logs' ids for this client."""
         found = self._files.list(self._folder)
         logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
         self._shown.pop(peer, None)

@@ -97,7 +97,6 @@ class Memory:
         return self._no_file(names) or bytes(self._files[names][offset : offset + count])
 
     def _no_way(self, names: Names) -> FileRefusal | None:
-        """Refuse a path if a parent is missing or is a file."""
         for depth in range(1, len(names)):
             if names[:depth] not in self._folders:
                 return FileRefusal.NOT_A_FOLDER if names[:depth] in self._files else FileRefusal.NOT_FOUND

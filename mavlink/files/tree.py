@@ -74,8 +74,7 @@ class Files(Protocol):
 
     def make_folder(self, names: Names) -> FileRefusal | None: ...
 
-    def remove_folder(self, names: Names) -> FileRefusal | None:
-        """Remove an empty folder."""
+    def remove_folder(self, names: Names) -> FileRefusal | None: ...
 
 
 def names_of(path: str) -> Names | FileRefusal:
@@ -89,7 +88,7 @@ def names_of(path: str) -> Names | FileRefusal:
 
 
 def can_be_new(name: str) -> bool:
-    """Whether a new file may have this name: one that can be listed on any system."""
+    """Whether a name can be listed on any system."""
     return name not in ("", ".", "..") and name.isprintable() and "/" not in name and _fits(name)
 
 
@@ -115,7 +114,6 @@ class Tree:
         generated: Mapping[str, Generator],
         aliases: Mapping[str, str] | None = None,
     ) -> None:
-        """Compose files by path: "logs", "@PARAM/param.pck", "@MAV_LOG"."""
         self._root = root
         self._mounts = {_known(path): files for path, files in mounts.items()}
         self._generated = {_known(path): generator for path, generator in generated.items()}
@@ -178,7 +176,6 @@ class Tree:
         return self._change(names, lambda files, rest: files.remove_folder(rest))
 
     def _change(self, names: Names, change: Callable[[Files, Names], FileRefusal | None]) -> FileRefusal | None:
-        """Change `names` unless it is part of the composition."""
         return FileRefusal.PROTECTED if self._is_fixed(names) else change(*self._at(names))
 
     def _is_fixed(self, names: Names) -> bool:
@@ -186,7 +183,6 @@ class Tree:
         return not names or any(names in places for places in fixed)
 
     def _at(self, names: Names) -> tuple[Files, Names]:
-        """Return the files that hold `names`, and the names there."""
         for depth in range(len(names), 0, -1):
             files = self._mounts.get(names[:depth])
             if files is not None:

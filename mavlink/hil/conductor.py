@@ -1,7 +1,7 @@
 """Step messages: all datagrams of stepped ground stations and a vehicle at one time, exchanged between processes.
 
-The process that steps time sends the stations' datagrams with each frame of the plant; the vehicle answers with its
-own. So every datagram arrives at a definite frame, however slow either process is.
+Stations' datagrams come with each frame of the plant, the vehicle's with its answer: so every datagram arrives at a
+definite frame, however slow either process is.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,6 @@
 """The lockstep protocol between plant and autopilot, both ends as state machines without I/O.
 
-Datagrams and the wall-clock time go in, datagrams come out. The plant sends the frame of time t and advances only
-with the command that names t, so no link can change a flight:
+The plant sends the frame of time t and advances only with the command that names t, so no link can change a flight:
 
 - an unanswered frame is sent again after `RESEND_AFTER_S`;
 - a repeated frame gets the remembered answer, so each frame is computed once;
@@ -14,8 +13,8 @@ With its frame the plant sends its battery twice a second and to each new caller
 effect, if any (NAMED_VALUE_INT cmd_delay, µs). Faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, are accepted only
 appended to the answer of a frame, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 
-A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and accepts any answer newer than the last;
-the autopilot continues from the newest frame. In lockstep a new flight begins at time 0 only.
+A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and accepts any newer answer; the autopilot
+continues from the newest frame. In lockstep a new flight begins at time 0 only.
 """
 
 from colibri.mavlink.hil.feedback import Feedback

@@ -97,7 +97,6 @@ class AutopilotEnd:
         self._time_us = time_us
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
-        """Send and remember the answer to the last frame, with faults for that time."""
         answer = encode_actuators(self._codec, command)
         for fault in faults:
             answer += encode_fault(self._codec, fault, self._plant)
@@ -107,7 +106,6 @@ class AutopilotEnd:
         self._outbox.append(answer)
 
     def poll(self, now_s: float) -> float:
-        """Repeat the call if due; return the next due time."""
         if self.silence_s(now_s) < CALL_AFTER_S:
             return self._received_s + CALL_AFTER_S
         if now_s >= self._call_at_s:

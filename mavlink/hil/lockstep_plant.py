@@ -54,10 +54,7 @@ class Outgoing(NamedTuple):
 
 
 class PlantEnd:
-    """The plant's end: offers a frame and waits for its answer.
-
-    Kind and interval of frames are requested by the autopilot before the first frame.
-    """
+    """The plant's end: offers a frame and waits for its answer."""
 
     def __init__(
         self,
@@ -67,7 +64,6 @@ class PlantEnd:
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
     ) -> None:
-        """Wait for the autopilot of `system_id`, which may request the kinds of frames that the plant `serves`."""
         self.waits = waits  # or runs freely
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
@@ -96,10 +92,7 @@ class PlantEnd:
     def offer(
         self, frame: Frame, now_s: float, plant_status: PlantStatus = NOTHING, truth: StateFrame | None = None
     ) -> None:
-        """Send `frame` and status; await its command.
-
-        The `truth` is appended, as another component's, for a program between plant and autopilot.
-        """
+        """Send `frame`, status and `truth`, as another component's; await the command."""
         if isinstance(frame, StateFrame):
             frames = encode_state(self._codec, frame)
         else:
@@ -122,7 +115,6 @@ class PlantEnd:
         self._send_frame(now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        """Return the datagram's command if it answers the awaited frame."""
         command = read_actuators(datagram, self._autopilot_bytes) if sender == self.peer else None
         if command is None:
             return self._receive_any(datagram, sender, now_s)
@@ -159,7 +151,6 @@ class PlantEnd:
         return faults
 
     def poll(self, now_s: float) -> float:
-        """Repeat the frame if due; return the next due time."""
         if self._awaited_us is None or not self.waits:
             return now_s + RESEND_AFTER_S
         if now_s >= self._resend_at_s:

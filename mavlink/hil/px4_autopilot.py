@@ -1,8 +1,7 @@
 """PX4's simulator interface, the autopilot's end, as a state machine without I/O.
 
-It sends a HEARTBEAT twice a second of wall-clock time, as a simulator restarts after three seconds without. Each
-HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS of the same time that requests lockstep. Time counts from the first
-frame.
+It sends a HEARTBEAT twice a second, as a simulator restarts after three seconds without. Each HIL_SENSOR is answered by
+a HIL_ACTUATOR_CONTROLS of the same time that requests lockstep. Time counts from the first frame.
 
 Quirks of jMAVSim: its HIL_GPS follows the HIL_SENSOR of the same time and belongs to the next; old versions leave
 `fields_updated` empty, which counts as all new.
@@ -33,7 +32,7 @@ class FlierEnd:
     """The autopilot's end: returns each new frame once, remembers the last answer."""
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
-        """Create the end; `to_motors` converts rotor speeds 0..1 in the vehicle file's order to the simulator's."""
+        """`to_motors` converts rotor speeds 0..1 in the vehicle file's order to the simulator's."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
         self.refused: int | None = None  # always None
@@ -52,7 +51,6 @@ class FlierEnd:
         return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
-        """Return the datagram's frame if it is the next one to compute."""
         frame = None
         for message in self._codec.decode(datagram):
             if message.name == "HIL_SENSOR":

@@ -78,7 +78,6 @@ class SimulatorEnd:
         self._outbox: list[tuple[tuple[bytes, ...], Address]] = []
 
     def wants_truth(self, time_us: int) -> bool:
-        """Whether the true state is requested and due."""
         return self._truth_every_us is not None and time_us >= self._truth_at_us
 
     def offer(self, frame: SensorFrame, truth: Truth | None, now_s: float) -> None:
@@ -117,7 +116,7 @@ class SimulatorEnd:
             self.peer = None
 
     def call(self, address: Address, now_s: float) -> None:
-        """Call a PX4 that waits to be called, as over UDP, every `CALL_EVERY_S` until it answers."""
+        """Call a PX4 that waits to be called, as over UDP."""
         if self.peer is None and now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
             self._outbox.append(((self._heartbeat(),), address))

@@ -76,10 +76,7 @@ class Distance(NamedTuple):
 
 
 class SensorFrame(NamedTuple):
-    """On-board measurements at one instant of simulated time, and new messages of other sensors.
-
-    Groups that are not `updated` hold old values or zeros.
-    """
+    """On-board measurements at one instant; groups that are not `updated` hold old values or zeros."""
 
     time_us: int
     updated: int  # bits of `Updated`

@@ -30,24 +30,21 @@ class GroundLink(Protocol):
     url: str
 
     @property
-    def target(self) -> Address | None:
-        """The address it calls, if any."""
+    def target(self) -> Address | None: ...
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send whole frames to `address`, or lose them."""
 
     def receive_now(self) -> list[tuple[bytes, Address]]: ...
 
-    def wait(self, timeout_s: float) -> None:
-        """Sleep until input or the timeout."""
+    def wait(self, timeout_s: float) -> None: ...
 
     def take_opened(self) -> list[Address]:
         """Return new addresses to send to: the called one, or those that connected."""
 
     def take_closed(self) -> list[Address]: ...
 
-    def take_notes(self) -> list[str]:
-        """Return new lines for the user."""
+    def take_notes(self) -> list[str]: ...
 
     def close(self) -> None: ...
 

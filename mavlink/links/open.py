@@ -21,12 +21,10 @@ _SERIAL, _SERIAL_FORM = "serial:", "serial:DEVICE:BAUD"
 
 
 def open_link(url: str) -> UdpLink:
-    """Open a UDP endpoint, the only kind between plant and autopilot."""
     return _open_udp(url, *_parse(url, _UDP))
 
 
 def open_ground_link(url: str) -> GroundLink:
-    """Open an endpoint; port 0 takes any free port if it waits."""
     if is_serial(url):
         return SerialLink(url, *_parse_serial(url))
     scheme, host, port = _parse(url, (*_UDP, *_TCP))

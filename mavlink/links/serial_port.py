@@ -1,7 +1,7 @@
 """A serial port as a non-blocking endpoint, reopened when its device returns.
 
 Broken frames are dropped; beyond the line's speed, whole datagrams are dropped. pyserial only opens the port: its
-`write` blocks on a stalled device in spite of its time-out.
+`write` blocks on a stalled device.
 """
 
 import errno

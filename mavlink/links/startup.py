@@ -32,7 +32,7 @@ def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) 
 
 
 def report_compiling(status: Status) -> None:
-    """Report compilation: to people once, to programs with the number of functions. Loads numba."""
+    """Report to people once, to programs with the number of functions. Loads numba."""
     from colibri.common.jit import on_compile
 
     def report(functions: int) -> None:

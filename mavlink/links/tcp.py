@@ -168,7 +168,6 @@ class TcpClient(Endpoint):
         self._call_again_s = float("inf")
 
     def _connected(self) -> Connection | None:
-        """Return the connection, if any; call if due, and check a pending call."""
         if self._connection is not None:
             return self._connection
         if self._socket is None:
@@ -207,7 +206,7 @@ class TcpClient(Endpoint):
 def _established(sock: socket.socket, address: Address) -> Connection | None:
     """Return the connection of a completed call, unless it failed or connected to itself.
 
-    A call to an unused port of the own host may be given just that port as its own.
+    A call to an unused port of the own host may be given just that port.
     """
     try:
         if sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or sock.getsockname() == sock.getpeername():

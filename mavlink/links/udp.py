@@ -32,7 +32,7 @@ class UdpLink(Endpoint):
         self._opened = [target]
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
-        """Send to `address` or the target, or lose the datagram; raise `LinkError` if the target is unreachable."""
+        """Send or lose the datagram; raise `LinkError` if the target is unreachable."""
         destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
         try:

@@ -78,7 +78,6 @@ def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_typ
 
 
 def _whole(value: float, scale: float) -> int | None:
-    """Return a scaled coordinate as an integer; `NOT_GIVEN` for nan, `None` if out of range."""
     if isnan(value):
         return NOT_GIVEN
     if not isfinite(value):

@@ -39,8 +39,6 @@ MAX_READERS = 32
 
 
 class _Reading(NamedTuple):
-    """The plan announced to a reader."""
-
     plan: Plan
     received_us: int
 
@@ -57,7 +55,7 @@ class Downloads:
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
     def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
-        """Return an item as MISSION_ITEM_INT, also for MISSION_REQUEST: "Deprecated Types: MISSION_ITEM"."""
+        """Return an item, also for the deprecated MISSION_REQUEST as MISSION_ITEM_INT."""
         reading = self._readings.get((peer, plan_type))
         plan = newest
         if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
@@ -132,7 +130,6 @@ class MissionService:
         return sends
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Repeat item requests; send MISSION_CURRENT once a second and on changes."""
         progress = self._progress()
         if now_us < self._due_us and progress is self._shown and not self._outbox:
             return ()
@@ -146,11 +143,9 @@ class MissionService:
         return sends
 
     def reached(self, seq: int) -> None:
-        """Announce a reached item at the next poll ("Monitor Mission Progress")."""
         self._outbox.append(to_all("MISSION_ITEM_REACHED", seq))
 
     def current(self) -> Fields:
-        """Return the fields of a MISSION_CURRENT."""
         progress = self._progress()
         total = len(self.plans[MISSION].items) or NO_MISSION_TOTAL
         ids = (self.plans[plan_type].id for plan_type in (MISSION, FENCE, RALLY))
@@ -253,7 +248,6 @@ class MissionService:
         return [ack(peer, ACCEPTED, plan_type)]
 
     def _set_current(self, fields: Any, _peer: Peer, _now_us: int) -> Iterable[Send]:
-        """Set the item; broadcast the result ("Set Current Mission Item")."""
         refusal = self._vehicle.set_current(fields.seq, False)
         if refusal is not None:
             return self._text.say(WARNING, refusal.reason)

@@ -6,8 +6,7 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 - Requests are repeated every 250 ms for five seconds. The recommended five retries would let two of three uploads of
 500
   items fail over a link that loses a fifth of the datagrams each way.
-- Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent: not for strays, and not for an
-  upload that the ground station has abandoned for another transfer.
+- Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,8 +34,6 @@ class Rules(NamedTuple):
 
 
 class _Answer(NamedTuple):
-    """The MISSION_ACK that ended an upload."""
-
     peer: Peer
     seq: int
     send: Send
@@ -44,8 +41,6 @@ class _Answer(NamedTuple):
 
 
 class _Upload:
-    """An upload in progress."""
-
     def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int) -> None:
         self.peer = peer
         self.plan_type = plan_type
@@ -59,7 +54,7 @@ class _Upload:
         self._last_form = False
 
     def ask(self, now_us: int) -> Send:
-        """Request the next item; first in the new form, as some nack MISSION_REQUEST (MAVSDK) and some require it."""
+        """Request the next item, first in the new form: some nack MISSION_REQUEST (MAVSDK), some require it."""
         old = bool(self._old_form)
         if self._old_form is None and self._asked >= OLD_FORM_AFTER:
             old = self._asked % 2 == 0
@@ -85,7 +80,7 @@ class _Upload:
 
 
 class Uploads:
-    """The uploads in progress, at most one per type and per ground station; `poll` is due at `due_us`."""
+    """The uploads in progress, at most one per type and per ground station."""
 
     def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], Plan]) -> None:
         self._rules = rules
@@ -132,7 +127,6 @@ class Uploads:
         return self._complete(upload, now_us)
 
     def acknowledged(self, peer: Peer, plan_type: int, result: int, now_us: int) -> Send | None:
-        """Handle a MISSION_ACK: it cancels an upload, or refuses MISSION_REQUEST."""
         upload = self._under_way.get(plan_type)
         if upload is None or upload.peer != peer or result == ACCEPTED:  # a late one of a download accepts
             return None

@@ -43,10 +43,7 @@ class ChannelObserver(Protocol):
 
 
 class Hub:
-    """A component on any number of links.
-
-    A channel is one remote address on one link. It opens with the first valid message from there.
-    """
+    """A component on any number of links; a channel opens with the first valid message of a remote address."""
 
     def __init__(
         self,
@@ -58,7 +55,7 @@ class Hub:
         observers: Sequence[ChannelObserver] = (),
         caught: Caught | None = None,
     ) -> None:
-        """Create a component; without `signing` SETUP_SIGNING is refused, without `caught` exceptions are raised."""
+        """Create a component; without `caught` services' exceptions are raised."""
         self._own = (system_id, component_id)
         self._polled = tuple(service for service in services if isinstance(service, PolledService))
         self._awake = self._polled
@@ -105,7 +102,6 @@ class Hub:
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
     ) -> None:
-        """Handle a datagram; `loopback`: whether it is from this computer."""
         self._now_us = now_us
         number = self._numbers.get((link, address), self._numbers.get((link, None)))
         channel = None if number is None else self._channels[number]

@@ -17,7 +17,6 @@ class ParameterFileError(MavlinkError):
 
 
 def write(parameters: Parameters, system_id: int = 1) -> str:
-    """Return the parameters that differ from their defaults as a file."""
     lines = [_HEADER.format(system=system_id)]
     for parameter in parameters:
         value = parameters[parameter.name]

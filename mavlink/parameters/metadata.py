@@ -1,7 +1,6 @@
-"""The component metadata protocol: descriptions of this vehicle and its parameters.
+"""The component metadata protocol: https://mavlink.io/en/services/component_metadata.html.
 
-Specification: https://mavlink.io/en/services/component_metadata.html. The files are fetched by FTP. Their version is 1,
-the only one that QGroundControl supports.
+The files are fetched by FTP. Their version is 1, the only one that QGroundControl supports.
 """
 
 import json
@@ -41,12 +40,12 @@ class Metadata:
 
 
 def checksum(data: bytes) -> int:
-    """Return MAVLink's CRC32, with initial value 0 and without inversion: https://mavlink.io/en/guide/crc.html."""
+    """Return MAVLink's CRC32: https://mavlink.io/en/guide/crc.html."""
     return crc32(data, _UINT32_MAX) ^ _UINT32_MAX
 
 
 def metadata_json(parameters: Iterable[Parameter]) -> bytes:
-    """Return descriptions of parameters by MAVLink's component_metadata/parameter.schema.json."""
+    """Return MAVLink's component_metadata/parameter.schema.json."""
     content = {"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]}
     return json.dumps(content, separators=(",", ":")).encode()
 

@@ -17,7 +17,6 @@ _MAX_COMMON_CHARS = 15
 
 
 def packed(parameters: Parameters, query: str = "") -> bytes | None:
-    """Return the file for the query part of its path; `None` if that is invalid."""
     wanted = {"withdefaults": 0, "start": 0, "count": 0}
     for pair in filter(None, query.split("&")):
         key, _, digits = pair.partition("=")
@@ -47,7 +46,7 @@ def packed(parameters: Parameters, query: str = "") -> bytes | None:
 
 
 def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
-    """Return type, lengths, and the name's part that differs from the previous name, at least a character."""
+    """Return type, lengths, and the part of the name that is new, at least a character."""
     maximum = min(len(before), len(parameter.name) - 1, _MAX_COMMON_CHARS)
     common = next((i for i in range(maximum) if before[i] != parameter.name[i]), maximum)
     own = parameter.name[common:].encode()

@@ -1,7 +1,6 @@
-"""The parameter microservice of the vehicle: list, read and set.
+"""The parameter microservice of the vehicle: https://mavlink.io/en/services/parameter.html.
 
-Specification: https://mavlink.io/en/services/parameter.html. Values are encoded bytewise, as PX4's
-(MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE), in two types: INT32 and REAL32.
+Values are encoded bytewise, as PX4's (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
 """
 
 from collections.abc import Iterable
@@ -54,7 +53,6 @@ class ParameterService:
         return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
 
     def _begin_list(self, peer: Peer, now_us: int) -> None:
-        """Begin a list; a repeated request continues it to its end, then from the start."""
         listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
         listing.left = len(self._parameters)
 
@@ -82,7 +80,6 @@ class ParameterService:
         return self._value(known, peer.channel)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
-        """Set a parameter and send its value to all; a refusal goes to the requester first."""
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:
@@ -104,7 +101,7 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamErr
     """Return the value of a PARAM_SET.
 
     Clients of the packed file (MAVProxy), or without types (DroneKit), send integers as REAL32 and expect conversion
-    (https://mavlink.io/en/services/parameter_ftp.html), which is unambiguous for small ones. Other types must match.
+    (https://mavlink.io/en/services/parameter_ftp.html). Other types must match.
     """
     if wire_type not in tuple(Kind):
         return ParamError.TYPE_UNSUPPORTED

@@ -162,12 +162,10 @@ class Parameters:
                 self._change(name, value)
 
     def reset(self) -> None:
-        """Set every parameter to its default, unless refused."""
         for definition in self._definitions:
             self.set(definition.name, definition.default)
 
     def take_made(self) -> object | None:
-        """Return the newest object made for a change since the last call."""
         made, self._made = self._made, None
         return made
 

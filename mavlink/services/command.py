@@ -1,7 +1,4 @@
-"""The command microservice: COMMAND_LONG and COMMAND_INT, answered by COMMAND_ACK.
-
-Specification: mavlink.io/en/services/command.html.
-"""
+"""The command microservice: mavlink.io/en/services/command.html."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -118,7 +115,6 @@ class CommandService:
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Report commands in progress once a second."""
         if self._report_at_us is None:
             return IDLE
         if 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
@@ -132,7 +128,6 @@ class CommandService:
         return sends
 
     def finish(self, command_id: int, peer: Peer, refusal: Refusal | None) -> list[Send]:
-        """Return the final COMMAND_ACK of the peer's command in progress, if any."""
         running = self._running.get(command_id)
         if running is None or running.command.peer != peer:
             return []
@@ -142,10 +137,7 @@ class CommandService:
         return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
     def _obey(self, handler: Handler, command: Command, confirmation: int) -> list[Send]:
-        """Execute a command unless it is a repetition after a lost answer, or another is in progress.
-
-        "If no acknowledgement is received the command must be automatically re-sent", with a larger confirmation.
-        """
+        """Execute a command unless it is a repetition after a lost answer, or another is in progress."""
         running = self._running.get(command.id)
         if running is not None:
             if running.command.peer == command.peer and _parameters(running.command) == _parameters(command):
@@ -174,7 +166,6 @@ class CommandService:
         return _ack(command.id, command.peer, ACCEPTED if refusal is None else refusal.result)
 
     def _reason(self, refusal: Refusal | None, now_us: int) -> list[Send]:
-        """Send the reason of a refusal to all, the same one at most once a second."""
         if refusal is None or not refusal.reason:
             return []
         reason, at_us = self._said

@@ -1,7 +1,7 @@
 """The autopilot's identity.
 
-Ground stations adapt to MAV_AUTOPILOT. As `px4` they offer all features of a PX4, whose custom modes and conventions
-Colibri follows; as `generic` only common ones. Either way AUTOPILOT_VERSION and the text at the start name Colibri.
+Ground stations adapt to MAV_AUTOPILOT. As `px4` they offer all features of a PX4, whose custom modes Colibri follows;
+as `generic` only common ones. Either way AUTOPILOT_VERSION and the text at the start name Colibri.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ IDENTITIES = {identity.name: identity for identity in (PX4, GENERIC)}
 
 
 def version_of(text: str) -> Triple:
-    """Return major, minor and patch of a version like "0.2.1"; zeros if missing or not numeric."""
+    """Return three numbers of a version like "0.2.1"; zeros if missing or not numeric."""
     numbers = [int(part) & 0xFF if part.isdecimal() else 0 for part in text.split(".")[:3]]
     major, minor, patch = (*numbers, 0, 0, 0)[:3]
     return (major, minor, patch)
@@ -45,9 +45,7 @@ def version_of(text: str) -> Triple:
 def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fields:
     """Return the fields of AUTOPILOT_VERSION (148).
 
-    The custom version is patch, minor and major of Colibri, then its name. Versions are never marked as official:
-    ground
-    stations would offer an update to PX4's latest.
+    Versions are never marked as official: ground stations would offer an update to PX4's latest.
     """
     major, minor, patch = version
     own = _packed(version)

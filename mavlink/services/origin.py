@@ -1,7 +1,6 @@
-"""Messages to set origin, home and mode.
+"""Messages to set origin, home and mode, the latter two superseded by commands but still in use.
 
-SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the same integers, as MAVSDK expects. SET_HOME_POSITION and
-SET_MODE are predecessors of DO_SET_HOME and DO_SET_MODE, still in use.
+SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the same integers, as MAVSDK expects.
 """
 
 from collections.abc import Callable, Iterable

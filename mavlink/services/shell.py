@@ -62,7 +62,6 @@ class Shell:
         return sends
 
     def _answer(self, line: bytes) -> str:
-        """Return the echo of a line and the command's text."""
         typed = "".join(letter for letter in line.decode(errors="replace") if letter.isprintable())
         name, *arguments = typed.split() or [""]
         if not name:

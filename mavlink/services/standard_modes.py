@@ -1,7 +1,4 @@
-"""The standard modes microservice: lists the modes, and sets those defined alike on every vehicle.
-
-Specification: mavlink.io/en/services/standard_modes.html. CURRENT_MODE is telemetry.
-"""
+"""The standard modes microservice: mavlink.io/en/services/standard_modes.html. CURRENT_MODE is telemetry."""
 
 from collections.abc import Callable, Iterable, Sequence
 from math import isnan

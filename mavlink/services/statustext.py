@@ -1,7 +1,7 @@
-"""STATUSTEXT: a line for users, in chunks if long.
+"""STATUSTEXT (253): a line for users, in chunks if long.
 
-Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes continues in further messages with the same
-non-zero id, counted by chunk_seq; a chunk that is not full ends it.
+Text beyond 50 bytes continues in further messages with the same non-zero id, counted by chunk_seq; a chunk that is not
+full ends it.
 """
 
 from collections import deque

@@ -45,7 +45,6 @@ class StreamedService(ABC, Generic[Value]):
         return ()
 
     def engage(self, peer: Peer, now_us: int) -> None:
-        """Obey `peer`, which has requested the mode, if it streams."""
         if self._streams(peer, now_us):
             self.source = peer
 
@@ -65,7 +64,6 @@ class StreamedService(ABC, Generic[Value]):
         return self._value(peer, now_us, self._silent_after_us) is not None
 
     def _keep(self, peer: Peer, value: Value, now_us: int) -> bool:
-        """Store a setpoint; return whether its client is obeyed."""
         if peer not in self._received and len(self._received) >= MAX_CLIENTS:
             self._received = {it: kept for it, kept in self._received.items() if self._streams(it, now_us)}
             if len(self._received) >= MAX_CLIENTS:

@@ -1,7 +1,6 @@
-"""Follow-me: the target's state from FOLLOW_TARGET.
+"""Follow-me: the target's state from FOLLOW_TARGET, https://mavlink.io/en/messages/common.html#FOLLOW_TARGET.
 
-Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Of `est_capabilities` only the
-position bit is required: clients that send velocity omit its bit, and (0, 0, 0) is an unknown one.
+Of `est_capabilities` only the position bit is required: clients omit the others. (0, 0, 0) is an unknown velocity.
 """
 
 from math import hypot, isfinite, isnan
@@ -39,7 +38,6 @@ class Follow(StreamedService[TargetState]):
         self._origin = origin
 
     def latest(self, now_us: int, timeout_us: int) -> TargetState | None:
-        """Return the target's state extrapolated to `now_us`, if its message is not older than `timeout_us`."""
         target = self._latest(now_us, timeout_us)
         return target.at(now_us, GOES_ON_US) if target else None
 
@@ -66,6 +64,5 @@ class Follow(StreamedService[TargetState]):
 
 
 def _known(ned: Any) -> Vector:
-    """Return a vector in ENU, zero if unknown."""
     north, east, down = ned
     return STILL if isnan(north) or isnan(east) or isnan(down) else ned_from_enu((north, east, down))

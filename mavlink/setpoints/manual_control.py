@@ -1,8 +1,7 @@
-"""Manual control: a ground station's sticks, as MANUAL_CONTROL or RC_CHANNELS_OVERRIDE.
+"""Manual control: a ground station's sticks, as MANUAL_CONTROL (69) or RC_CHANNELS_OVERRIDE (70).
 
-Specification: https://mavlink.io/en/services/manual_control.html and common.xml, messages MANUAL_CONTROL (69) and
-RC_CHANNELS_OVERRIDE (70). Never answered. Yaw is positive to the right, as in PX4 and its clients, although the
-message's text is counter-clockwise. Buttons are ignored.
+Specification: https://mavlink.io/en/services/manual_control.html and common.xml. Yaw is positive to the right, as in
+PX4 and its clients, although the message's text is counter-clockwise. Buttons are ignored.
 """
 
 from typing import Any, NamedTuple
@@ -78,10 +77,7 @@ class Manual(StreamedService[Controls]):
 
 
 def sticks_of(channels: Channels, now_us: int) -> Sticks:
-    """Return the sticks of four channels, µs; a released one is centred, as there is no radio.
-
-    A low elevator channel is the stick forward, as on copters' transmitters.
-    """
+    """Return the sticks of four channels, µs; a released one is centred, a low elevator is the stick forward."""
     roll, pitch, thrust, yaw = (
         0.0 if value == RELEASED else (min(max(value, MIN_US), MAX_US) - MIDDLE_US) / (MAX_US - MIDDLE_US)
         for value in channels

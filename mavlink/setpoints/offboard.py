@@ -145,7 +145,6 @@ def _along_heading(flu: Vector, frame: Frame, here: Whereabouts) -> Vector:
 
 
 def _position_of(fields: Any, here: Whereabouts) -> Vector:
-    """Return the position of a SET_POSITION_TARGET_GLOBAL_INT, nan if masked."""
     no_latitude, no_longitude, no_altitude = (bool(fields.type_mask >> axis & 1) for axis in range(3))
     latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * DEGREES
     longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * DEGREES
@@ -160,7 +159,6 @@ def _position_of(fields: Any, here: Whereabouts) -> Vector:
 
 
 def _counted_from_m(frame: int, here: Whereabouts) -> float:
-    """Return the zero of a global frame's altitudes, m, ENU."""
     if frame in AMSL_FRAMES:
         return -here.origin.altitude_m
     if here.home is None:
@@ -182,7 +180,6 @@ def group(wire: Vector, masked: int, maximum: float) -> Vector:
 
 
 def single(wire: float, masked: int, maximum: float) -> float:
-    """Return the field of a one-field group, see `group`."""
     value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), maximum)
     return value
 
@@ -209,7 +206,6 @@ def _whole(flu: Vector) -> Vector:
 
 
 def _yaw(fields: Any, zero_rad: float, *, up: bool) -> tuple[float, float]:
-    """Return yaw, relative to `zero_rad` on the wire, and its rate, both counter-clockwise."""
     yaw = single(fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
     rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
     turn = 1.0 if up else -1.0

@@ -25,7 +25,6 @@ class PositionSetpoint(NamedTuple):
     time_us: int = 0
 
     def in_enu(self, heading_rad: float) -> "PositionSetpoint":
-        """Return the setpoint with velocity and acceleration in ENU, for the present heading."""
         if not self.body:
             return self
         return self._replace(

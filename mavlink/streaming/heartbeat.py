@@ -15,11 +15,7 @@ MAVLINK_VERSION = 3
 
 
 class HeartbeatService:
-    """Sends the vehicle's HEARTBEAT, at once when its mode changes; receives those of ground stations.
-
-    Attributes:
-        station_us: When a ground station (MAV_TYPE_GCS) was received last, or expected; None if there never was one.
-    """
+    """Sends the vehicle's HEARTBEAT, at once when its mode changes; receives those of ground stations."""
 
     handles = frozenset({"HEARTBEAT"})
 
@@ -28,7 +24,7 @@ class HeartbeatService:
         self._snapshot: Snapshot | None = None
         self._sent: tuple[object, ...] | None = None
         self._sent_at_us = -EVERY_US
-        self.station_us: int | None = None
+        self.station_us: int | None = None  # last ground station's (MAV_TYPE_GCS)
 
     def update(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot

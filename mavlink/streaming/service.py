@@ -42,7 +42,7 @@ _OLD_REQUESTS = {
 class StreamService:
     """Streams telemetry to every channel at its own rates, and sends messages on request.
 
-    The owner sets each frame's snapshot by `update` before `poll`.
+    `update` with each frame's snapshot comes before `poll`.
     """
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
@@ -71,7 +71,6 @@ class StreamService:
             self._encoded = {}
 
     def use(self, channel: int, kind: str) -> None:
-        """Stream the defaults of a `kind` of `rates.DEFAULTS` to `channel`."""
         self._kinds[channel] = kind
         if channel in self._open:
             self._restart(channel, self._now_us)
@@ -173,7 +172,6 @@ class StreamService:
         return self._post(sends) if sends else Refusal(result=TEMPORARILY_REJECTED)
 
     def _post(self, sends: list[Send]) -> Refusal | None:
-        """Queue messages behind the COMMAND_ACK, until the next poll."""
         if len(self._waiting) + len(sends) > MAX_WAITING:
             return Refusal(result=TEMPORARILY_REJECTED)
         self._waiting.extend(sends)
@@ -215,5 +213,4 @@ def _message_id(name: str) -> int:
 
 
 def _whole(number: float) -> int:
-    """Return a message id sent as a float; -1 if invalid."""
     return int(number) if 0.0 <= number < 2**24 and number == int(number) else -1

@@ -74,8 +74,7 @@ def debug_float_array(s: Snapshot) -> Fields:
     """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: eleven figures of the solver, then its plan.
 
     The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and the numbers of active bounds on
-    rotors,
-    increments, angles, rates (codes are those of `SolverState`). The plan: squared rotor speeds as parts of the
+    rotors, increments, angles, rates (codes are those of `SolverState`). The plan: squared rotor speeds as parts of the
     largest, four a step.
     """
     solver = s.solver
@@ -117,7 +116,6 @@ def _row(point: Forecast) -> tuple[float, ...]:
 
 
 def _spread(horizon: tuple[Forecast, ...]) -> list[Forecast]:
-    """-"""
     count = min(POINTS, len(horizon))
     return [horizon[(number + 1) * len(horizon) // count - 1] for number in range(count)]
 

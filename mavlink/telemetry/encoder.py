@@ -25,7 +25,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:
-    """Return `encoder` with numbers rounded and clamped to the fields' types; it omits a message with invalid ones."""
+    """Return `encoder` with numbers clamped to the fields' types; messages with invalid ones are omitted."""
     kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
 
@@ -74,7 +74,6 @@ for _bits in (8, 16, 32, 64):
 
 
 def boot_ms(s: Snapshot) -> int:
-    """Return the time since the start, ms, wrapped to a uint32."""
     return s.time_us // 1000 % 2**32
 
 

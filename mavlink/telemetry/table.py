@@ -20,7 +20,6 @@ def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
 
 
 def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
-    """Return the encoder of a sensor's own message; `otherwise` for a vehicle without that sensor."""
 
     def encoder(s: Snapshot) -> Fields | list[Fields] | None:
         value = s.latest.get(row.field)

@@ -28,9 +28,7 @@ class TopicReader(Protocol):
         """Yield a topic's rows in order, in blocks (n, columns), n > 0."""
         ...
 
-    def encoded(self) -> Iterator[bytes]:
-        """Yield a file with all topics, in parts."""
-        ...
+    def encoded(self) -> Iterator[bytes]: ...
 
 
 class TopicLog(ABC):
@@ -55,7 +53,6 @@ class TopicLog(ABC):
             self._take(encoder)
 
     def queue(self, encoded: bytes) -> None:
-        """Write messages before the next block."""
         self._queued.append(encoded)
         if len(self._queued) >= _QUEUED:
             self._append_queued()
@@ -70,7 +67,6 @@ class TopicLog(ABC):
     def append(self, encoded: bytes) -> None: ...
 
     def close(self) -> None:
-        """Write pending rows if possible, and close."""
         with suppress(LogError):
             self.flush()
 

@@ -1,7 +1,7 @@
 """The messages of a ULog file, as bytes.
 
-Specification: https://docs.px4.io/main/en/dev_log/ulog_file_format. A file is a header, the definitions (flag bits,
-formats, information, parameters), and from the first subscription on the data. A message is its size, type and content.
+Specification: https://docs.px4.io/main/en/dev_log/ulog_file_format. A file is a header, the definitions, and from the
+first subscription on the data. A message is its size, type and content.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,6 @@ def header(start_us: int = 0) -> bytes:
 
 
 def format_of(name: str, fields: str) -> bytes:
-    """Return the definition of a type; `fields` are "type name;" each."""
     return message("F", f"{name}:{fields}".encode())
 
 
@@ -67,5 +66,4 @@ def subscription(topic: str, number: int) -> bytes:
 
 
 def logged_string(time_us: int, severity: int, text: str) -> bytes:
-    """Return a logged text; `severity` as in STATUSTEXT."""
     return message("L", _LOGGED.pack(ord("0") + severity, time_us) + text.encode()[:_MAX_TEXT_BYTES])

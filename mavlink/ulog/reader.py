@@ -29,7 +29,6 @@ class FlightFile:
     """A flight log; after a killed process, its last message may be truncated."""
 
     def __init__(self, path: Path) -> None:
-        """Index the messages; raise `LogFormatError` if it is not a ULog, or lacks this version's topics."""
         self._path = path
         with path.open("rb") as file:
             self._size = path.stat().st_size
@@ -84,7 +83,6 @@ class FlightFile:
                 raise LogFormatError(f"{self._path}: no log of a flight of this version")
 
     def _add_run(self, at: int, head: bytes, size: int) -> int:
-        """Index consecutive messages of one topic; return their number."""
         runs = self._runs.get(int.from_bytes(head[3:], "little"))
         if runs is None:
             return 1

@@ -87,7 +87,6 @@ _CODES = {
 
 
 def record(topic: str, *numbers: float) -> bytes:
-    """Return a data message of all fields of a topic, in order."""
     return messages.message("D", _packer(topic)(NUMBERS[topic], *numbers))
 
 
@@ -128,7 +127,7 @@ def head(layout: "np.dtype[np.void]", number: int) -> tuple[int, int, int]:
 class Records:
     """Data messages of some topics, one of each per row, with fields assigned for many rows at once.
 
-    Consecutive fields of one type are assigned together, by the name of the first: (rows, fields).
+    Consecutive fields of one type are assigned by the name of the first, (rows, fields).
     """
 
     def __init__(self, rows: int, *topics: str) -> None:

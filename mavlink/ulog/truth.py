@@ -58,7 +58,6 @@ class TruthBlocks(Blocks):
         return records.first(count) + self._battery(*table[-1, [0, 18, 19]].tolist())
 
     def _battery(self, time_s: float, voltage_v: float, charge_ah: float) -> bytes:
-        """Return a battery message with the mean current since the previous one."""
         if not self._capacity_ah:
             return b""
         elapsed_s, used_ah = time_s - self._charge_s, charge_ah - self._charge_ah
@@ -70,7 +69,7 @@ class TruthBlocks(Blocks):
 
 
 def _rotated(attitude: Array, vector: Array) -> tuple[Array, Array, Array]:
-    """Rotate body vectors, (3, n), to earth by attitudes (4, n): v + w t + q x t, t = 2 q x v."""
+    """Rotate vectors (3, n) by attitudes (4, n): v + w t + q x t, t = 2 q x v."""
     w, x, y, z = attitude
     u, v, s = vector
     tx, ty, tz = 2.0 * (y * s - z * v), 2.0 * (z * u - x * s), 2.0 * (x * v - y * u)

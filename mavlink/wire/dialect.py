@@ -81,7 +81,7 @@ def param_bits(message: Message) -> int:
 
 
 def payload(frame: bytes) -> bytes:
-    """Return the payload of a frame of MAVLink 1 or 2; trailing zeros may be missing."""
+    """Return the payload, possibly without trailing zeros, of a frame of MAVLink 1 or 2."""
     start = _header_bytes(frame)
     return frame[start : start + frame[1]]
 
@@ -104,8 +104,7 @@ class Codec:
     """Encoder for one component, decoder for any; signatures are not checked.
 
     MAVLink 2 frames, the only ones in flight, are read and written here, several times as fast as by pymavlink. MAVLink
-    1
-    and malformed input are left to pymavlink.
+    1 and malformed input are left to pymavlink.
     """
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
@@ -128,7 +127,6 @@ class Codec:
         return self.framed(layout.payload(fields), layout.message_id, layout.crc_extra)
 
     def framed(self, payload: bytes, message_id: bytes, crc_extra: bytes) -> bytes:
-        """Return the next frame with this payload, without trailing zeros."""
         if not payload[-1]:
             payload = payload.rstrip(b"\0") or b"\0"
         seal = self.seal
@@ -172,8 +170,6 @@ class Codec:
 
 
 class _Layout:
-    """Layout of a message in a frame."""
-
     def __init__(self, definition: Any) -> None:
         self.name: str = definition.msgname
         later = [name for name in missing_messages.LATER.get(self.name, ()) if name not in definition.fieldnames]
@@ -196,7 +192,6 @@ class _Layout:
         self._texts = [i for i, kind in enumerate(kinds) if kind == "char"]
 
     def payload(self, fields: Sequence[Any]) -> bytes:
-        """Return the payload; extension fields may be omitted."""
         missing = len(self._fields._fields) - len(fields)
         if missing:
             fields = (*fields, *self._defaults[-missing:])
@@ -211,13 +206,12 @@ class _Layout:
         return crc16(header_and_payload[1:] + self.crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
 
     def read(self, payload: bytes) -> Any:
-        """Return the fields of a payload, which may lack trailing zeros or have later extensions."""
         size = self._size
         values = self._in_order_of_fields(self._unpack(payload.ljust(size, b"\0")[:size]))
         return self._fields._make(self._with_text(values) if self._texts else values)
 
     def _with_text(self, values: Sequence[Any]) -> list[Any]:
-        """Return the fields with text up to the first NUL, non-ASCII replaced, as pymavlink does."""
+        """Return the fields with text as by pymavlink: up to the first NUL, non-ASCII replaced."""
         fields = list(values)
         for i in self._texts:
             fields[i] = fields[i].split(b"\0", 1)[0].decode("ascii", "replace")
@@ -298,7 +292,6 @@ def _places(lengths: Sequence[int]) -> Iterator[int | slice]:
 
 
 def _getter(places: Sequence[int | slice]) -> Callable[[Sequence[Any]], Sequence[Any]]:
-    """Return a reader of several places, with a sequence as result even for one."""
     if len(places) == 1:
         return lambda values: (values[places[0]],)
     return itemgetter(*places)

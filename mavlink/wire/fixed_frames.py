@@ -1,7 +1,7 @@
 """Fast encoding and decoding of the messages in every frame of a flight.
 
-Such a message is unsigned, from one component, and its last field is hardly ever zero, so its frame has a fixed length.
-One `Struct` reads header and payload, and fields are a tuple in wire order. Other forms are left to `Codec`.
+Such a message is unsigned, from one component, and has a fixed length, as its last field is hardly ever zero. One
+`Struct` reads header and payload into a tuple in wire order. Other forms are left to `Codec`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ class FixedFrame:
     """A message up to one of its fields; `size` is the frame's length."""
 
     def __init__(self, name: str, fields: str) -> None:
-        """Lay out the first fields of message `name`, in wire order, separated by spaces; the rest is zero.
+        """Lay out the first fields of message `name`, in wire order; the rest is zero.
 
         "controls[4]" is the first four numbers of an array; "fields_updated:H" has another size, without trailing zero
         bytes.

@@ -15,7 +15,7 @@ _OTHER_BYTES = 12
 class Framer:
     """Splitter of a stream into frames with valid CRC; buffers at most one.
 
-    A message outside the dialect, with unverifiable CRC, counts as a frame if followed by another one or by silence.
+    With unknown CRC, a frame must be followed by another or by silence.
     """
 
     def __init__(self) -> None:

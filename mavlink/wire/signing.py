@@ -55,8 +55,7 @@ def tick_at(unix_s: float) -> int:
 class Signing:
     """Verifies and signs frames; without a key, accepts all and signs none.
 
-    The own timestamp advances with simulated time, with each signed frame and each later accepted one; it never
-    decreases.
+    The own timestamp advances with simulated time, each signed frame and each later accepted one; it never decreases.
     """
 
     def __init__(self, key: bytes | None, start: int, now_us: int = 0) -> None:
@@ -85,7 +84,6 @@ class Signing:
         return head + self._digest(frame + head)
 
     def refusal(self, name: str, frame: bytes, now_us: int) -> str | None:
-        """Return the reason to reject a frame."""
         if not self.active:
             return None
         if frame[0] != MARKER or not frame[_FLAGS_AT] & SIGNED:
