@@ -27,7 +27,6 @@ class FlightLog:
             self._waiting += data
 
     def update(self, armed: bool, now_us: int) -> None:
-        """Begin and end logs, write pending bytes; called at every frame of the plant."""
         if armed != self._armed:
             self._armed = armed
             if armed:

@@ -51,13 +51,12 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
-    """Return the frame as `read_state` reads it after `encode_state`, rounded by the wire."""
+    """Return the frame as rounded by `encode_state` and `read_state`."""
     turning, moving = _numbers(frame)
     return _state(_ATTITUDE.rounded(turning), _POSITION.rounded(moving))
 
 
 def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the fields of ATTITUDE_QUATERNION and of LOCAL_POSITION_NED."""
     time_us, position, velocity, attitude, rate = frame
     time_boot_ms = time_us // 1000
     position, velocity, attitude, rate = ned_frd_state(position, velocity, attitude, rate)
@@ -97,7 +96,7 @@ def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
 
 
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
-    """Return the command as `read_actuators` reads it after `encode_actuators`, rounded by the wire."""
+    """Return the command as rounded by `encode_actuators` and `read_actuators`."""
     time_us, controls, armed = command
     mode = _ARMED if armed else _DISARMED
     return _command(_ACTUATORS.rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))

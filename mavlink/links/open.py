@@ -45,7 +45,7 @@ def is_serial(url: str) -> bool:
 
 
 def beyond_loopback(url: str) -> bool:
-    """Whether an endpoint reaches other computers by a network; a serial port does not."""
+    """Whether an endpoint reaches other computers by a network."""
     if is_serial(url):
         _parse_serial(url)
         return False

@@ -101,7 +101,6 @@ class Parameters:
         self.revision = 0  # number of changes so far
 
     def trial(self, values: Mapping[str, Value]) -> "Parameters":
-        """Return a copy with other values; `prepare` is not called."""
         trial = Parameters(self._definitions)
         trial.load(values)
         return trial

@@ -198,7 +198,6 @@ def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
 
 
 def _whole(flu: Vector) -> Vector:
-    """Return a vector with a single masked horizontal axis set to zero."""
     ahead, left, up = flu
     if isnan(ahead) == isnan(left):
         return flu

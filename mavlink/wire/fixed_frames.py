@@ -50,7 +50,6 @@ class FixedFrame:
         return frame + crc16(frame[1:] + self._crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
 
     def rounded(self, numbers: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the numbers as a receiver reads them."""
         return self._unpack(self._pack(*numbers))
 
     def read(self, datagram: bytes, at: int, source: bytes) -> tuple[Any, ...] | None:

@@ -32,6 +32,6 @@ def ned_frd_from_enu_flu(
 
 
 def ned_frd_state(position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector) -> State:
-    """Convert position, velocity, attitude and body rates, by one call as it happens at each frame."""
+    """Convert position, velocity, attitude and body rates in one call, for every frame."""
     (x, y, z), (u, v, w), (p, q, r) = position, velocity, rate
     return (y, x, -z), (v, u, -w), ned_frd_from_enu_flu(attitude), (p, -q, -r)
