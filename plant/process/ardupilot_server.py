@@ -44,26 +44,17 @@ REPEATED_AFTER_S = 0.5
 """Time since the last answer after which a request may have come twice: ArduPilot asks again after about a second."""
 
 
-class _Flight:
-    def __init__(self, now_s: float, status: Status) -> None:
-        self.began_s = self.answered_s = now_s
-        self.steps = 0
-        self._progress = Progress(status)
-
-    def answered(self, time_us: int, now_s: float, steps: int) -> None:
-        self.answered_s = now_s
-        self.steps += steps
-        self._progress.report(time_us / 1e6, now_s - self.began_s)
-
-
 class ArduPilotServer:
     """Serves one ArduPilot after another, each from the start."""
 
     def __init__(self, end: ArduPilotEnd, link: UdpLink, status: Status, stop: Stop, logs: PlantLogs | None) -> None:
         self._end, self._link, self._status, self._stop, self._logs = end, link, status, stop, logs
         self._silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", perf_counter())
-        self._flight = _Flight(perf_counter(), status)
         self._answered_s = -inf
+        self._begin(perf_counter())
+
+    def _begin(self, now_s: float) -> None:
+        self._began_s, self._steps, self._progress = now_s, 0, Progress(self._status)
 
     def serve(self, *, duration_s: float) -> None:
         """Serve until a flight is `duration_s` long, or until a signal."""
@@ -88,7 +79,6 @@ class ArduPilotServer:
             if reply is None:
                 continue
             self._link.send(reply, sender)
-            self._answered_s = now_s
             self._silence.end(now_s)
             if self._end.restarts > restarts:
                 self._report(before.time_us, "gone", "ArduPilot has begun again, the flight before ended")
@@ -96,16 +86,18 @@ class ArduPilotServer:
                     self._logs.begin_again()
                 begins = True
             if begins:
-                self._flight = _Flight(now_s, self._status)
-            advanced = self._end.world is not before
-            if self._logs and advanced:
-                self._logs.write_world(self._end.world)
-            self._flight.answered(self._end.world.time_us, now_s, int(advanced))
+                self._begin(now_s)
+            self._answered_s = now_s
+            if self._end.world is not before:
+                self._steps += 1
+                if self._logs:
+                    self._logs.write_world(self._end.world)
+            self._progress.report(self._end.world.time_us / 1e6, now_s - self._began_s)
 
     def _report(self, time_us: int, event: str, text: str) -> None:
         if self._logs:
             self._logs.flush()
-        flight, end = self._flight, self._end
-        figures: dict[str, Any] = {"steps": flight.steps, "restarts": end.restarts, "dropped": dict(end.dropped)}
-        text = f"{text} {{}} after {flight.steps} steps"
-        report_end(self._status, time_us, flight.began_s, text, event=event, ended_s=flight.answered_s, **figures)
+        end, ended_s = self._end, max(self._began_s, self._answered_s)
+        figures: dict[str, Any] = {"steps": self._steps, "restarts": end.restarts, "dropped": dict(end.dropped)}
+        text = f"{text} {{}} after {self._steps} steps"
+        report_end(self._status, time_us, self._began_s, text, event=event, ended_s=ended_s, **figures)

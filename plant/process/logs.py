@@ -5,7 +5,6 @@ from pathlib import Path
 
 from colibri.common.process.log_files import set_aside
 from colibri.common.process.shared_log import SharedLog, remove_unused
-from colibri.mavlink.hil.lockstep_plant import Outgoing
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import TRUTH
@@ -65,11 +64,6 @@ class PlantLogs:
 
     def write_world(self, world: World) -> None:
         self._truth.write_world(world)
-
-    def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
-        for outgoing in sent:
-            received = [*received, *outgoing.frames]
-        self.write_frames(time_us, received)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         if self._tlog:

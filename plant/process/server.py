@@ -107,7 +107,6 @@ class Server:
         self._time_us = world.time_us
         self._log_traffic(sent)
         self._log(world)
-        plant.prepare()
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
@@ -163,7 +162,8 @@ class Server:
     def _log_traffic(self, sent: list[Outgoing]) -> None:
         """Log newly received frames, then `sent`, at the time of the last frame."""
         received, time_us = self._end.received, self._time_us
-        self._keep(lambda logs: logs.write_traffic(time_us, received, sent))
+        frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
+        self._keep(lambda logs: logs.write_frames(time_us, frames))
         received.clear()
 
     def _wait_until(self, due_s: float) -> None:

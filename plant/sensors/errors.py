@@ -47,19 +47,15 @@ class Triad:
     def measure(self, truth: Vector) -> Vector:
         limit = self._limit
         if not self._drawn:
-            self.draw()
+            self._draw()
         bx, by, bz, dx, dy, dz = self._drawn.pop()
         x, y, z = bx + (truth[0] + dx), by + (truth[1] + dy), bz + (truth[2] + dz)
         if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
             return (x, y, z)
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
 
-    def draw(self, left: int = 0) -> None:
-        """Draw bias and white noise of many samples at once, unless more than `left` are still unused."""
-        if len(self._drawn) > left:
-            return
+    def _draw(self) -> None:
         drawn = np.array(self._chance.take(6 * _DRAWN)).reshape(_DRAWN, 6)
         biases = np.add.accumulate(np.concatenate([self._last[None], self._walk * drawn[:, :3]]))[1:]
         self._last = biases[-1]
-        later: list[list[float]] = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()
-        self._drawn = later + self._drawn
+        self._drawn = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()

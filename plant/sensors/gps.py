@@ -5,7 +5,6 @@ from dataclasses import replace
 from math import hypot
 
 from colibri.common.earth.compiled_geodesy import geodetic_of
-from colibri.common.earth.geodesy import Geodetic
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import GPS
@@ -18,39 +17,28 @@ from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Gps
 
 
-class GpsReceiver:
-    """Delayed fixes: position with white and correlated errors, velocity with white ones."""
+def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
+    """Measure position with white and correlated errors, velocity with white ones; report after the delay."""
+    rate, delay_us = Rate(part.rate_hz), round(part.delay_s * 1e6)
+    sideways, upward = part.horizontal_drift_m, part.vertical_drift_m
+    drifts = tuple(GaussMarkov(deviation, part.drift_time_s, chance) for deviation in (sideways, sideways, upward))
+    pending: deque[GpsFix] = deque()
+    measured_us: int | None = None
 
-    def __init__(self, part: Gps, origin: Geodetic, chance: Chance) -> None:
-        self._part = part
-        self._origin = origin
-        self._chance = chance
-        self._delay_us = round(part.delay_s * 1e6)
-        sideways, upward, time_s = part.horizontal_drift_m, part.vertical_drift_m, part.drift_time_s
-        self._drifts = tuple(GaussMarkov(deviation, time_s, chance) for deviation in (sideways, sideways, upward))
-        self._measured_us: int | None = None
-        self._pending: deque[GpsFix] = deque()
-
-    def measure(self, time_us: int, position_enu_m: Vector, velocity_enu_m_s: Vector) -> None:
-        """Sample a fix now; it is delivered after the receiver's delay."""
-        part, chance = self._part, self._chance
-        if self._measured_us is not None:
-            for drift in self._drifts:
-                drift.after((time_us - self._measured_us) * 1e-6)
-        self._measured_us = time_us
-        east, north, up = (drift.value for drift in self._drifts)
-        x, y, z = position_enu_m
+    def fix(world: World) -> GpsFix:
+        u, v, w, _, _, _, x, y, z = world.state[:9]
+        east, north, up = (drift.value for drift in drifts)
         measured_m = (
             x + east + part.horizontal_noise_m * next(chance),
             y + north + part.horizontal_noise_m * next(chance),
             z + up + part.vertical_noise_m * next(chance),
         )
-        vx, vy, vz = velocity_enu_m_s
+        vx, vy, vz = earth_from_body(attitude_of(world.state), (u, v, w))
         noise_m_s = part.velocity_noise_m_s
-        fix = GpsFix(
-            time_us=time_us + self._delay_us,
+        return GpsFix(
+            time_us=world.time_us + delay_us,
             fix_type=part.fix_type,
-            place=geodetic_of(measured_m, self._origin),
+            place=geodetic_of(measured_m, setting.origin),
             velocity_enu_m_s=(
                 vx + noise_m_s * next(chance),
                 vy + noise_m_s * next(chance),
@@ -60,34 +48,17 @@ class GpsReceiver:
             vertical_accuracy_m=hypot(part.vertical_noise_m, part.vertical_drift_m),
             satellites=part.satellites,
         )
-        self._pending.append(fix)
-
-    def report(self, time_us: int) -> GpsFix | None:
-        if self._pending and self._pending[0].time_us <= time_us:
-            return self._pending.popleft()
-        return None
-
-
-def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
-    receiver, rate = GpsReceiver(part, setting.origin, chance), Rate(part.rate_hz)
-    seen: list[World] = []
-
-    def catch_up() -> None:
-        """Measure the world seen at the previous frame: the fix is due only after the receiver's delay."""
-        while seen:
-            world = seen.pop()
-            u, v, w, _, _, _, x, y, z = world.state[:9]
-            receiver.measure(world.time_us, (x, y, z), earth_from_body(attitude_of(world.state), (u, v, w)))
 
     def measure(world: World) -> GpsFix | None:
-        catch_up()
+        nonlocal measured_us
         if rate.is_due(world.time_us):
-            seen.append(world)
-            if part.delay_s == 0.0:
-                catch_up()
-        return receiver.report(world.time_us)
+            if measured_us is not None:
+                for drift in drifts:
+                    drift.after((world.time_us - measured_us) * 1e-6)
+            measured_us = world.time_us
+            pending.append(fix(world))
+        return pending.popleft() if pending and pending[0].time_us <= world.time_us else None
 
-    setting.ahead.append(catch_up)
     return measure
 
 

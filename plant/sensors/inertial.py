@@ -1,7 +1,5 @@
 """The plant's accelerometer and gyroscope, sampled at every frame."""
 
-from functools import partial
-
 from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
 from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.environment.random_streams import Chance
@@ -10,15 +8,10 @@ from colibri.plant.sensors.errors import Triad
 from colibri.plant.sensors.instrument import Instrument, Measure, Setting
 from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
-_ACCELEROMETER_LEFT, _GYROSCOPE_LEFT = 3, 5
-"""Samples left when errors of the next are drawn: of either at another frame, and where every second one is a control
-sample, at one of those, while the autopilot has most to do."""
-
 
 def _accelerometer(part: Accelerometer, setting: Setting, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
     errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
-    setting.ahead.append(partial(errors.draw, _ACCELEROMETER_LEFT))
     specific_force = setting.physics.specific_force
     return lambda world: errors.measure(specific_force(world))
 
@@ -26,7 +19,6 @@ def _accelerometer(part: Accelerometer, setting: Setting, chance: Chance) -> Mea
 def _gyroscope(part: Gyroscope, setting: Setting, chance: Chance) -> Measure:
     walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
     errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
-    setting.ahead.append(partial(errors.draw, _GYROSCOPE_LEFT))
 
     def measure(world: World) -> tuple[float, float, float]:
         p, q, r = world.state[3:6]

@@ -24,16 +24,11 @@ def vector_sum(value: Vector, error: Vector) -> Vector:
 
 
 class Setting(NamedTuple):
-    """The surroundings of a vehicle's sensors.
-
-    Attributes:
-        ahead: Optional work of each sensor that can be done before the next world is known.
-    """
+    """The surroundings of a vehicle's sensors."""
 
     physics: Physics
     origin: Geodetic
     interval_s: float
-    ahead: list[Callable[[], None]]
 
 
 class Instrument(NamedTuple):

@@ -1,6 +1,5 @@
 """All sensors of the plant; measurements depend on seed, simulated time and truth alone."""
 
-from collections.abc import Callable
 from typing import Any
 
 from colibri.common.earth.atmosphere import temperature_c
@@ -38,8 +37,7 @@ class SensorSuite:
     ) -> None:
         self._faults = faults
         self._origin = origin
-        self._ahead: list[Callable[[], None]] = []
-        setting = Setting(physics, origin, interval_us * 1e-6, self._ahead)
+        setting = Setting(physics, origin, interval_us * 1e-6)
         chances = streams(seed, Source.SENSORS, len(ROWS))
         self._instruments = [
             (_PLACE[row.field], row.group, row.switched_on(getattr(parts, row.part), setting, chance))
@@ -56,11 +54,6 @@ class SensorSuite:
             frame = self._measured(world)
             self._frame = frame if self._faults is None else self._faults.through(frame)
         return self._frame
-
-    def prepare(self) -> None:
-        """Do the work that needs no knowledge of the next world."""
-        for do in self._ahead:
-            do()
 
     def _measured(self, world: World) -> SensorFrame:
         reported, updated = self._reported, 0

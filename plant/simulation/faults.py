@@ -1,7 +1,5 @@
 """Faults of one vehicle by MAV_CMD_INJECT_FAILURE, each at an instant between two frames."""
 
-from collections.abc import Sequence
-
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, Part, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
@@ -39,13 +37,6 @@ class Faults:
         else:
             self.sensors.begin(fault, world.time_us)
         return world, FaultResult(fault.unit, fault.kind, RESULT_ACCEPTED)
-
-    def inject_all(self, asked: Sequence[Fault], world: World) -> tuple[World, tuple[FaultResult, ...]]:
-        results = []
-        for fault in asked:
-            world, result = self.inject(fault, world)
-            results.append(result)
-        return world, tuple(results)
 
     def _on_rotors(self, fault: Fault, world: World) -> None:
         chosen = range(len(world.rotor_speeds)) if fault.instance == ALL else (fault.instance - 1,)

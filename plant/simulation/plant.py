@@ -62,15 +62,12 @@ class Plant:
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
         self._physics = physics
-        self._suite: SensorSuite | None = None
         self._measure: Callable[[World], Frame] = state_frame
         if feedback is Feedback.SENSORS:
             assert vehicle.sensors is not None, "only what has sensors serves them"
             faults = self.faults.sensors
-            self._suite = SensorSuite(
-                vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
-            )
-            self._measure = self._suite.measure
+            suite = SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults)
+            self._measure = suite.measure
             physics.specific_force(world)  # loads it, before any frame
         self._actuation = Actuation(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
@@ -80,11 +77,6 @@ class Plant:
         battery = self._physics.battery(self.world) if with_battery else None
         status = PlantStatus(battery, self._results, self._actuation.delay_us or None)
         return ReceivedFrame(self._measure(self.world), status)
-
-    def prepare(self) -> None:
-        """Prepare the next frame while the autopilot computes its answer to this one."""
-        if self._suite is not None:
-            self._suite.prepare()
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         """Advance to the next frame with the answer to this one, and with faults that happen now."""
@@ -96,13 +88,16 @@ class Plant:
 
     def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
         """Inject faults and changes of the world now; results of faults go with the next frame."""
+        results = []
         for each in asked:
             if isinstance(each, WindChange):
                 self._physics.blow(Wind(each.speed_m_s, each.from_deg))
             elif isinstance(each, PayloadChange):
                 self._physics.carry(each.mass_kg)
-        faults = [each for each in asked if isinstance(each, Fault)]
-        self.world, self._results = self.faults.inject_all(faults, self.world)
+            else:
+                self.world, result = self.faults.inject(each, self.world)
+                results.append(result)
+        self._results = tuple(results)
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:
         self._actuation.arrive(sent_us + self._round_trip_us, command)
