@@ -7,8 +7,11 @@ from pathlib import Path
 
 def main() -> int:
     """Return 1 if the page's flights did not go well."""
-    page, folder = sys.argv[1:]
-    return 0 if import_module(f"tools.pages.{page}").write(Path(folder)) is not False else 1
+    name, folder = sys.argv[1], Path(sys.argv[2])
+    module = import_module(f"tools.pages.{name}")
+    for page, renewed in getattr(module, "PAGES", {}).items():
+        (folder / page).write_text(renewed((folder / page).read_text(encoding="utf-8")), encoding="utf-8")
+    return 1 if hasattr(module, "write") and module.write(folder) is False else 0
 
 
 if __name__ == "__main__":

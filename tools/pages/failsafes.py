@@ -1,6 +1,5 @@
 """Tables of `failsafes.md`, and `failsafes.png`, from the autopilot's table."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
@@ -8,12 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
+from colibri.analysis.tables import markdown
 from colibri.autopilot.commander.rules.failsafe_table import MEANINGS, NAMES, TABLE, Action, Row
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.parameters.store import Kind, Parameter
 from colibri.plant.vehicle.description import load_vehicle
-from tools.pages.tables import renew_tables
+from tools.pages.tables import with_tables
 
 _LADDER = (Action.HOLD, Action.RETURN, Action.LAND, Action.DESCEND, Action.TERMINATE)
 _STEP, _LINE, _WIDTH = 1.45, 0.19, 84
@@ -21,26 +21,22 @@ _STATE = {"boxstyle": "round,pad=0.45", "facecolor": "white", "edgecolor": "#223
 
 
 def tables() -> list[str]:
-    return ["\n".join(_ranks()), "\n".join(_rows())]
-
-
-def _ranks() -> Iterator[str]:
-    yield "| rank | action | what it is |"
-    yield "|---:|---|---|"
-    for action in sorted(Action, reverse=True):
-        yield f"| {int(action)} | {NAMES[action]} | {MEANINGS[action]} |"
-
-
-def _rows() -> Iterator[str]:
     profile = load_profile("flight")
     known = {each.name: each for each in definitions(profile, load_vehicle(profile.simulation.vehicle))}
-    yield "| condition | holds when | limits | delay | action | over when |"
-    yield "|---|---|---|---|---|---|"
-    for row in TABLE:
-        limits = "<br>".join(_shown(known[name]) for name in row.limits) or "-"
-        delay = _shown(known[row.delay]) if row.delay else "-"
-        action = f"`{row.parameter}`: {_choices(row)}"
-        yield f"| {row.condition} | {row.holds} | {limits} | {delay} | {action} | {row.clears} |"
+    ranks = [(str(int(action)), NAMES[action], MEANINGS[action]) for action in sorted(Action, reverse=True)]
+    conditions = [
+        (
+            row.condition,
+            row.holds,
+            "<br>".join(_shown(known[name]) for name in row.limits) or "-",
+            _shown(known[row.delay]) if row.delay else "-",
+            f"`{row.parameter}`: {_choices(row)}",
+            row.clears,
+        )
+        for row in TABLE
+    ]
+    headings = ("condition", "holds when", "limits", "delay", "action", "over when")
+    return [markdown(("rank", "action", "what it is"), ranks, names=3), markdown(headings, conditions, names=6)]
 
 
 def _shown(parameter: Parameter) -> str:
@@ -113,5 +109,7 @@ def _label(axes: Axes, x: float, y: float, default: str, able: str) -> None:
 
 
 def write(folder: Path) -> None:
-    renew_tables(folder / "failsafes.md", tables())
     draw(folder / "failsafes.png")
+
+
+PAGES = {"failsafes.md": lambda page: with_tables(page, tables())}

@@ -1,23 +1,17 @@
 """Tables of `faults.md`: faults that can be injected."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
+from colibri.analysis.tables import markdown
 from colibri.mavlink.hil.faults import ROWS, Part, Row, Value, kind_name, unit_name
-from tools.pages.tables import renew_tables
+from tools.pages.tables import with_tables
 
 
-def tables() -> list[str]:
-    return ["\n".join(_rows(part)) for part in (Part.SENSORS, Part.BATTERY, Part.ROTORS)]
-
-
-def _rows(part: Part) -> Iterator[str]:
-    yield "| unit | type | what it does | numbers |"
-    yield "|---|---|---|---|"
-    for row in ROWS:
-        if row.part is part:
-            unit, kind = f"{unit_name(row.unit)} {row.unit}", f"{kind_name(row.kind)} {row.kind}"
-            yield f"| {unit} | {kind} | {row.meaning} | {_numbers(row)} |"
+def _table(part: Part) -> str:
+    rows = [
+        (f"{unit_name(row.unit)} {row.unit}", f"{kind_name(row.kind)} {row.kind}", row.meaning, _numbers(row))
+        for row in ROWS
+        if row.part is part
+    ]
+    return markdown(("unit", "type", "what it does", "numbers"), rows, names=4)
 
 
 def _numbers(row: Row) -> str:
@@ -33,5 +27,4 @@ def _number(value: Value, name: str, usual: str) -> str:
     return f"{name}: {value.minimum:g} to {value.maximum:g}{unit} ({usual})"
 
 
-def write(folder: Path) -> None:
-    renew_tables(folder / "faults.md", tables())
+PAGES = {"faults.md": lambda page: with_tables(page, map(_table, (Part.SENSORS, Part.BATTERY, Part.ROTORS)))}

@@ -1,6 +1,6 @@
 """`latency.md` and `latency.png`: flights over ever slower links, with and without compensation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import pi
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.ulog.log import MemoryLog
+from tools.pages.tables import with_tables
 
 LAWS = ("whole-lpv-mpc", "lpv-mpc", "geometric-se3")
 ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
@@ -24,44 +25,6 @@ _WRONG_MS = 5.0
 _SETTLED = 3.0
 """Factor on the error without delay that is still flown well, and an error that always is."""
 _WELL_M = 1e-3
-
-_HEAD = """# Latency between plant and autopilot
-
-The command that answers a frame acts a round trip after it, the one before it is held until then (`colibri fly
---latency MS`, one way: half of it). The autopilot compensates that, whichever control law flies
-(`autopilot/control/delay.py`):
-
-- Where a state is known for time *t*, the vehicle model carries it to *t + d*, when the command that is now decided
-  takes effect: by the commands that were sent and act until then, with rotor lag, drag and what the battery's voltage
-  allows.
-- What moves the vehicle beside that, wind or a wrong mass, is observed as the difference of each state from the one
-  predicted for it, at 10 rad/s, and carried along. In wind of 5 m/s and over 40 ms `lpv-mpc` so flies the lemniscate
-  below to 1.0 cm, as without delay (0.9 cm); without the observer to 3.3.
-- References are those of *t + d*, tracks and moving setpoints alike. So the law finds commands that act at once, and
-  what it remembers of its own rotors is right.
-- Failsafes, the landing, the flight on three rotors see the same state. Telemetry shows the vehicle as it is.
-
-How much *d* is, the plant says beside its frames, of the last command that has taken effect (NAMED_VALUE_INT
-`cmd_delay`, µs by its own clock). Compensated is the median of the last 25, taken over where it differs by 1 ms or
-more; it is told nothing by a plant without delay, nor by a simulator that speaks PX4's interface. A delay can be told
-instead: `--delay MS` of `colibri fly` and `autopilot`, `delay_s` in a profile, parameter `SYS_CMD_DELAY` in flight; 0
-compensates none. What is compensated is `delay_us` of topic `colibri_decision`, and in telemetry NAMED_VALUE_FLOAT
-`delay_us`.
-
-By how much the delay differs from the one compensated, a law must bear by itself: `whole-lpv-mpc` bears 12 ms,
-`lpv-mpc` 16, and SE(3) as it is tuned not even 2. A gust is answered no sooner for it, and a slow law (`SIM_SOLVE_MS`)
-is not part of it.
-
-Profile `flight`, `hummingbird`, state feedback; the law of the profile, the one before it, and the SE(3) baseline.
-*not*: not compensated; *measured*: by default; *- 5*, *+ 5*: told 5 ms less, and more, than it is. Step: hover, begun
-1 m beside it at rest, 12 s, RMS (m) of the last 4 s. Lemniscate: 4 m, 6 s a lap, 5.9 m/s at most, begun at its speed,
-20 s, RMS (m) from 8 s on. *Lost*: more than 5 m off, on the ground, or still upside down. *Well*: within three times
-the errors without delay, or within 1 mm where that is more. Written by `python -m tools.pages latency docs`; simulated,
-so the same again bit for bit.
-
-![Errors over the round trip](latency.png)
-
-"""
 
 
 class Case(NamedTuple):
@@ -107,7 +70,12 @@ class Point(NamedTuple):
     lemniscate: Merit | None
 
 
-WAYS = ("not", "measured", "- 5", "+ 5")
+WAYS = {
+    "not": "not compensated",
+    "measured": "measured",
+    "- 5": "told 5 ms less",
+    "+ 5": "told 5 ms more",
+}
 """Compensated or not, and by what delay."""
 
 
@@ -158,32 +126,23 @@ def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
     ]
 
 
-def page(points: Sequence[Point]) -> str:
+def tables(points: Sequence[Point]) -> Iterator[str]:
+    """Yield for each law its errors, and the largest round trips before the first failure."""
     headings = ("round trip (ms)", *(f"{name}: {way}" for name in ("step", "lemniscate") for way in WAYS))
-    text = _HEAD
     for law in LAWS:
-        rows = [_row(points, law, ms) for ms in sorted({point.round_trip_ms for point in points})]
-        text += f"## `{law}`\n\n" + markdown(headings, rows, names=1) + "\n" + _margins(points, law) + "\n"
-    return text + "The same over UDP, unsimulated: [realtime.md](realtime.md).\n"
+        yield markdown(headings, [_row(points, law, ms) for ms in sorted({p.round_trip_ms for p in points})], names=1)
+        limits = []
+        for way, name in WAYS.items():
+            those = [point for point in points if point.law == law and point.way == way]
+            well = _until(those, [_is_well(point, points) for point in those])
+            limits.append((name, well, _until(those, list(map(_is_kept, those)))))
+        yield markdown(("delay", "flown well up to", "kept up to"), limits, names=1)
 
 
 def _row(points: Sequence[Point], law: str, ms: float) -> tuple[str, ...]:
     those = {point.way: point for point in points if point.law == law and point.round_trip_ms == ms}
     steps, tracks = ([_cell(getattr(those[way], name)) for way in WAYS] for name in ("step", "lemniscate"))
     return f"{ms:g}", *steps, *tracks
-
-
-def _margins(points: Sequence[Point], law: str) -> str:
-    """Return for each way the round trips before the first failure."""
-    lines = []
-    for way, said in zip(WAYS, ("Not compensated", "Measured", "Told 5 ms less", "Told 5 ms more"), strict=True):
-        those = [point for point in points if point.law == law and point.way == way]
-        well, kept = (
-            _until(those, [_is_well(point, points) for point in those]),
-            _until(those, list(map(_is_kept, those))),
-        )
-        lines.append(f"- {said}: flown well up to {well}, kept up to {kept}.\n")
-    return "".join(lines)
 
 
 def _is_kept(point: Point) -> bool:
@@ -224,8 +183,8 @@ def draw(points: Sequence[Point], path: Path) -> None:
                 those = [(p.round_trip_ms, getattr(p, name)) for p in points if (p.law, p.way) == (law, way)]
                 flown = [(ms, max(it.rms_m, _FLOOR_M)) for ms, it in those if it is not None]
                 lost = [ms for ms, it in those if it is None]
-                label = {"not": "not compensated", "measured": "measured"}.get(way, f"told {way} ms")
-                axes.plot(*zip(*flown, strict=True), "o-", ms=4, color=_COLORS[way], label=label) if flown else None
+                style = {"ms": 4, "color": _COLORS[way], "label": WAYS[way]}
+                axes.plot(*zip(*flown, strict=True), "o-", **style) if flown else None
                 heights = [0.97 - 0.04 * height] * len(lost)
                 axes.plot(lost, heights, "x", ms=5, color=_COLORS[way], transform=axes.get_xaxis_transform())
             axes.set_yscale("log")
@@ -241,5 +200,6 @@ def draw(points: Sequence[Point], path: Path) -> None:
 
 def write(folder: Path) -> None:
     points = sweep(ROUND_TRIPS_MS)
-    (folder / "latency.md").write_text(page(points), encoding="utf-8")
+    path = folder / "latency.md"
+    path.write_text(with_tables(path.read_text(encoding="utf-8"), tables(points)), encoding="utf-8")
     draw(points, folder / "latency.png")

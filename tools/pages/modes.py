@@ -6,8 +6,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
+from colibri.analysis.tables import markdown
 from colibri.autopilot.commander.rules.modes import MODES, ROWS, TRANSITIONS, Event, Mode, Transition, custom_mode
-from tools.pages.tables import renew_tables
+from tools.pages.tables import with_tables
 
 PLACES = {
     Mode.STABILIZED: (0.0, 3.0),
@@ -28,37 +29,30 @@ _ANY = (5.2, 1.0)
 
 
 def tables() -> list[str]:
-    """Return the tables of the page: modes, and transitions between them."""
-    return ["\n".join(_modes()), "\n".join(_transitions())]
+    modes = [
+        (
+            row.mode,
+            f"{row.main}/{row.sub} = {custom_mode(row.mode)}",
+            str(row.standard or "-"),
+            row.meaning,
+            "; ".join(need.name.lower().replace("_", " ") for need in row.needs) or "-",
+            "yes" if row.to_arm else "no",
+        )
+        for row in MODES
+    ]
+    headings = ("mode", "custom mode", "standard mode", "what it does", "needs", "arms")
+    transitions = [(", ".join(row.sources) or "any mode", *_outcome(row)) for row in TRANSITIONS]
+    return [markdown(headings, modes, names=6), markdown(("in", "when", "then", "rotors"), transitions, names=4)]
 
 
-def _modes() -> Iterator[str]:
-    yield "| mode | custom mode | standard mode | what it does | needs | arms |"
-    yield "|---|---|---|---|---|---|"
-    for row in MODES:
-        needs = "; ".join(need.name.lower().replace("_", " ") for need in row.needs) or "-"
-        number = f"{row.main}/{row.sub} = {custom_mode(row.mode)}"
-        yield f"| {row.mode} | {number} | {row.standard or '-'} | {row.meaning} | {needs} | {_yes(row.to_arm)} |"
-
-
-def _transitions() -> Iterator[str]:
-    yield "| in | when | then | rotors |"
-    yield "|---|---|---|---|"
-    for row in TRANSITIONS:
-        source = ", ".join(row.sources) or "any mode"
-        if row.event is Event.ARM:
-            yield f"| {source} | {row.event}, every check passes | the same mode | turn |"
-            continue
-        target = row.target or ("the mode selected" if row.event is Event.SELECT else "the same mode")
-        yield f"| {source} | {row.event} | {target} | {'stop' if row.disarms else '-'} |"
-
-
-def _yes(value: bool) -> str:
-    return "yes" if value else "no"
+def _outcome(row: Transition) -> tuple[str, str, str]:
+    if row.event is Event.ARM:
+        return f"{row.event}, every check passes", "the same mode", "turn"
+    target = row.target or ("the mode selected" if row.event is Event.SELECT else "the same mode")
+    return row.event, target, "stop" if row.disarms else "-"
 
 
 def draw(path: Path) -> None:
-    """Draw the transitions as a PNG."""
     figure = Figure(figsize=(13.0, 5.2))
     axes = figure.subplots()
     axes.set_xlim(-1.2, 13.0)
@@ -111,6 +105,7 @@ def _edges(row: Transition) -> Iterator[tuple[tuple[float, float], tuple[float, 
 
 
 def write(folder: Path) -> None:
-    """Write tables and picture."""
-    renew_tables(folder / "modes.md", tables())
     draw(folder / "modes.png")
+
+
+PAGES = {"modes.md": lambda page: with_tables(page, tables())}

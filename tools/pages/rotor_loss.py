@@ -13,7 +13,7 @@ from colibri.analysis.tables import markdown
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from tools.pages.rotor_loss_flights import COLUMNS, HEIGHT_M, UPRIGHT_DEG, Case, Flown, fly_all
-from tools.pages.tables import renew_tables
+from tools.pages.tables import with_tables
 
 SEEDS = range(50)
 CASES = (
@@ -103,7 +103,8 @@ def _cells(flown: Sequence[Flown]) -> list[str]:
 def write(folder: Path) -> bool:
     """Return whether every flight was well, except in the last case."""
     flown = fly_all(CASES, SEEDS)
-    renew_tables(folder / "rotor-loss.md", [table(flown)])
+    path = folder / "rotor-loss.md"
+    path.write_text(with_tables(path.read_text(encoding="utf-8"), [table(flown)]), encoding="utf-8")
     title = f"A rotor lost at {HEIGHT_M:.0f} m, {len(SEEDS)} seeds: {_DRAWN.name}"
     write_figure(draw(flown[_DRAWN], title), folder / "rotor-loss")
     return all(one.well for case in CASES[:-1] for one in flown[case])

@@ -1,15 +1,21 @@
-"""Tables of pages that are otherwise written by hand."""
+"""Parts of pages that come from the code; the rest of these pages is written by hand."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from html import escape
-from pathlib import Path
 
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
-def renew_tables(path: Path, tables: Sequence[str]) -> None:
-    path.write_text(with_tables(path.read_text(encoding="utf-8"), tables), encoding="utf-8")
+def with_body(page: str, body: Iterable[str], *, first: str = "## ", last: str = "") -> str:
+    """Replace the lines of a page from one that begins with `first` on, up to one that begins with `last`."""
+    head = page[: page.index(f"\n{first}") + 1]
+    text = head + "".join(f"{line}\n" for line in body)
+    return text + page[page.index(f"\n{last}") + 1 :] if last else text.rstrip("\n") + "\n"
+
+
+def cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def with_tables(page: str, tables: Iterable[str]) -> str:

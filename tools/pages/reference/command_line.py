@@ -2,30 +2,13 @@
 
 from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
 from collections.abc import Iterator
-from pathlib import Path
 from textwrap import dedent
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.cli.shared.parser import parser_of
 from colibri.plant.__main__ import command_line as plant_command_line
-from tools.pages.tables import code
-
-_HEAD = """# Commands and options
-
-`colibri COMMAND --help` says the same on a terminal. Written by `python -m tools.pages reference.command_line docs`
-from the parsers themselves; a test holds that they agree.
-"""
-_TAIL = """## Environment and exit codes
-
-| variable | what it does |
-|---|---|
-| `NO_COLOR` | set to anything: no colours on the terminal |
-| `NUMBA_CACHE_DIR` | a folder for machine code, where no usual one can be written to ([install.md](install.md)) |
-
-Exit codes: 0 it went well; 1 something failed, and one line says what; 2 bad input, and one line says what to do;
-130 interrupted.
-"""
+from tools.pages.tables import code, with_body
 
 
 class _Listener(HelpFormatter):
@@ -54,18 +37,12 @@ def parsers() -> dict[str, ArgumentParser]:
     return {**found, "plant": plant_command_line(), "autopilot": autopilot_command_line()}
 
 
-def page() -> str:
-    known = parsers()
-    lines = [_HEAD]
-    for group, commands in GROUPS.items():
-        lines += [f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in commands)]
-    lines += [
-        "- **the two processes of a flight**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in PROCESSES),
-        "",
-    ]
-    for name, parser in known.items():
-        lines += _section(name, parser)
-    return "\n".join([*lines, _TAIL])
+def _page() -> Iterator[str]:
+    for group, names in (*GROUPS.items(), ("the two processes of a flight", PROCESSES)):
+        yield f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in names)
+    yield ""
+    for name, parser in parsers().items():
+        yield from _section(name, parser)
 
 
 def _section(name: str, parser: ArgumentParser) -> Iterator[str]:
@@ -97,5 +74,4 @@ def _help(action: Action, parser: ArgumentParser) -> str:
     return " ".join(said.split()).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
 
-def write(folder: Path) -> None:
-    (folder / "cli.md").write_text(page(), encoding="utf-8")
+PAGES = {"cli.md": lambda page: with_body(page, _page(), first="- **", last="## Environment")}

@@ -4,27 +4,12 @@ import ast
 import re
 from collections.abc import Callable, Iterator
 from inspect import cleandoc, getsource
-from pathlib import Path
 from textwrap import dedent
 from typing import Any
 
-import msgspec
-from msgspec.inspect import (
-    CustomType,
-    DictType,
-    Field,
-    FloatType,
-    IntType,
-    LiteralType,
-    Metadata,
-    NoneType,
-    StructType,
-    TupleType,
-    Type,
-    UnionType,
-    VarTupleType,
-)
+from msgspec import inspect as kinds
 
+from colibri.analysis.tables import markdown
 from colibri.autopilot.control.geometric import GeometricSettings
 from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
 from colibri.autopilot.control.profile import ProfileTables, profile_names, profile_text
@@ -32,6 +17,7 @@ from colibri.autopilot.control.thesis.cascade import CascadeSettings
 from colibri.autopilot.control.thesis.global_mpc import GlobalSettings
 from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpcSettings
 from colibri.plant.vehicle.description import Vehicle, vehicle_names, vehicle_text
+from tools.pages.tables import cell, with_body
 
 LAWS: dict[str, Any] = {
     "whole-lpv-mpc": WholeLpvMpcSettings,
@@ -40,38 +26,20 @@ LAWS: dict[str, Any] = {
     "cascade": CascadeSettings,
     "global-lpv-mpc": GlobalSettings,
 }
-_PROFILES = """# Keys of a profile
-
-A profile is a TOML file: `colibri show profile flight > mine.toml`, changed, is flown by `--profile mine.toml`
-([vehicles.md](vehicles.md)). Keys that are not listed here, and what is out of range, are refused by file and key.
-Those without "may be left out" must be there. The example is of the first of Colibri's profiles that has the key.
-Written by `python -m tools.pages reference.keys docs` from the structures that read the files; a test holds that
-they agree.
-"""
-_VEHICLES = """# Keys of a vehicle
-
-A vehicle is a TOML file: `colibri show vehicle hummingbird > mine.toml`, changed, is flown by `--vehicle
-mine.toml`, or with `--plant-vehicle mine.toml` by an autopilot that is not told ([vehicles.md](vehicles.md)). Keys
-that are not listed here, and what is out of range, are refused by file and key. What may be left out is not
-modelled then. The example is of the first of Colibri's vehicles that has the key. Written by `python -m tools.pages
-reference.keys docs` from the structures that read the files; a test holds that they agree.
-"""
-_HEADINGS = "| key | what may be there | for example | what it is |\n|---|---|---|---|"
 _SOURCE = re.compile(r"^\s*([\w-]+)\s*=\s*(.+?)\s*(?:#\s*(.*))?$")
 _MORE = re.compile(r"^\s{12,}#\s*(.*)$")
 _BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to"}
 
 
-def pages() -> dict[str, str]:
-    profiles = _said("flight", profile_names(), profile_text)
-    vehicles = _said("hummingbird", vehicle_names(), vehicle_text)
-    sections = [_PROFILES, *_sections(ProfileTables, "", profiles)]
+def profiles() -> Iterator[str]:
+    said = _said("flight", profile_names(), profile_text)
+    yield from _sections(ProfileTables, "", said)
     for law, settings in LAWS.items():
-        sections += _sections(settings, f"controllers.{law}", profiles)
-    return {
-        "profile-keys.md": "\n".join(sections),
-        "vehicle-keys.md": "\n".join([_VEHICLES, *_sections(Vehicle, "", vehicles)]),
-    }
+        yield from _sections(settings, f"controllers.{law}", said)
+
+
+def vehicles() -> Iterator[str]:
+    return _sections(Vehicle, "", _said("hummingbird", vehicle_names(), vehicle_text))
 
 
 def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[str, tuple[str, str, str]]:
@@ -95,12 +63,12 @@ def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[s
 
 
 def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> Iterator[str]:
-    info = msgspec.inspect.type_info(kind)
-    assert isinstance(info, StructType)
-    yield f"## {_heading(above)}\n"
+    info = kinds.type_info(kind)
+    assert isinstance(info, kinds.StructType)
+    yield f"## `[{above}]`\n" if above else "## Top of the file\n"
     yield f"{_first_line(kind)}\n"
     notes, inner = _notes(kind), []
-    rows = [_HEADINGS]
+    rows = []
     for field in info.fields:
         key = f"{above}.{field.encode_name}".lstrip(".")
         table = _table_of(field.type)
@@ -110,17 +78,13 @@ def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> I
         value, comment, where = said.get(key, ("", "", ""))
         note = notes.get(field.name) or comment or (_first_line(table) if table is not None else "")
         shown = f"`{value}` ({where})" if value else ""
-        rows.append(f"| `{field.encode_name}` | {what}{_optional(field)} | {_cell(shown)} | {_cell(note)} |")
-    yield "\n".join(rows) + "\n"
+        rows.append((f"`{field.encode_name}`", what + _optional(field), cell(shown), cell(note)))
+    yield markdown(("key", "what may be there", "for example", "what it is"), rows, names=4)
     for table, key in inner:
         yield from _sections(table, key, said)
 
 
-def _heading(above: str) -> str:
-    return f"`[{above}]`" if above else "Top of the file"
-
-
-def _optional(field: Field) -> str:
+def _optional(field: kinds.Field) -> str:
     if field.required:
         return ""
     default = field.default
@@ -132,31 +96,31 @@ def _first_line(kind: Any) -> str:
     return cleandoc(kind.__doc__).partition("\n\n")[0].replace("\n", " ")
 
 
-def _table_of(kind: Type) -> Any:
-    parts = kind.types if isinstance(kind, UnionType) else (kind,)
-    return next((part.cls for part in parts if isinstance(part, StructType)), None)
+def _table_of(kind: kinds.Type) -> Any:
+    parts = kind.types if isinstance(kind, kinds.UnionType) else (kind,)
+    return next((part.cls for part in parts if isinstance(part, kinds.StructType)), None)
 
 
-def _what(kind: Type) -> str:
+def _what(kind: kinds.Type) -> str:
     match kind:
-        case Metadata():
+        case kinds.Metadata():
             return _what(kind.type)
-        case FloatType() | IntType():
+        case kinds.FloatType() | kinds.IntType():
             limits = [(word, getattr(kind, name)) for name, word in _BOUNDS.items()]
             bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
-            return " ".join(["whole number" if isinstance(kind, IntType) else "number", *bounds])
-        case LiteralType():
+            return " ".join(["whole number" if isinstance(kind, kinds.IntType) else "number", *bounds])
+        case kinds.LiteralType():
             return " or ".join(f"`{value}`" for value in kind.values)
-        case TupleType():
+        case kinds.TupleType():
             each = {_what(item): None for item in kind.item_types}
             return f"{len(kind.item_types)} of: {', '.join(each)}"
-        case VarTupleType():
+        case kinds.VarTupleType():
             return f"list of: {_what(kind.item_type)}"
-        case UnionType():
-            return " or ".join(_what(part) for part in kind.types if not isinstance(part, NoneType))
-        case DictType():
+        case kinds.UnionType():
+            return " or ".join(_what(part) for part in kind.types if not isinstance(part, kinds.NoneType))
+        case kinds.DictType():
             return "tables"
-        case CustomType():
+        case kinds.CustomType():
             return kind.cls.__name__
     return "yes or no: `true`, `false`" if type(kind).__name__ == "BoolType" else "text"
 
@@ -180,10 +144,7 @@ def _notes(kind: Any) -> dict[str, str]:
     return notes
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-def write(folder: Path) -> None:
-    for name, page in pages().items():
-        (folder / name).write_text(page, encoding="utf-8")
+PAGES = {
+    "profile-keys.md": lambda page: with_body(page, profiles()),
+    "vehicle-keys.md": lambda page: with_body(page, vehicles()),
+}

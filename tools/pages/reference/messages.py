@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from inspect import getdoc, getmembers, getsource, isclass
-from pathlib import Path
 from types import ModuleType
 
 import colibri.mavlink as mavlink_package
+from colibri.analysis.tables import markdown
 from colibri.autopilot.commander import commands, motion_commands
 from colibri.autopilot.ground import stations, system_commands
 from colibri.mavlink.mission.service import MissionService, Vehicle
@@ -19,50 +19,26 @@ from colibri.mavlink.streaming import service as streaming_service
 from colibri.mavlink.streaming.rates import DEFAULTS, GCS, HZ, SDK
 from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
 from colibri.mavlink.wire.dialect import mav
+from tools.pages.tables import cell, with_tables
 
-_HEAD = """# Messages
-
-What a vehicle of `colibri sitl` streams, takes and obeys. How clients use it:
-[ground-stations.md](ground-stations.md); setpoints, sticks and targets are those of PX4. Between plant and
-autopilot it is the messages of [lockstep.md](lockstep.md). Written by `python -m tools.pages reference.messages
-docs` from the tables and services themselves; a test holds that they agree.
-
-## Streamed
-
-At rates that a client changes by SET_MESSAGE_INTERVAL or REQUEST_DATA_STREAM; REQUEST_MESSAGE asks for one. *SDK*
-and *GCS*: messages a second on links to SDKs (ports 14540 to 14549) and to ground stations; `-`: when asked for.
-"""
-_OBEYED = """
-## Commands obeyed
-
-As COMMAND_LONG or COMMAND_INT; any other, and a request for what the vehicle has not, is answered by UNSUPPORTED.
-"""
 _TELEMETRY = (attitude, controller, position, power, sensors, status)
 _HANDLERS = (commands, motion_commands, stations, streaming_service, standard_modes, system_commands)
 
 
-def page() -> str:
-    return "\n".join(
-        [
-            _HEAD,
-            "| message | SDK | GCS | what is in it |",
-            "|---|---:|---:|---|",
-            *_streamed(),
-            "\n## Taken\n\n| messages | what takes them |\n|---|---|",
-            *_taken(),
-            _OBEYED,
-            "| command | number |\n|---|---:|",
-            *(f"| `{command}` | {getattr(mav, command)} |" for command in sorted(obeyed())),
-            "",
-        ]
-    )
+def tables() -> list[str]:
+    commands = [(f"`{command}`", str(getattr(mav, command))) for command in sorted(obeyed())]
+    return [
+        markdown(("message", "SDK", "GCS", "what is in it"), list(_streamed()), names=4),
+        markdown(("messages", "what takes them"), list(_taken()), names=2),
+        markdown(("command", "number"), commands, names=1),
+    ]
 
 
-def _streamed() -> Iterator[str]:
+def _streamed() -> Iterator[tuple[str, ...]]:
     for name in sorted(DEFAULTS[SDK].keys() | DEFAULTS[GCS].keys()):
         encoder = next(getattr(module, name.lower()) for module in _TELEMETRY if hasattr(module, name.lower()))
         meaning = " ".join((getdoc(encoder) or "").split()).removeprefix(name).lstrip()
-        yield f"| `{name}` | {_rate(SDK, name)} | {_rate(GCS, name)} | {_cell(meaning)} |"
+        yield f"`{name}`", _rate(SDK, name), _rate(GCS, name), cell(meaning)
 
 
 def _rate(kind: str, name: str) -> str:
@@ -70,12 +46,12 @@ def _rate(kind: str, name: str) -> str:
     return f"{HZ / interval_us:g}" if interval_us else "-"
 
 
-def _taken() -> Iterator[str]:
+def _taken() -> Iterator[tuple[str, ...]]:
     by_service: dict[str, list[str]] = {}
     for message, service in sorted(taken().items()):
         by_service.setdefault(service, []).append(f"`{message}`")
     for service, messages in by_service.items():
-        yield f"| {', '.join(messages)} | {_cell(service)} |"
+        yield ", ".join(messages), cell(service)
 
 
 def taken() -> dict[str, str]:
@@ -115,9 +91,4 @@ def _is_command(value: object) -> bool:
     return isinstance(value, str) and re.fullmatch("MAV_CMD_[A-Z0-9_]+", value) is not None
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-def write(folder: Path) -> None:
-    (folder / "messages.md").write_text(page(), encoding="utf-8")
+PAGES = {"messages.md": lambda page: with_tables(page, tables())}

@@ -5,35 +5,26 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any, get_args
 
 from colibri.common.spec import Option, described, fields_of
+from tools.pages.tables import cell, with_body
 
 FACES = ("colibri", "colibri.sitl")
-_HEAD = """# Python
-
-What `colibri` and `colibri.sitl` make public, from their docstrings: how to use it is in [python.md](python.md),
-[campaigns.md](campaigns.md), [controllers.md](controllers.md) and [scenarios.md](scenarios.md). The other packages
-name what is public in their `__init__` ([design.md](design.md)). Written by `python -m tools.pages reference.python
-docs`; a test holds that it agrees.
-"""
 _SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
 _ENTRY = re.compile(r"^    (\*{0,2}\w+)(?: \(.*?\))?: (.*)$")
 
 
-def page() -> str:
-    lines = [_HEAD]
+def _sections() -> Iterator[str]:
     shown: set[int] = set()
     for face in FACES:
         package = import_module(face)
-        lines += [f"## {face}\n", f"{inspect.getdoc(package)}\n"]
+        yield f"## {face}\n\n{inspect.getdoc(package)}\n"
         for name in sorted(package.__all__, key=str.lower):
             thing = getattr(package, name)
             if id(thing) not in shown:
                 shown.add(id(thing))
-                lines += _thing(name, thing)
-    return "\n".join(lines)
+                yield from _thing(name, thing)
 
 
 def _thing(name: str, thing: Any) -> Iterator[str]:
@@ -55,7 +46,7 @@ def _options(kind: type) -> Iterator[str]:
         yield "| option | |\n|---|---|"
         for name, field in fields_of(kind).items():
             if field.option.keyword:
-                yield f"| `{name}` | {_cell(described(field))} |"
+                yield f"| `{name}` | {cell(described(field))} |"
         yield ""
 
 
@@ -74,7 +65,7 @@ def _members(kind: type) -> Iterator[str]:
             continue
         said = _sentence(inspect.getdoc(member) or "")
         if said:
-            rows.append(f"| `{_cell(shown)}` | {_cell(said)} |")
+            rows.append(f"| `{cell(shown)}` | {cell(said)} |")
     if rows:
         yield "| | |\n|---|---|\n" + "\n".join(rows) + "\n"
 
@@ -123,9 +114,4 @@ def _text(doc: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-def write(folder: Path) -> None:
-    (folder / "python-api.md").write_text(page(), encoding="utf-8")
+PAGES = {"python-api.md": lambda page: with_body(page, _sections())}
