@@ -38,7 +38,7 @@ def parsers() -> dict[str, ArgumentParser]:
 
 
 def _page() -> Iterator[str]:
-    for group, names in (*GROUPS.items(), ("the two processes of a flight", PROCESSES)):
+    for group, names in (*GROUPS.items(), ("the two processes of a flight", tuple(PROCESSES))):
         yield f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in names)
     yield ""
     for name, parser in parsers().items():
