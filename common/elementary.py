@@ -1,7 +1,7 @@
 """Elementary functions with the same bits on every computer, unlike the C library's.
 
-Each is an argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt`, `math.hypot`
-and `math.dist` are exact or Python's own. `kernels` has the same functions compiled, `elementwise` for arrays.
+Each is an argument reduction and a Taylor series in IEEE 754 operations in the order written. `math.sqrt` is exact
+everywhere, `math.hypot` is Python's own. `kernels` has the same functions compiled, `elementwise` for arrays.
 
 Errors stay below one unit in the last place for sin, cos, exp and log, below three for the others (tested against 60
 digits). Outside its domain a function returns nan or infinity, never raises.

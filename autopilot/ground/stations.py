@@ -131,7 +131,6 @@ class Stations:
             self._heartbeat,
             self._obeys,
             self._streams,
-            modes,
             TimeService(),
             ParameterService(parameters),
             self.plans,

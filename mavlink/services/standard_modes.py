@@ -1,12 +1,12 @@
 """The standard modes microservice: mavlink.io/en/services/standard_modes.html. CURRENT_MODE is telemetry."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from math import isnan
 from typing import NamedTuple, TypeAlias
 
-from colibri.mavlink.node.service import Fields, Peer, Send, to
+from colibri.mavlink.node.service import Fields, Send, to
 from colibri.mavlink.services.command import FAILED, Command, Handler
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 NAME_BYTES = 34
@@ -30,14 +30,9 @@ SetMode: TypeAlias = Callable[[int, Command], Refusal | None]
 class StandardModes:
     """Lists the modes, and sets the standard ones."""
 
-    handles: frozenset[str] = frozenset()
-
     def __init__(self, modes: Sequence[ModeInfo], set_mode: SetMode) -> None:
         self._modes = tuple(modes)
         self._set_mode = set_mode
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:  # noqa: ARG002
-        return ()
 
     def handlers(self) -> dict[int, Handler]:
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
