@@ -49,7 +49,6 @@ def gust(text: str) -> Gust:
 
 
 def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
-    """Read a wind from a CSV file, or from `text` that was in it."""
     try:
         lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:

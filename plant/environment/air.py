@@ -62,7 +62,6 @@ class Air:
 
 
 def _with_eddies(velocity: Vector, wind: Vector, eddies: Eddies, scale: Scales) -> Vector:
-    """Add the eddies, whose axes are along the mean `wind`, to `velocity`."""
     along, left, up = eddy_velocity(eddies, scale)
     speed = hypot(wind[0], wind[1])
     e, n = (wind[0] / speed, wind[1] / speed) if speed > 0.0 else (1.0, 0.0)

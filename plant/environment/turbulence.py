@@ -60,7 +60,6 @@ def scales(intensity: Intensity, height_m: float) -> Scales:
 
 
 def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
-    """Return the velocity along the mean wind, across it to the left, and upwards, m/s."""
     horizontal = scale.sigma_uv_m_s
     return horizontal * eddies.u, horizontal * _across(eddies.v), scale.sigma_w_m_s * _across(eddies.w)
 

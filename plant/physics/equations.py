@@ -168,7 +168,6 @@ def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
 
 @compiled
 def specific_force(x: Array, parameters: Packed) -> Vector:
-    """Return the specific force at the centre of mass, FLU, m/s²."""
     numbers = parameters[0]
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
     fx, fy, fz = _wrench(x, R, (x[13], x[14], x[15], x[16]), numbers).force_n

@@ -42,7 +42,6 @@ _TOO_SMALL = 1e-14
 
 
 def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
-    """Integrate by Runge-Kutta 4 in equal steps of at most `RK4_STEP_S`."""
     end = np.empty_like(x)
     return end, runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s), end)
 
@@ -69,7 +68,7 @@ def solver(name: Integrator) -> Solver:
 def runge_kutta_4(
     start: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int, x: Array
 ) -> float:
-    """Write x after `duration_s` in `steps` equal steps; return the voltage then."""
+    """Write x after `duration_s`; return the voltage then."""
     h = duration_s / steps
     hold(start, target, parameters, x)
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)

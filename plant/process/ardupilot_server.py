@@ -57,7 +57,6 @@ class ArduPilotServer:
         self._began_s, self._steps, self._progress = now_s, 0, Progress(self._status)
 
     def serve(self, *, duration_s: float) -> None:
-        """Serve until a flight is `duration_s` long, or until a signal."""
         while not self._stop and self._end.world.time_us < duration_s * 1e6:
             received = self._link.receive(MAX_WAIT_S)
             now_s = perf_counter()

@@ -83,7 +83,7 @@ class Simulator:
             self._logs.close()
 
     def _fly(self) -> bool:
-        """Fly with the connected PX4; return whether the time is over, rather than PX4 gone."""
+        """Return whether the time is over, rather than PX4 gone."""
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
         world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
@@ -135,7 +135,6 @@ class Simulator:
         return Truth(state, geodetic_of(state.position_enu_m, self._origin), acceleration, airspeed_m_s)
 
     def _await_answer(self, world: World, silence: Silence) -> bool:
-        """Return False if PX4 goes before it has answered."""
         end, call = self._end, self._end.calls
         silence.end(perf_counter())
         while not end.answered and not self._stop:

@@ -63,7 +63,6 @@ class Silence:
         self._since_s, self._reported = now_s, False
 
     def lasts(self, now_s: float, missing: str, time_us: int, waiting: str) -> bool:
-        """Return whether the silence has just become too long; if so, report it."""
         if self._reported or now_s - self._since_s < self._allowed_s:
             return False
         self._reported = True

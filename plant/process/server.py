@@ -60,7 +60,6 @@ class Server:
         self._ends = True
 
     def wait(self) -> bool:
-        """Wait for an autopilot; return False if a signal came first."""
         while not self._stop and self._end.peer is None:
             self._receive(MAX_WAIT_S)
         return self._end.peer is not None
@@ -160,7 +159,6 @@ class Server:
             self._log_traffic(sent)
 
     def _log_traffic(self, sent: list[Outgoing]) -> None:
-        """Log newly received frames, then `sent`, at the time of the last frame."""
         received, time_us = self._end.received, self._time_us
         frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
         self._keep(lambda logs: logs.write_frames(time_us, frames))

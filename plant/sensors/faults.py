@@ -24,7 +24,6 @@ class Reading:
         self._later: deque[tuple[int, Any]] = deque()
 
     def begin(self, fault: Fault, now_us: int, last: Any) -> None:
-        """Begin a fault, or end it with kind OK."""
         self._fault = None if fault.kind == OK else fault
         self._since_us, self._last = now_us, last
         self._later.clear()

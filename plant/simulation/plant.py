@@ -32,7 +32,6 @@ class Actuation:
         self._coming.append((from_us, command))
 
     def spans(self, begin_us: int, end_us: int) -> Iterator[tuple[ActuatorCommand, int]]:
-        """Yield commands and their durations, µs."""
         now_us = begin_us
         while now_us < end_us:
             while self._coming and self._coming[0][0] <= now_us:
@@ -79,7 +78,6 @@ class Plant:
         return ReceivedFrame(self._measure(self.world), status)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
-        """Advance to the next frame with the answer to this one, and with faults that happen now."""
         self._results = ()
         if faults:
             self.inject(faults)
@@ -103,7 +101,6 @@ class Plant:
         self._actuation.arrive(sent_us + self._round_trip_us, command)
 
     def go_on(self) -> None:
-        """Advance to the next frame."""
         begin_us = self.world.time_us
         for command, duration_us in self._actuation.spans(begin_us, begin_us + self.interval_us):
             self.world = self._physics.step(self.world, command, duration_us)

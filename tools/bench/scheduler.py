@@ -1,7 +1,4 @@
-"""Tasks a second and memory of a cluster's scheduler.
-
-`python -m tools.bench.scheduler [TASKS]`: a scheduler and two workers of many threads; each task sleeps for 10 ms.
-"""
+"""Tasks a second and memory of a cluster's scheduler: `python -m tools.bench.scheduler [TASKS]`."""
 
 import subprocess
 import sys

@@ -49,7 +49,6 @@ def main() -> int:
 
 
 def table(cases: list[dict[str, Any]]) -> list[str]:
-    """Return a row for each place: outcomes in each situation, and the most common STATUSTEXT."""
     outcomes: dict[str, dict[str, Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
     said: dict[str, Counter[str]] = defaultdict(Counter)
     for case in cases:
@@ -65,7 +64,6 @@ def table(cases: list[dict[str, Any]]) -> list[str]:
 
 
 def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:
-    """Yield the cases of both kinds of feedback as they end."""
     reading, writing = os.pipe()
     children = []
     for feedback in Feedback:

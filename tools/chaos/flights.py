@@ -1,4 +1,4 @@
-"""Flights into which exceptions are thrown: a situation is prepared, flown on, and judged."""
+"""Flights into which exceptions are thrown."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,11 +25,11 @@ _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 class Verdict(NamedTuple):
-    """Outcome of a flight, the number of exceptions thrown, and the first STATUSTEXT about them."""
+    """Outcome of a flight."""
 
-    outcome: str
-    thrown: int
-    said: str
+    outcome: str  # "flown on", "landed", "not reached", or the violated condition
+    thrown: int  # number of exceptions
+    said: str  # the first STATUSTEXT about them
 
     @property
     def holds(self) -> bool:
@@ -82,7 +82,6 @@ class Flown:
         self._frames = 0
 
     def judged(self) -> Verdict:
-        """Arm the thrower, fly on, and judge."""
         flight, copter = self._flight, self._flight.inside.copter
         flight.gcs.forget()
         self._thrower.arm()
@@ -115,7 +114,7 @@ class Flown:
         return "never landed"
 
     def _step(self) -> str:
-        """Fly a frame with all clients' traffic; return the violated condition, if any."""
+        """Return the violated condition, if any."""
         flight, n = self._flight, self._frames
         self._frames += 1
         if n % 25 == 1:

@@ -1,4 +1,4 @@
-"""Places for exceptions: methods of the vehicle's parts, by module and dotted name."""
+"""Places for exceptions: methods by module and dotted name."""
 
 from importlib import import_module
 from math import inf

@@ -9,7 +9,6 @@ from tools.fuzz.jobs import HEADER, Job, fire
 
 
 def main() -> int:
-    """Run the campaigns and print what each came to; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tools.fuzz", description=__doc__)
     parser.add_argument("--datagrams", type=int, default=1_000_000, help="of each kind, to each process")
     parser.add_argument("--messages", type=int, default=1_000_000, help="to the ground-station side, in all modes")

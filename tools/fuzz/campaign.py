@@ -1,4 +1,4 @@
-"""One flight of two real processes under fire, and the conditions checked after it."""
+"""One flight of two real processes under fire, and its conditions."""
 
 import signal
 from hashlib import sha256
@@ -21,17 +21,11 @@ _EXIT_CODES = {"plant": 0, "autopilot": 130}
 
 
 class Outcome(NamedTuple):
-    """Outcome of a campaign.
+    """Outcome of a campaign."""
 
-    Attributes:
-        sent: Bad datagrams, by receiver and kind.
-        lost: Datagrams dropped by the kernel because a receiver was too slow.
-        memory_mib: Resident memory after a tenth of the flight and at its end, by process.
-    """
-
-    sent: dict[tuple[str, str], int]
-    lost: int
-    memory_mib: dict[str, tuple[float, float]]
+    sent: dict[tuple[str, str], int]  # bad datagrams by receiver and kind
+    lost: int  # dropped by the kernel, because a receiver was too slow
+    memory_mib: dict[str, tuple[float, float]]  # after a tenth of the flight and at its end
     failures: list[str]
 
 
@@ -65,7 +59,7 @@ def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> Outcome:
 
 
 def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
-    """Wait until `time_s` is flown; return the failure if the flight ends or stalls before."""
+    """Return the failure if the flight ends or stalls before `time_s`."""
     flown_s, moved_at_s = -1.0, monotonic()
     while flown_s < time_s:
         sleep(_LOOK_EVERY_S)
@@ -81,7 +75,6 @@ def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
 
 
 def _end(processes: dict[str, Process]) -> list[str]:
-    """Let the plant end by itself and the autopilot by SIGINT; return wrong exit codes."""
     codes = {"plant": processes["plant"].wait()}
     processes["autopilot"].process.send_signal(signal.SIGINT)
     codes["autopilot"] = processes["autopilot"].wait()
@@ -89,7 +82,7 @@ def _end(processes: dict[str, Process]) -> list[str]:
 
 
 def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]:
-    """Compare unreadable datagrams counted and sent: equal only if all of them arrived."""
+    """Compare unreadable datagrams sent and counted: equal only if all arrived."""
     failures = []
     for name, process in processes.items():
         counted = unreadable(process.events("ended")[-1]["dropped"])
@@ -115,7 +108,7 @@ def _rss(pid: int) -> int:
 
 
 def _kernel_drops(processes: dict[str, Process]) -> int:
-    """Sum the last column of /proc/net/udp over the sockets of the processes; 0 without such a file."""
+    """Sum the last column of /proc/net/udp over the processes' sockets."""
     table = Path("/proc/net/udp")
     alive = [psutil.Process(process.process.pid) for process in processes.values() if process.process.poll() is None]
     ports = {connection.laddr.port for process in alive for connection in process.net_connections("udp4")}

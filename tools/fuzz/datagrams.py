@@ -1,7 +1,6 @@
 """Hostile datagrams: random bytes, and frames with a right CRC and wrong content.
 
-Left out are valid messages for the awaited moment, which only signing could tell from the peer's, and requests for a
-frame interval before the flight.
+A valid message for the awaited moment is left out: only signing could tell it from the peer's.
 """
 
 import random
@@ -35,19 +34,14 @@ _QUATERNIONS = ((1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.0, 0.6, 0.8, 0.0)
 
 
 class Fuzzer:
-    """Random datagrams for one `receiver`, and hostile ones in the name of its `peer`.
-
-    Attributes:
-        moment_us: Simulated time of the flight: broken messages carry it, valid ones never do.
-        good: The last good datagram to the receiver, to be corrupted.
-    """
+    """Random datagrams for one `receiver`, and hostile ones in the name of its `peer`."""
 
     def __init__(self, chance: random.Random, peer: Ids, receiver: Ids) -> None:
         self._chance = chance
         self._peer = peer
         self._receiver = receiver
-        self.moment_us = FRAME_US
-        self.good = frame(HEARTBEAT, bytes(9), peer)
+        self.moment_us = FRAME_US  # of the flight: broken messages carry it, valid ones never do
+        self.good = frame(HEARTBEAT, bytes(9), peer)  # to be corrupted
         self._attitude_is_broken = True
         self._kinds: tuple[Callable[[], bytes], ...] = (
             self._any_message,
@@ -63,7 +57,6 @@ class Fuzzer:
         )
 
     def random(self) -> bytes:
-        """Return random bytes; some begin like a frame, some are a corrupted good or hostile datagram."""
         chance = self._chance
         kind = chance.randrange(4)
         if kind == 0:
@@ -88,7 +81,7 @@ class Fuzzer:
         return frame(message_id, payload, self._peer, sequence=self._chance.randrange(256))
 
     def _wrong_length(self) -> bytes:
-        """Return a message cut short, which MAVLink fills with zeros, or longer than defined."""
+        """Return a message cut short, which MAVLink fills with zeros, or one that is too long."""
         length = self._chance.choice((0, 1, self._chance.randrange(2, 12), self._chance.randrange(256), 255))
         payload = self._chance.choice((b"\xff" * length, self._chance.randbytes(length)))
         return frame(self._chance.choice(_CONVERSATION), payload, self._peer)

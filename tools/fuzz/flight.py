@@ -1,4 +1,4 @@
-"""A vehicle and its clients in one process, without files: a million messages take minutes."""
+"""A vehicle and its clients in one process, without files."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simul
 
 
 class BareFlight(Stepped, Steered):
-    """A vehicle and its clients; `client` is the first ground station, `rotors` the last command."""
+    """A vehicle and its clients."""
 
     system = SYSTEM
 
@@ -69,7 +69,6 @@ class BareFlight(Stepped, Steered):
         return client
 
     def restart(self) -> None:
-        """Restart the autopilot, wherever the vehicle is."""
         self._flight = Flight(self.plant, self._new_autopilot(), Direct())
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)

@@ -1,4 +1,4 @@
-"""MAVLink frames by hand, around any payload: only ids, sizes and CRC extras are pymavlink's."""
+"""MAVLink frames by hand, around any payload."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""The campaign against the ground-station side: messages fired at a vehicle in every mode."""
+"""Messages from ground stations, fired at a vehicle in every mode."""
 
 import gc
 import random
@@ -22,24 +22,17 @@ _FRAMES_A_SITUATION = 15
 
 
 class GroundOutcome(NamedTuple):
-    """Outcome of a campaign.
-
-    Attributes:
-        sent: Messages, by the state of the vehicle.
-        kinds: Number of different commands accepted.
-        memory_mib: Resident memory after half of the messages and at the end.
-    """
+    """Outcome of a campaign."""
 
     sent: dict[State, int]
     accepted: int
-    kinds: int
+    kinds: int  # of commands accepted
     flown_s: float
-    memory_mib: tuple[float, float]
+    memory_mib: tuple[float, float]  # after half of the messages and at the end
     failures: list[str]
 
 
 def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> GroundOutcome:
-    """Fire `quota` messages, equally in every situation; the vehicle writes to `files`, or to memory."""
     chance = random.Random(seed)
     target = Target(chance, files)
     sent = 0
@@ -66,10 +59,7 @@ def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> Gro
 
 
 def growth_mib(samples: Sequence[float]) -> float:
-    """Return the growth of memory over samples at equal intervals: five times the median over sixths of them.
-
-    A leak grows again and again; a single step is the allocator's next piece of memory, and does not count.
-    """
+    """Return the growth of memory by a leak: repeated growth counts, one step of the allocator does not."""
     sixths = [samples[i * len(samples) // 6 : (i + 1) * len(samples) // 6] for i in range(6)]
     if not all(sixths):
         return 0.0
@@ -77,7 +67,6 @@ def growth_mib(samples: Sequence[float]) -> float:
 
 
 def _fire(target: Target, situation: State, chance: random.Random, quota: int) -> int:
-    """Fire up to `quota` messages, or until the vehicle is lost; return their number."""
     target.prepare(situation)
     sent = 0
     while sent < quota and not target.lost:

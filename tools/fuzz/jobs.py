@@ -1,4 +1,4 @@
-"""Fuzzing campaigns by seed: each is a job, and rows of one table."""
+"""Fuzzing campaigns by seed."""
 
 import tempfile
 from pathlib import Path
@@ -14,11 +14,11 @@ HEADER = f"{'fired at':<16}{'seed':>6}{'sent':>10}{'MiB before':>12}{'after':>9}
 
 
 class Job(NamedTuple):
-    """A campaign with one seed: `datagrams` of each kind to each process, or `messages` from ground stations."""
+    """A campaign with one seed, from the peer or from ground stations."""
 
     seed: int
-    datagrams: int
-    messages: int
+    datagrams: int  # of each kind, to each process; 0: messages instead
+    messages: int  # from ground stations
 
 
 class Result(NamedTuple):
@@ -29,7 +29,6 @@ class Result(NamedTuple):
 
 
 def fire(job: Job) -> Result:
-    """Run one campaign; an exception of the vehicle is a failure, which the seed reproduces."""
     started_s = perf_counter()
     with tempfile.TemporaryDirectory() as name:
         return (_lockstep if job.datagrams else _ground)(job, Path(name), started_s)

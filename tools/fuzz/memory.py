@@ -16,7 +16,7 @@ NOW_S = 0.0
 
 
 class HostileWire(InMemory):
-    """A wire with `burst` hostile datagrams before and after each good one; fuzzer 0 aims at the plant."""
+    """A wire with `burst` hostile datagrams before and after each good one."""
 
     def __init__(self, burst: int = 0, fuzzers: tuple[Fuzzer, Fuzzer] | None = None) -> None:
         self._burst, self._fuzzers, self._now_us = burst, fuzzers, 0
@@ -29,7 +29,6 @@ class HostileWire(InMemory):
         return self._among(datagrams, 0)
 
     def at(self, now_us: int) -> None:
-        """Set the time in hostile datagrams; at 0 they are left out."""
         self._now_us = now_us
 
     def _among(self, datagrams: list[bytes], which: int) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""Messages with right CRCs and any contents, as anyone on a ground-station link may send them."""
+"""Messages with right CRCs and any contents."""
 
 import random
 import struct
@@ -52,7 +52,7 @@ class Sent(NamedTuple):
 
 
 class Messages:
-    """Random messages, with `parameters` and `commands` that are in use."""
+    """Random messages."""
 
     def __init__(self, chance: random.Random, parameters: Sequence[str], commands: Sequence[int]) -> None:
         self.chance = chance
@@ -80,7 +80,6 @@ class Messages:
         }
 
     def any(self) -> Sent:
-        """Return any message of the dialect, more often one that a vehicle handles."""
         return self.of(self._pick(_OFTEN) if self.chance.random() < 0.8 else self._pick(self._names))
 
     def of(self, name: str) -> Sent:
@@ -99,7 +98,6 @@ class Messages:
         return Sent(name, source, fields, self._codecs[source].encode(name, *fields.values()))
 
     def _near(self, fields: dict[str, Any], *, in_degrees: bool) -> None:
-        """In most cases, replace coordinates by a place within reach."""
         chance = self.chance
         if chance.random() < 0.3:
             return
@@ -177,7 +175,6 @@ class Messages:
 
 
 def _fitting(value: int, kind: str) -> float:
-    """Wrap a number to the range of its field."""
     if kind in ("float", "double"):
         return float(value)
     bits = _BITS[kind]

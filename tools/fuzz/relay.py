@@ -16,10 +16,9 @@ _RECEIVE_BUFFER = 2**20
 
 
 class FuzzingRelay(Relay):
-    """A relay with an attacker in it; `sent` counts bad datagrams by receiver and kind.
+    """A relay with an attacker in it.
 
-    A burst goes with the first datagram of each moment, never with a repeated one: at most two bursts wait in a
-    receiver's buffer. Requests before the flight, the first frame and its answer pass undisturbed.
+    A burst goes with the first datagram of each moment: at most two wait in a receiver's buffer.
     """
 
     def __init__(self, plant_url: str, *, burst: int, quota: int, seed: int) -> None:
@@ -38,7 +37,7 @@ class FuzzingRelay(Relay):
         self.sent = {(to, kind): 0 for to in self._fuzzers for kind in ("random", "hostile")}
 
     def unreadable(self, to: str) -> dict[str, int]:
-        """Return the counts that the codec of `to` must have if every bad datagram arrived."""
+        """Return the expected counts of the codec of `to` if every bad datagram arrived."""
         return unreadable(self._twins[to].dropped)
 
     def pass_on(self, to: str, datagram: bytes) -> None:
@@ -68,7 +67,6 @@ def unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
 
 
 def _moment_us(datagram: bytes) -> int:
-    """Return the simulated time of a command or frame, 0 for anything else."""
     message_id = int.from_bytes(datagram[7:10], "little")
     if message_id == ACTUATORS:
         return int.from_bytes(datagram[10:18], "little")

@@ -1,4 +1,4 @@
-"""A vehicle under fire from ground stations, and the conditions checked at every step."""
+"""A vehicle under fire from ground stations."""
 
 import random
 from collections import Counter
@@ -57,7 +57,7 @@ class Shooter(Client):
 
 
 class Target:
-    """One vehicle under fire from three places; `sent` counts by its state, `accepted` by MAV_CMD."""
+    """One vehicle under fire from three places."""
 
     def __init__(self, chance: random.Random, files: Files | None = None) -> None:
         self.flight = BareFlight(files=files)
@@ -97,7 +97,6 @@ class Target:
                 _must(sensible is None or sensible(asked(one.fields)), f"accepted {one}")
 
     def prepare(self, state: State) -> None:
-        """Reset everything to the start, then set up mode and place."""
         flight, copter = self.flight, self.flight.copter
         copter.parameters.reset()
         copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
@@ -150,7 +149,6 @@ class Target:
 
 
 def check(flight: BareFlight) -> None:
-    """Raise a `BrokenError` unless the conditions of every step hold."""
     pilot = flight.copter.pilot
     controls = flight.rotors.controls
     _must(all(0.0 <= control <= 1.0 for control in controls), f"rotors commanded to {controls}")

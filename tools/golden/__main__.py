@@ -23,7 +23,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def table(flown: Mapping[str, Flown]) -> str:
-    """Return flights × variations as Markdown: differences, and the duration of each variation."""
     names = list(flown)
     flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
     differing = {name: each.differing() for name, each in flown.items()}

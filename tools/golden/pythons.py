@@ -1,4 +1,4 @@
-"""Other Python versions on this computer, each in its own environment from the lock."""
+"""Other Python versions on this computer, each in an environment from the lock."""
 
 import shutil
 import subprocess
@@ -13,7 +13,6 @@ _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 
 def environments(root: Path) -> dict[str, Path]:
-    """Return the interpreters of the environments beside .venv, by version."""
     found = {}
     for minor in range(MIN_MINOR, MAX_MINOR + 1):
         folder = root / f".venv-3.{minor}"
@@ -23,7 +22,6 @@ def environments(root: Path) -> dict[str, Path]:
 
 
 def other_pythons() -> dict[str, Path]:
-    """Return an interpreter of each version found, except the running one."""
     found = {}
     for minor in range(MIN_MINOR, MAX_MINOR + 1):
         for python in _candidates(minor):
@@ -34,13 +32,11 @@ def other_pythons() -> dict[str, Path]:
 
 
 def is_stale(root: Path, version: str) -> bool:
-    """Return whether an environment is missing, or older than lock or package."""
     ready = root / f".venv-{version}" / ".ready"
     return not ready.exists() or ready.stat().st_mtime <= max((root / name).stat().st_mtime for name in _MADE_FROM)
 
 
 def set_up(root: Path, version: str, python: Path) -> None:
-    """Make an environment from the lock, unless it is current."""
     if not is_stale(root, version):
         return
     folder = root / f".venv-{version}"
@@ -55,7 +51,6 @@ def set_up(root: Path, version: str, python: Path) -> None:
 
 
 def _candidates(minor: int) -> list[Path]:
-    """Return possible interpreters: pyenv's, latest first, then the path's."""
     kept = Path.home() / ".pyenv" / "versions"
     pyenv = sorted(kept.glob(f"3.{minor}.*"), key=lambda folder: [_number(part) for part in folder.name.split(".")])
     on_path = shutil.which(f"python3.{minor}")
@@ -67,7 +62,6 @@ def _number(part: str) -> int:
 
 
 def _version(python: Path) -> str:
-    """Return the version of an interpreter; empty if it does not run."""
     try:
         said = subprocess.run([str(python), "-c", _SAYS_VERSION], capture_output=True, text=True, check=False)
     except OSError:

@@ -32,18 +32,12 @@ class VariationError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variation:
-    """Another computer.
-
-    Attributes:
-        environment: Additional variables of its processes.
-        needs: Required flags of the CPU, as in /proc/cpuinfo.
-        lacks: Why it cannot be flown here on any CPU; empty if it can.
-    """
+    """Another computer."""
 
     name: str
-    environment: Mapping[str, str] = field(default_factory=dict)
-    needs: Sequence[str] = ()
-    lacks: str = ""
+    environment: Mapping[str, str] = field(default_factory=dict)  # additional variables of its processes
+    needs: Sequence[str] = ()  # flags of the CPU, as in /proc/cpuinfo
+    lacks: str = ""  # why it cannot be flown here on any CPU
     python: Path = Path(sys.executable)
 
     def obstacle(self) -> str:
@@ -53,7 +47,7 @@ class Variation:
 
 
 class Flown(NamedTuple):
-    """Hash of each golden flight, empty if it did not end, and the wall-clock time with start and compilation."""
+    """Hash of each golden flight, empty if it did not end, and the duration with compilation."""
 
     hashes: dict[str, str]
     took_s: float
@@ -90,7 +84,7 @@ def _openblas(core: str, needs: Sequence[str]) -> Variation:
 
 
 def _numpy_without_simd() -> Variation:
-    """Disable the CPU features that numpy found here: others must not be named."""
+    """Disable the features that numpy found: others must not be named."""
     found: list[str] = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return Variation(
         name="numpy-without-simd",
@@ -124,7 +118,6 @@ def cpu_flags() -> frozenset[str]:
 
 
 def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> Flown:
-    """Fly the golden flights, or `only` some, in a process; raise `VariationError` if it ends early."""
     command = [str(variation.python), "-m", "colibri", "verify", "--golden", str(HASHES), "--link", link]
     command += ["--out", str(out), "--quiet", *(f"--only={name}" for name in only)]
     began_s = perf_counter()
@@ -140,7 +133,6 @@ def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[st
 
 
 def _environment(variation: Variation) -> dict[str, str]:
-    """Return a variation's variables, and ours except for those set by any variation."""
     varied = {"OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "GLIBC_TUNABLES", *ONE_THREAD}
     varied |= {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
     usual = {name: value for name, value in os.environ.items() if name not in varied}

@@ -1,4 +1,4 @@
-"""A ground station of a vehicle in this process: it encodes and decodes MAVLink."""
+"""A ground station of a vehicle in this process."""
 
 from typing import Any
 
@@ -12,12 +12,7 @@ GCS_PORT, SDK_PORT = 14550, 14540
 
 
 class Client(Inbox):
-    """A ground station; received messages are in `Inbox`.
-
-    Attributes:
-        link: Of the vehicle's links.
-        address: As seen by the vehicle.
-    """
+    """A ground station; received messages are in `Inbox`."""
 
     def __init__(self, system: int = 255, component: int = 190, port: int = GCS_PORT, link: int = 0) -> None:
         super().__init__(remembers=4000)
@@ -42,7 +37,6 @@ class Client(Inbox):
             self.add(message)
 
     def forget(self) -> None:
-        """Keep only the latest of each message."""
         for kept in self.heard.values():
             del kept[:-1]
         self.acks.clear()

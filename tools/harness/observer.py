@@ -1,4 +1,4 @@
-"""Observes a vehicle on a separate link: tests judge clients by this, not by their own output."""
+"""Observes a vehicle on a separate link: clients are judged by it."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -51,12 +51,7 @@ class Sight(NamedTuple):
 
 
 class Observer(OnPort):
-    """Records the messages of a vehicle to a port of this computer.
-
-    Attributes:
-        sights: About 20 in a simulated second.
-        counts: Messages by name, from any component.
-    """
+    """Records the messages of a vehicle to a port of this computer."""
 
     def __init__(self) -> None:
         super().__init__(self)
@@ -100,7 +95,7 @@ class Observer(OnPort):
                 self._news.wait(left_s)
 
     def wait_until_disarmed(self) -> Sight:
-        """Return the first sight after a flight; sights may lag behind a client's messages."""
+        """Return the first sight after a flight: sights may lag behind a client."""
         return self.wait(lambda sight: not sight.armed and any(it.armed for it in self.sights), "the end of the flight")
 
     @property
@@ -109,7 +104,7 @@ class Observer(OnPort):
         return self._client.vehicle.target
 
     def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
-        """Send a message with target ids and `fields`; return the first `answer` after it."""
+        """Return the first `answer` after a message with target ids and `fields`."""
         with self._news:
             before = self.counts[answer]
             self.send(self._client.encode(name, *self._vehicle, *fields))
@@ -139,7 +134,6 @@ class Observer(OnPort):
         return conversation
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
-        """Process a datagram; return datagrams to send, at first requests for message rates."""
         now_us = round(now_s * 1e6)
         with self._news:
             for message in self._client.receive(datagram, now_us):

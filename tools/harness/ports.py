@@ -17,7 +17,7 @@ class Talker(Protocol):
 
 
 class OnPort:
-    """Connects a client to the vehicle that serves `url`, within a block; `sender` is the last source."""
+    """Connects a client, within a block, to the vehicle that serves `url`."""
 
     def __init__(self, talker: Talker) -> None:
         self.sender: tuple[str, int] | None = None

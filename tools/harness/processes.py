@@ -34,7 +34,6 @@ THESIS_PLANT = (
 
 
 def fly(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
-    """Fly through the command line, without figures; return the report."""
     try:
         code: int | str | None = main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)])
     except SystemExit as ended:
@@ -61,7 +60,6 @@ def topic_rows(log: Path, topic: Topic = TRUTH) -> dict[str, Array]:
 
 
 def reference(track: str) -> dict[str, Array]:
-    """Read the thesis's closed-loop data of a track."""
     return rows(REFERENCE / f"{track}.csv")
 
 
@@ -71,7 +69,7 @@ def max_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: t
 
 
 def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_AFTER_S / 3600.0) -> None:
-    """Wait until `condition()`; the bound is for hangs, never a part of the verdict."""
+    """Wait until `condition()`; the bound is never part of a verdict."""
     give_up_s = monotonic() + 3600.0 * hours
     while not condition():
         assert monotonic() < give_up_s, f"waited in vain for {what}"
@@ -79,7 +77,7 @@ def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_
 
 
 class Process:
-    """`colibri plant` or `colibri autopilot` as a user starts it; `folder` takes its JSON status and errors."""
+    """`colibri plant` or `colibri autopilot` as a user starts it."""
 
     def __init__(self, folder: Path, package: str, *options: str) -> None:
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
@@ -119,7 +117,6 @@ def running(*processes: Process) -> Iterator[None]:
 
 
 def start_plant(folder: Path, out: Path, *options: str) -> tuple[Process, str]:
-    """Start the thesis's plant on a free port; return it and the URL to call."""
     plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(out), *THESIS_PLANT, *options)
     url: str = plant.wait_for("listening")["url"]
     return plant, url.replace("udpin", "udpout")

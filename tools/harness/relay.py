@@ -1,4 +1,4 @@
-"""A UDP relay between autopilot and plant, which applies a test's faults to the datagrams."""
+"""A UDP relay between autopilot and plant, which damages the traffic."""
 
 import random
 import socket

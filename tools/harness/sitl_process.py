@@ -1,4 +1,4 @@
-"""`colibri sitl` for tests: started on free ports, watched by an observer, ended."""
+"""`colibri sitl` for tests: started on free ports, observed, ended."""
 
 import re
 import signal
@@ -19,7 +19,7 @@ _COMPILES_HOURS = 0.05
 
 
 class Vehicle:
-    """A running `colibri sitl`; `seen` observes it, `state` has its parameters, logs and files."""
+    """A running `colibri sitl`."""
 
     def __init__(
         self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path, printed: Path
@@ -50,7 +50,6 @@ class Vehicle:
         return self._printed.read_text(encoding="utf-8").splitlines()
 
     def end(self) -> int:
-        """Interrupt it, as Ctrl-C does; return the exit code."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:

@@ -1,7 +1,4 @@
-"""Ground stations that request a lot and count the answers, without input or output.
-
-They act on received messages, so that the speed of the vehicle does not matter.
-"""
+"""Ground stations that request a lot and count the answers, whatever the speed of the vehicle."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +27,7 @@ _RADIUS_M, _RATE_RAD_S, _HEIGHT_M = 2.0, 0.5, 3.0
 
 
 class Ack(NamedTuple):
-    """An acknowledgement, with the system and component that it is for."""
+    """An acknowledgement."""
 
     command: int
     result: int
@@ -38,7 +35,7 @@ class Ack(NamedTuple):
 
 
 class Station:
-    """A ground station; `max_gap_s` is the longest time between heartbeats by `now_s`, `time_s` is simulated."""
+    """A ground station; `max_gap_s` is the longest time between heartbeats."""
 
     def __init__(
         self,
@@ -117,7 +114,7 @@ class Station:
 
 
 class OffboardTask(Station):
-    """A companion that takes off and flies a circle by setpoints; `off_m` is its largest error on the circle."""
+    """A companion that flies a circle by setpoints; `off_m` is its largest error."""
 
     def __init__(self, system_id: int) -> None:
         super().__init__(system_id, mav.MAV_COMP_ID_ONBOARD_COMPUTER, orders=[OFFBOARD, ARM])
@@ -126,7 +123,6 @@ class OffboardTask(Station):
         self._caught_up = False
 
     def _told(self) -> None:
-        """Send a setpoint 20 times a simulated second."""
         if self.time_s < self._setpoint_s + _SETPOINT_EVERY_S:
             return
         self._setpoint_s = self.time_s

@@ -99,7 +99,6 @@ def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[
 def _killed(
     what: str, kills: int, fly: Callable[[Path, int, int], tuple[list[K], list[str]]]
 ) -> tuple[list[K], list[str], int]:
-    """Fly until `kills` processes were killed; return the kills, the failures, and the number of flights."""
     done: list[K] = []
     failures: list[str] = []
     flights = 0

@@ -1,4 +1,4 @@
-"""Autopilots killed in flight: one mission after another, each kill judged."""
+"""Autopilots killed in flight, each kill judged."""
 
 import random
 from pathlib import Path
@@ -24,20 +24,20 @@ STANDING = "y=0,z=0,psi=90,rotors=0"
 class Kill(NamedTuple):
     """Outcome of a kill."""
 
-    time_s: float
+    time_s: float  # of the frame, simulated
     phase: Phase
-    item: int
-    hovered: bool
-    still: bool
-    tilt_deg: float
-    tilt_before_deg: float
-    lost_m: float
-    moved_m: float
-    went_on: bool
+    item: int  # of the mission, current
+    hovered: bool  # at the kill
+    still: bool  # in the same item at the next kill
+    tilt_deg: float  # largest before the next kill
+    tilt_before_deg: float  # largest in the second before
+    lost_m: float  # height lost within two seconds, if still
+    moved_m: float  # then, if still
+    went_on: bool  # reported by the autopilot
 
 
 class Flight(NamedTuple):
-    """Outcome of a mission; `words` is the standard error."""
+    """Outcome of a mission."""
 
     kills: list[Kill]
     flown: bool
@@ -46,7 +46,6 @@ class Flight(NamedTuple):
 
 
 def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> Flight:
-    """Fly a mission; kill the autopilot at random instants, and start it again at once."""
     folder.mkdir()
     station = Station(mission(legs))
     plant = start_plant(folder, "udpin:127.0.0.1:0", seed, out=folder)
@@ -89,8 +88,6 @@ class _Killed(NamedTuple):
 
 
 class _Killer:
-    """Kills one autopilot after another, and starts the next at once."""
-
     def __init__(self, folder: Path, between: Between, station: Station, feedback: Feedback, chance: random.Random):
         self._folder, self._between, self._station = folder, between, station
         self._feedback, self._chance = feedback, chance
@@ -105,7 +102,7 @@ class _Killer:
         self._died_us = self._between.time_us - round(_APART_S * 1e6)
 
     def kill(self) -> bool:
-        """Kill the autopilot some time after the last kill; return False if the mission ends before."""
+        """Return False if the mission ends before the kill."""
         between, station, chance = self._between, self._station, self._chance
         self._phase = chance.choice(list(Phase))
         due_us = self._died_us + round(1e6 * (_APART_S + chance.uniform(0.0, _SPREAD_S)))
@@ -137,7 +134,6 @@ class _Killer:
 
 
 def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
-    """Return the vehicle's motion after each kill."""
     t, place = truth["t"], np.stack([truth[axis] for axis in "xyz"], axis=1)
     tilt = tilt_deg(truth)
     speed = np.sqrt(truth["u"] ** 2 + truth["v"] ** 2 + truth["w"] ** 2)

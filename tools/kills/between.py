@@ -37,12 +37,7 @@ class HangsError(Exception):
 
 
 class Between:
-    """Relays between a plant and the autopilots that call it in turn, each over its own way.
-
-    Attributes:
-        time_us: Of the newest frame.
-        url: For the next autopilot; another after each `cut`.
-    """
+    """Relays between a plant and the autopilots that call it in turn, each over a separate way."""
 
     def __init__(self, plant: tuple[str, int]) -> None:
         self._plant = plant
@@ -140,7 +135,6 @@ class Between:
 
 
 def _number(datagram: bytes) -> int:
-    """Return the message id of a datagram's first frame."""
     return int.from_bytes(datagram[7:_HEAD], "little")
 
 

@@ -1,4 +1,4 @@
-"""Plants killed in flight: the autopilot reports it, and flies the next plant from the start."""
+"""Plants killed in flight: the autopilot waits, and flies the next one from the start."""
 
 import random
 from pathlib import Path
@@ -18,12 +18,11 @@ class Kill(NamedTuple):
 
     time_s: float
     phase: Phase
-    said: str
-    stood: bool
+    said: str  # the autopilot's report; empty if the next plant came first
+    stood: bool  # disarmed and without a mission at the next plant's start
 
 
 def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[Kill], str]:
-    """Kill plants in mid-mission; return the kills, and the standard error."""
     folder.mkdir()
     chance = random.Random(seed)
     station = Station(mission())
@@ -46,8 +45,6 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
 
 
 class _Flights:
-    """One autopilot, and the plants that it flies one after another."""
-
     def __init__(
         self,
         folder: Path,
@@ -65,7 +62,7 @@ class _Flights:
         self._chance = chance
 
     def kill(self, seed: int) -> Kill:
-        """Fly for a while, kill the plant, start another: at once, or after the autopilot's report."""
+        """Kill the plant; start another at once, or after the autopilot's report."""
         between, station, chance = self._between, self._station, self._chance
         between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         phase = chance.choice(list(Phase))

@@ -1,4 +1,4 @@
-"""A ground station that has a mission flown, and repeats every request until it succeeds."""
+"""A ground station that has a mission flown, whatever restarts."""
 
 import socket
 from collections.abc import Sequence
@@ -27,7 +27,6 @@ LEGS = len(_PLACES)
 
 
 def mission(legs: int = LEGS) -> list[MissionItem]:
-    """Return a take-off, up to four legs with a hover at the end of each, and a landing."""
     items = [_item(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0)]
     for east, north in _PLACES[:legs]:
         items.append(_item(mav.MAV_CMD_NAV_WAYPOINT, east, north))
@@ -40,7 +39,7 @@ HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))
 
 
 class Station:
-    """Listens on a port of this computer; `mode` and `armed` are `None` before the first heartbeat."""
+    """A ground station on a port of this computer."""
 
     def __init__(self, items: Sequence[MissionItem]) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -52,7 +51,6 @@ class Station:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Expect another flight, of a vehicle without the mission."""
         self.mode: Mode | None = None
         self.armed: bool | None = None
         self.seq = 0
@@ -99,7 +97,7 @@ class Station:
                 self.seq = fields.seq
 
     def _see(self, mode: Mode | None, armed: bool) -> None:
-        """Begin the next outstanding request, at every heartbeat until the rotors are armed."""
+        """Begin the next outstanding request, until the rotors are armed."""
         self.mode, self.armed = mode, armed
         self.flown = self.flown or (self.has_armed and not armed)
         self.has_armed = self.has_armed or armed

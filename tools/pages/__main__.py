@@ -1,4 +1,4 @@
-"""`python -m tools.pages PAGE FOLDER`: write the tables and pictures of PAGE that come from the code into FOLDER."""
+"""`python -m tools.pages PAGE FOLDER`: write generated tables and pictures of PAGE into FOLDER."""
 
 import sys
 from importlib import import_module

@@ -84,7 +84,7 @@ def draw(path: Path) -> None:
 
 
 def _leading_to(action: Action) -> tuple[str, str]:
-    """Return the conditions that lead to an action by default, and others that can."""
+    """Return the default conditions of an action, and the possible ones."""
     default = [str(row.condition) for row in TABLE if dict(row.choices)[row.default] is action]
     able = [
         str(row.condition)
@@ -101,7 +101,6 @@ def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], col
 
 
 def _label(axes: Axes, x: float, y: float, default: str, able: str) -> None:
-    """Label an arrow: defaults in bold, above the others."""
     heavy, light = (wrap(text, _WIDTH) for text in (default, able))
     for up, line in enumerate(reversed(heavy + light)):
         weight = "bold" if up >= len(light) else "normal"

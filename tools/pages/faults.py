@@ -15,7 +15,7 @@ def _table(part: Part) -> str:
 
 
 def _numbers(row: Row) -> str:
-    """Return the numbers of a row; the axes of a vector, which are alike, as one."""
+    """Return the numbers of a row; the axes of a vector as one."""
     if len(row.values) == len("xyz"):
         name = row.values[0].name.removesuffix(" x")
         return _number(row.values[0], f"{name} x, y, z", ", ".join(f"{value.usual:g}" for value in row.values))

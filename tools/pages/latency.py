@@ -1,4 +1,4 @@
-"""`latency.md` and `latency.png`: flights over ever slower links, with and without compensation."""
+"""Tables of `latency.md` and `latency.png`: flights over ever slower links."""
 
 from collections.abc import Iterator, Sequence
 from math import pi
@@ -28,7 +28,7 @@ _WELL_M = 1e-3
 
 
 class Case(NamedTuple):
-    """A flight of the sweep; `start` as in `colibri.plant.physics.start.Start`."""
+    """A flight of the sweep."""
 
     name: str
     track: str
@@ -44,11 +44,11 @@ LEMNISCATE = Case("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
 
 
 class Merit(NamedTuple):
-    """Quality of a flight: error from `judged_from_s` on, overshoot past the hover along x, largest tilt."""
+    """Quality of a flight, from `judged_from_s` on."""
 
     rms_m: float
-    overshoot_m: float
-    tilt_deg: float
+    overshoot_m: float  # past the hover, along x
+    tilt_deg: float  # largest
 
 
 class Flight(NamedTuple):
@@ -61,7 +61,7 @@ class Flight(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Both flights of a law at one round trip and way to compensate; `None` if the vehicle was lost."""
+    """Both flights of a law at one round trip; `None` if the vehicle was lost."""
 
     law: str
     way: str
@@ -85,7 +85,6 @@ def told_ms(way: str, round_trip_ms: float) -> float | None:
 
 
 def merit(recording: Recording, case: Case) -> Merit | None:
-    """Judge a flight; `None` if the vehicle was lost."""
     error, t = recording.position_error_m, recording["t"]
     upright = np.cos(recording["phi"]) * np.cos(recording["theta"])
     judged = t >= case.judged_from_s
@@ -127,7 +126,6 @@ def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
 
 
 def tables(points: Sequence[Point]) -> Iterator[str]:
-    """Yield for each law its errors, and the largest round trips before the first failure."""
     headings = ("round trip (ms)", *(f"{name}: {way}" for name in ("step", "lemniscate") for way in WAYS))
     for law in LAWS:
         yield markdown(headings, [_row(points, law, ms) for ms in sorted({p.round_trip_ms for p in points})], names=1)

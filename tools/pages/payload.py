@@ -21,15 +21,15 @@ _COLOURS = {"mass learned": "#0072B2", "mass not learned": "#D55E00"}
 
 
 class Laden(NamedTuple):
-    """A flight with the payload: times, s, height errors, (n,), and times and reported masses, kg, (m, 2)."""
+    """A flight with the payload."""
 
-    t: Array
-    height_error_m: Array
-    told: Array
+    t: Array  # s, (n,)
+    height_error_m: Array  # (n,)
+    told: Array  # times, s, and reported masses, kg, (m, 2)
 
 
 def fly(track: str | None, *, learns: bool, seconds: tuple[float, float, float]) -> Laden:
-    """Fly a track, `None` for hover; `seconds` are of the pick-up, of the drop and of the end."""
+    """Fly a track, `None` for hover; `seconds` are the times of pick-up, drop and end."""
     picked_up_s, dropped_s, end_s = seconds
     params = {} if learns else {"WHL_MASS_RATE": 0.0}
     with Flights(Setting(airborne=HEIGHT_M, track=track, params=params), None) as flights:

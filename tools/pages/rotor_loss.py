@@ -41,14 +41,12 @@ _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
 
 
 def table(flown: Mapping[Case, Sequence[Flown]]) -> str:
-    """Return the number of good flights, and median and worst of each measure."""
     headings = ("50 flights each", "well", *(name for name, _, _ in _MEASURES))
     rows = [(case.name, f"{sum(one.well for one in of)} of {len(of)}", *_cells(of)) for case, of in flown.items()]
     return markdown(headings, rows, names=1)
 
 
 def draw(flown: Sequence[Flown], title: str) -> Figure:
-    """Draw flights on top of one another, one of them thick: the first two seconds, and the whole."""
     figure = Figure(figsize=(10.0, 9.6), dpi=130)
     grid = figure.add_gridspec(5, 2, top=0.9, bottom=0.055, left=0.08, right=0.985, hspace=0.14, wspace=0.13)
     quantities: tuple[tuple[str, Callable[[Array], Array]], ...] = (

@@ -1,4 +1,4 @@
-"""Flights that lose a rotor, by seed, all in memory."""
+"""Flights that lose a rotor, by seed."""
 
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -40,26 +40,25 @@ _FULL_TURN_DEG = 360.0
 
 
 class Case(NamedTuple):
-    """Settings of the flights in a row; the wind's direction varies by seed."""
+    """Settings of the flights in a row."""
 
     name: str
     feedback: Feedback
-    runs_down: bool = False
-    wind_m_s: float = 0.0
+    runs_down: bool = False  # with its motor; else the thrust is gone at once
+    wind_m_s: float = 0.0  # its direction varies by seed
     turbulence: Intensity | None = None
 
 
 class Flown(NamedTuple):
-    """One flight; `path` has `COLUMNS`, one row a frame, until the vehicle rests, (n, 11)."""
+    """One flight."""
 
-    seed: int
-    noticed_s: float
-    path: Array
-    rights: bool
+    seed: int  # of everything random; the rotor is seed mod 4
+    noticed_s: float  # from the loss to its detection; nan without
+    path: Array  # `COLUMNS`, one row a frame until the vehicle rests, (n, 11)
+    rights: bool  # whether the right rotor was named
 
     @property
     def lost(self) -> Array:
-        """The path from the loss to the ground."""
         after = self.path[self.path[:, _T] > 0.0]
         touched = np.flatnonzero(np.diff(after[:, _VZ]) > _knock(after))
         low = [row for row in touched.tolist() if after[row, _Z] < _LOW_M]

@@ -1,4 +1,4 @@
-"""Parts of pages that come from the code; the rest of these pages is written by hand."""
+"""Generated parts of pages that are written by hand otherwise."""
 
 import re
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def with_body(page: str, body: Iterable[str], *, first: str = "## ", last: str = "") -> str:
-    """Replace the lines of a page from one that begins with `first` on, up to one that begins with `last`."""
+    """Replace the lines from one that begins with `first` on, up to one that begins with `last`."""
     head = page[: page.index(f"\n{first}") + 1]
     text = head + "".join(f"{line}\n" for line in body)
     return text + page[page.index(f"\n{last}") + 1 :] if last else text.rstrip("\n") + "\n"
@@ -34,5 +34,5 @@ def with_tables(page: str, tables: Iterable[str]) -> str:
 
 
 def code(text: str) -> str:
-    """Return a table cell with a text as code, for GitHub and the site, also with bars."""
+    """Return a text as code in a table cell, also with bars."""
     return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"

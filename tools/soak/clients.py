@@ -27,7 +27,7 @@ _VEHICLE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.tom
 
 
 class Look(NamedTuple):
-    """Use of resources at an instant; `cpu_s` is the total of each process."""
+    """Use of resources at an instant."""
 
     wall_s: float
     sim_s: float
@@ -40,7 +40,6 @@ def crew() -> tuple[Station, Station, OffboardTask]:
 
 
 def faults(crew: Iterable[Station]) -> list[str]:
-    """Return the clients' complaints."""
     found = []
     for client in crew:
         name = f"{client.identity[0]}/{client.identity[1]}"

@@ -49,14 +49,12 @@ def read(kept: Path) -> dict[str, str]:
 
 
 def compare(first: dict[str, str], again: dict[str, str]) -> None:
-    """Raise a `DiffersError` for the first test that differs."""
     for test in sorted(first.keys() | again.keys()):
         if first.get(test) != again.get(test):
             raise DiffersError(f"{test}: {first.get(test, 'not run')} at first, {again.get(test, 'not run')} now")
 
 
 def _run(link: str, kept: Path, only: str) -> str:
-    """Write outcome and hash of each test; return the summary."""
     hashes = kept.with_suffix(".part")
     command = [sys.executable, "-m", "pytest", "-q", "-m", "scenarios", "tests/scenarios/", "-n", str(WORKERS)]
     command += ["--dist", "worksteal", "--sitl-link", link, "--sitl-hashes", str(hashes)]

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by Playwright: it draws WebGL without a GPU, slowly."""
+"""A headless Chromium: it draws WebGL without a GPU, slowly."""
 
 import shutil
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""`lemniscate.gif`: a lap of the lemniscate as it was flown, over and over."""
+"""`lemniscate.gif`: a lap of the lemniscate as it was flown."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,6 @@ _GROUND, _AIR, _TRACK, _BODY, _THRUST = "#7d8a99", "#D55E00", "#b6c2cf", "#22334
 
 
 def draw(path: Path, *, frames_a_second: int = FRAMES_A_SECOND, width_in: float = 6.4) -> None:
-    """Fly the lemniscate and draw a lap: vehicle, thrust, trail, and shadow on the ground."""
     flight = fly("lemniscate", duration=FROM_S + LAP_S)
     table = flight.samples
     figure = Figure(figsize=(width_in, 0.56 * width_in), dpi=100)

@@ -1,4 +1,4 @@
-"""`house.png`: packages and their layers, from the import contracts; upper ones may import lower ones."""
+"""`house.png`: packages and their layers, from the import contracts."""
 
 import re
 import tomllib
@@ -25,7 +25,6 @@ _ALONE = ("autopilot", "plant", "mavlink", "common")
 
 
 def layers() -> dict[str, list[list[str]]]:
-    """Return the layers of each package, the importing ones first."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     found: dict[str, list[list[str]]] = {}
     for contract in project["tool"]["importlinter"]["contracts"]:
@@ -44,7 +43,7 @@ def _is_room(package: str, room: str, leave: set[str]) -> bool:
 
 
 def description() -> str:
-    """Return the drawing as text, which the picture keeps to show whether it is current."""
+    """Return the drawing as text: metadata that shows whether the picture is current."""
     return "; ".join(f"{package}: {' > '.join(' '.join(row) for row in rows)}" for package, rows in layers().items())
 
 
@@ -76,7 +75,6 @@ def _height(rows: list[list[str]]) -> float:
 
 
 def _package(axes: Axes, left: float, top: float, package: str, rows: list[list[str]]) -> float:
-    """Draw a package with its layers from `top` down; return its lower edge."""
     colour, what = PACKAGES[package]
     height = _height(rows)
     frame: dict[str, Any] = {"boxstyle": "round,pad=0,rounding_size=0.12", "edgecolor": _FRAME}

@@ -58,7 +58,6 @@ def recorded(path: Path) -> None:
 
 
 def compared(path: Path) -> None:
-    """Show two control laws on a track that is too fast for one of them."""
     begun = partial(fly, "lemniscate:lap=5", duration=6.0, wind="8@270", turbulence="moderate", link="memory")
     both = [begun(), begun(controller="geometric-se3")]
     with ExitStack() as held:
@@ -71,7 +70,6 @@ def compared(path: Path) -> None:
 
 
 def live(path: Path) -> None:
-    """Show a vehicle on its way to a target, with its commands unlocked."""
     with begun(feedback="sensors", wind="4@300") as sitl:
         vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
         sitl.run(3.0)
@@ -83,7 +81,6 @@ def live(path: Path) -> None:
 
 
 def mission(path: Path) -> None:
-    """Show a mission inside a fence, with an exclusion zone and a rally point."""
     with begun(wind="3@200") as sitl:
         vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
         corners = [(-6.0, -6.0), (12.0, -6.0), (12.0, 10.0), (-6.0, 10.0)]
@@ -104,7 +101,6 @@ def begun(**setting: str) -> Iterator[Sitl]:
 
 
 def real(path: Path) -> None:
-    """Show a vehicle of `colibri sitl` over UDP, flown by the page's orders."""
     vehicle = LiveVehicle("udpin:127.0.0.1:0")
     with TemporaryDirectory() as folder, closing(vehicle):
         link = ["--gcs", vehicle.url.replace("udpin", "udpout"), "--plant-port", "0", "--state", folder]

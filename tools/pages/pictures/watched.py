@@ -8,7 +8,7 @@ from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings
 
 
 class Watching(Station):
-    """A station of a simulated flight that feeds an `Observer`."""
+    """A station that feeds an `Observer`."""
 
     observer: Observer
 
@@ -30,7 +30,7 @@ def watched(sitl: Sitl) -> Observer:
 
 
 class Watched:
-    """A flight in simulated time as a live vehicle of the page."""
+    """A simulated flight as a live vehicle."""
 
     airframe = Airframe()
     is_live = True

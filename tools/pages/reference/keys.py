@@ -1,4 +1,4 @@
-"""`profile-keys.md` and `vehicle-keys.md`: every key of both kinds of files, from the structures that read them."""
+"""`profile-keys.md` and `vehicle-keys.md`, from the structures that read the files."""
 
 import ast
 import re
@@ -126,7 +126,7 @@ def _what(kind: kinds.Type) -> str:
 
 
 def _notes(kind: Any) -> dict[str, str]:
-    """Return the docstring below each field of a structure and its bases."""
+    """Return the docstring below each field."""
     notes: dict[str, str] = {}
     for part in reversed(kind.__mro__):
         if not part.__module__.startswith("colibri."):

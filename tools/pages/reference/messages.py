@@ -1,4 +1,4 @@
-"""`messages.md`: messages and commands of the vehicle, from its tables and services."""
+"""Tables of `messages.md`: messages and commands of the vehicle."""
 
 import ast
 import pkgutil
@@ -55,7 +55,6 @@ def _taken() -> Iterator[tuple[str, ...]]:
 
 
 def taken() -> dict[str, str]:
-    """Return the messages that a vehicle takes, with the first sentence of their service."""
     found: dict[str, str] = {}
     for module in _modules(mavlink_package):
         for _, kind in getmembers(module, isclass):

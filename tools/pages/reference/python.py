@@ -1,4 +1,4 @@
-"""`python-api.md`: the public names of the packages, from their signatures and docstrings."""
+"""`python-api.md`: public names with signatures and docstrings."""
 
 import inspect
 import re
@@ -41,7 +41,6 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
 
 
 def _options(kind: type) -> Iterator[str]:
-    """Yield the keyword options of a specification."""
     if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
         yield "| option | |\n|---|---|"
         for name, field in fields_of(kind).items():
@@ -51,7 +50,6 @@ def _options(kind: type) -> Iterator[str]:
 
 
 def _members(kind: type) -> Iterator[str]:
-    """Yield the documented public methods and properties of our classes, inherited ones included."""
     rows = []
     for name, member in inspect.getmembers(kind):
         owner = next((base for base in kind.__mro__ if name in vars(base)), kind)
@@ -96,7 +94,6 @@ def _sentence(doc: str) -> str:
 
 
 def _text(doc: str) -> str:
-    """Return a docstring as Markdown, its sections as lists."""
     lines: list[str] = []
     in_section = False
     for line in doc.splitlines():
