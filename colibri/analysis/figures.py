@@ -131,7 +131,6 @@ def draw_times(series: Series, description: TimeFigure, title: str) -> Figure:
 
 
 def draw_trajectory(series: Series, title: str) -> Figure:
-    """Draw position and reference in space, to scale unless an axis would be too short."""
     figure = Figure(figsize=(_WIDTH_IN, 6.8), dpi=_DPI)
     # Depth sorting would draw the reference over the path in places.
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
@@ -178,7 +177,6 @@ def _error_panels(series: Series) -> list[Panel]:
 def axes_grid(
     rows: int, columns: int, top_in: float, row_in: float = _ROW_IN, *, share: bool = True
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with axes; fixed margins draw twice as fast as a layout."""
     height_in = top_in + rows * row_in + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
     figure = Figure(figsize=(_WIDTH_IN, height_in), dpi=_DPI)
     column_in = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN - (columns - 1) * _COLUMN_GAP_IN) / columns

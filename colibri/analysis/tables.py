@@ -12,7 +12,7 @@ _MAX_WIDTH = 400
 
 
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -> list[Path]:
-    """Write `path` with suffixes md and csv; the first `names` columns are names."""
+    """Write `path` with suffixes md and csv."""
     texts = {"md": markdown(headings, rows, names=names), "csv": comma_separated(headings, rows)}
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in texts]
     for written, text in zip(paths, texts.values(), strict=True):

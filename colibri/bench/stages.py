@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
+from dataclasses import replace
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -25,7 +26,6 @@ from colibri.flights.in_process import fly_locally
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.open import open_link
-from colibri.mavlink.links.udp import UdpLink
 
 Figures: TypeAlias = dict[str, float]
 
@@ -83,7 +83,7 @@ class Flight(NamedTuple):
 def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight:
     """Fly in memory, timing every stage once all code is loaded."""
     flight = Flight({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
-    every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
+    every = max(1, round(duration_s / float(profile.table(CONTROLLER)["control_interval_s"]) / _QPS))
     seen, flying = 0, False
 
     def keep_qp(_result: Any, _kind: Any, qp: Qp, *_: Any) -> None:
@@ -101,11 +101,13 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
         FRAME_RECEIVED.name: lambda _result, datagram, *_: flight.frames.append(datagram),
         COMMAND_RECEIVED.name: lambda _result, datagram, *_: flight.commands.append(datagram),
     }
+    plan = plan_of(profile, folder, duration_s, "memory")
+    plan = replace(plan, spec=replace(plan.spec, tlog=True))  # else frames are rounded, not encoded
     with ExitStack() as stack:
         for stage in (*STAGES, *LINK_STAGES):
             keeper = keepers.get(stage.name, lambda *_: None)
             stack.enter_context(_timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
-        fly_locally(plan_of(profile, folder, duration_s, "memory"), begun)
+        fly_locally(plan, begun)
     return flight
 
 
@@ -157,23 +159,18 @@ def exchange_times_us(frames: Sequence[bytes], commands: Sequence[bytes]) -> lis
     answering.start()
     try:
         link = open_link(here.recv())
-        times_us = _round_trips_us(link, [*frames[:_MIN_SAMPLES], *frames])[_MIN_SAMPLES:]
+        times_us: list[float] = []
+        for frame in (*frames[:_MIN_SAMPLES], *frames):
+            began_s = perf_counter()
+            link.send(frame)
+            if link.receive(_REPLY_WITHIN_S) is not None:
+                times_us.append((perf_counter() - began_s) * 1e6)
         link.close()
     finally:
         answering.terminate()
         answering.join()
         here.close()
-    return times_us
-
-
-def _round_trips_us(link: UdpLink, datagrams: Sequence[bytes]) -> list[float]:
-    times_us = []
-    for datagram in datagrams:
-        began_s = perf_counter()
-        link.send(datagram)
-        if link.receive(_REPLY_WITHIN_S) is not None:
-            times_us.append((perf_counter() - began_s) * 1e6)
-    return times_us
+    return times_us[_MIN_SAMPLES:]
 
 
 def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
@@ -207,7 +204,3 @@ def _timed(
         yield
     finally:
         setattr(stage.owner, stage.method, untimed)
-
-
-def _control_interval_us(profile: Profile) -> float:
-    return float(profile.table(CONTROLLER)["control_interval_s"]) * 1e6

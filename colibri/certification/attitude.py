@@ -153,7 +153,7 @@ def _rotors(n: AttitudeNumbers) -> AnyArray:
 
 
 def _kernels(n: AttitudeNumbers) -> tuple[Any, Any, Any, Any]:
-    """Return the integrals over h of a moment that begins at 1, and of one commanded to 1; then theirs."""
+    """Return the integrals over h of a decaying and of a commanded moment; then theirs."""
     h = n.interval_s
     begun = n.lag_s * (1 - n.stays)
     begun_twice = n.lag_s * (h - begun)

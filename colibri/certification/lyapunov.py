@@ -129,13 +129,8 @@ def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
 
 
 def fastest(loop: UncertainLoop) -> Proof | None:
-    best = contraction(loop, 1.0)
-    low, high = spectral_radius(loop) ** 2, 1.0
-    for _ in range(_BISECTIONS if best else 0):
-        ratio = 0.5 * (low + high)
-        found = contraction(loop, ratio)
-        low, high, best = (low, ratio, found) if found else (ratio, high, best)
-    return best
+    found = _bisected(1.0, spectral_radius(loop) ** 2, lambda ratio: contraction(loop, ratio))
+    return found and found[1]
 
 
 def spectral_radius(loop: UncertainLoop) -> float:
@@ -149,15 +144,19 @@ def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float
         loop = loop_at(scale)
         return contraction(loop, 1.0) if loop else None
 
-    best = found_at(least)
+    return _bisected(least, 1.0, found_at)
+
+
+def _bisected(good: float, bad: float, find: Callable[[float], Proof | None]) -> tuple[float, Proof] | None:
+    """Return the value nearest to `bad` with a proof; `None` if even `good` lacks one."""
+    best = find(good)
     if best is None:
         return None
-    low, high = least, 1.0
     for _ in range(_BISECTIONS):
-        scale = 0.5 * (low + high)
-        found = found_at(scale)
-        low, high, best = (scale, high, found) if found else (low, scale, best)
-    return low, best
+        middle = 0.5 * (good + bad)
+        found = find(middle)
+        good, bad, best = (middle, bad, found) if found else (good, middle, best)
+    return good, best
 
 
 def invariant_set(loop: UncertainLoop) -> Proof | None:
@@ -244,7 +243,6 @@ def _root(P: Array, loop: UncertainLoop) -> Array | None:
 
 
 def _basis(blocks: list[list[int]], size: int) -> Array:
-    """Return a basis of symmetric matrices that couple states within blocks, (b, n, n)."""
     pairs = [pair for block in blocks for pair in combinations_with_replacement(block, 2)]
     basis = np.zeros((len(pairs), size, size))
     for matrix, (i, j) in zip(basis, pairs, strict=True):

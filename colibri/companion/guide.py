@@ -1,7 +1,4 @@
-"""The companion without socket or clock: bytes and time in, bytes out.
-
-The order of phases and its reasons are in `supervision/phases`.
-"""
+"""The companion without socket or clock: bytes and time in, bytes out."""
 
 from math import dist, inf, nan
 
@@ -43,12 +40,7 @@ _CORRECTED_IN = 0.5
 
 
 class Companion:
-    """Flies one vehicle along one track.
-
-    Attributes:
-        rows: The log; its writer clears it, as the reader of `said` does.
-        commanded, measured: Time, s, and body rates, rad/s, of an identification.
-    """
+    """Flies one vehicle along one track. The readers of `said` and `rows` clear them."""
 
     def __init__(
         self,

@@ -30,9 +30,6 @@ class HomeSeeker:
             return None
         return Home(origin, home.altitude_m - origin.altitude_m)
 
-    def receive(self, datagram: bytes, now_us: int) -> None:
-        self._peer.receive(datagram, now_us)
-
     def poll(self, now_us: int) -> list[bytes]:
         if self._peer.system and now_us >= self._again_us:
             self._again_us = now_us + _AGAIN_US

@@ -1,9 +1,9 @@
-"""Commands of each phase: arm, take off, offboard, hold; and the modes that result from them."""
+"""Commands of each phase, and the modes that result from them."""
 
 from math import isfinite, nan
 
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.stack import TakeOff
+from colibri.companion.stacks.stack import Stack, TakeOff
 from colibri.companion.supervision.phases import Phase
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.client.conversation import UNANSWERED
@@ -89,23 +89,21 @@ class Orders:
         if stack is None or self._settings.dry_run:
             return
         if phase is Phase.ARMING:
-            self._arm(stack.take_off)
+            self._arm(stack)
         elif phase is Phase.TAKING_OFF and stack.take_off is TakeOff.ARM_THEN_COMMAND:
             self._once("take-off", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, 0.0, 0.0, self._climb_m)
         elif phase is Phase.TAKING_OVER and in_phase_us >= _STREAMS_FIRST_US:
-            self._mode(stack.offboard, in_phase_us)
+            self._mode(stack.offboard)
         elif phase is Phase.HANDING_OVER and ready and self._peer.report.armed:
             last_try = self._asked_hold >= _HOLD_TRIES
             wanted = stack.last_resort if last_try else stack.hold
             name = f"mode {wanted.name}"
             if results.get(name) not in (None, RESULT_ACCEPTED):
                 self._asked_hold += 1
-            self._mode(wanted, in_phase_us)
+            self._mode(wanted)
 
-    def _arm(self, take_off: TakeOff) -> None:
-        stack, results = self._peer.stack, self._peer.results
-        assert stack is not None, "it is connected"
-        if take_off is TakeOff.COMMAND_THEN_ARM:
+    def _arm(self, stack: Stack) -> None:
+        if stack.take_off is TakeOff.COMMAND_THEN_ARM:
             above_sea_m = self._peer.report.altitude_amsl_m + self._climb_m
             if not isfinite(above_sea_m):
                 return
@@ -114,7 +112,7 @@ class Orders:
         else:
             first = f"mode {stack.offboard.name}"
             self._once(first, mav.MAV_CMD_DO_SET_MODE, *stack.offboard.command)
-        if results.get(first) == RESULT_ACCEPTED:
+        if self._peer.results.get(first) == RESULT_ACCEPTED:
             self._once("arming", mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def set_ground(self, ground_enu_m: float) -> None:
@@ -123,13 +121,12 @@ class Orders:
         self._climb_m = max(climb_m, _LEAST_HEIGHT_M)
         self.height_enu_m = ground_enu_m + self._climb_m
 
-    def _mode(self, mode: FlightMode, in_phase_us: int) -> None:
+    def _mode(self, mode: FlightMode) -> None:
         """Request a mode until it is reported."""
         name = f"mode {mode.name}"
         taken = self._peer.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
-        if not taken and in_phase_us >= self._again_us:
-            self._again_us = in_phase_us + _AGAIN_US
-            self._peer.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
+        if not taken:
+            self._repeat(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:
         """Send a command, repeatedly only after a temporary rejection."""
@@ -137,10 +134,13 @@ class Orders:
         if result is None:
             self._peer.ask(name, number, *params)
         elif result == RESULT_TEMPORARILY_REJECTED:
-            if self._in_phase_us >= self._again_us:
-                self._again_us = self._in_phase_us + _AGAIN_US
-                self._peer.ask(name, number, *params)
+            self._repeat(name, number, *params)
         elif result != RESULT_ACCEPTED:
             said = "; ".join(self._peer.report.texts[-2:])
             how = "was not answered" if result == UNANSWERED else f"was refused (result {result})"
             self.refused = f"{name} {how}" + (f": {said}" if said else "")
+
+    def _repeat(self, name: str, number: int, *params: float) -> None:
+        if self._in_phase_us >= self._again_us:
+            self._again_us = self._in_phase_us + _AGAIN_US
+            self._peer.ask(name, number, *params)

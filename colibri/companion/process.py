@@ -170,7 +170,7 @@ def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) 
         if stop or now_s > wait_s:
             raise CompanionError("a mission is flown from the vehicle's home, and it has not said where that is")
         for datagram in wire.receive():
-            seeker.receive(datagram, round(now_s * 1e6))
+            peer.receive(datagram, round(now_s * 1e6))
         wire.send(seeker.poll(round(now_s * 1e6)))
         wire.link.wait(_POLL_S)
     return seeker.home

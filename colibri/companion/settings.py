@@ -24,7 +24,6 @@ class CompanionSettings:
     Attributes:
         takeoff_height_m: Above the ground; `None` for the height of the track's first point.
         gives_up_s: Timeout of connection and checks.
-        thrust_scale: Initial ratio of actual to commanded thrust.
     """
 
     may_arm: bool = False

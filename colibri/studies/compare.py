@@ -1,7 +1,6 @@
 """`colibri compare`: controllers × tracks in one table, on the terminal, as Markdown and as CSV."""
 
 import argparse
-from typing import TYPE_CHECKING
 
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, print_table, write_table
@@ -9,9 +8,6 @@ from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.studies.comparison import fly_comparison
-
-if TYPE_CHECKING:
-    from colibri.experiments.flight import Flight
 
 COLUMNS = (
     *("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "QP p50 (µs)", "QP p99 (µs)"),
@@ -21,11 +17,9 @@ _UNKNOWN = "-"
 
 
 def _solve_time(quantile: str) -> Metric:
-    def of(flight: "Flight") -> float | None:
-        report = flight.report
-        return None if report["solver"] is None else report["solve_time_us"][quantile]
-
-    return Metric(f"solve_time_us.{quantile}", of)
+    return Metric(
+        f"solve_time_us.{quantile}", lambda flight: flight.report["solver"] and flight.report["solve_time_us"][quantile]
+    )
 
 
 _METRICS = (

@@ -41,8 +41,9 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     left = [point for point in points if point.flight not in flown]
     with Journal(args.out, flown, journal.name) as kept:
         _fly(left, common, kept, args)
-    found = {point.flight: _in_folder(flown[point.flight], point.folder, args.out) for point in points}
-    return FlightTable(planned, found)
+    for flight, _, _, folder in points:
+        flown[flight] = flown[flight]._replace(why=flown[flight].why.replace(folder, str(args.out / folder)))
+    return FlightTable(planned, flown)
 
 
 def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:
@@ -73,10 +74,6 @@ def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argpar
     with closing(fly_points(points, common, Pool())) as ended:
         for each in with_bar(ended, "flights", len(points), quiet=args.quiet):
             journal.add(each)
-
-
-def _in_folder(flown: Flown, folder: str, out: Path) -> Flown:
-    return flown._replace(why=flown.why.replace(folder, str(out / folder)))
 
 
 def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flown]:

@@ -80,10 +80,6 @@ def unless_crashed(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
     return lambda flown: "crashed" if flown.crashed else number(of(flown))
 
 
-def decided(fallback: Fallback) -> Callable[[Flown], str]:
-    return lambda flown: str(int(flown.decided_by(fallback).sum()))
-
-
 def bound(column: int) -> Callable[[Flown], str]:
     """Return the percentage of settled control samples with a kind of constraint active."""
 
@@ -217,7 +213,7 @@ STUDIES = (
                 "error < 0.1 m for good (s)",
                 lambda flown: number(flown.stays_below(flown.recording.position_error_m, _THERE_M)),
             ),
-            Measure("samples by recovery", decided(Fallback.RECOVERY)),
+            Measure("samples by recovery", lambda flown: str(int(flown.decided_by(Fallback.RECOVERY).sum()))),
         ),
         tuple(_recovery()),
         study_figures.recovery,

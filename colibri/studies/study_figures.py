@@ -115,8 +115,8 @@ def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
     for number, group in enumerate(dict.fromkeys(result.group for result in results)):
         shown = [result for result in results if result.group == group]
         color, dashes = COLORS[6 if "frozen" in group else 0], ("-", "--")[number // 2]
-        laps_s = [float(result.row[0]) for result in shown]
-        _dotted(axes, laps_s, [result.flown.rms_m for result in shown], group, color, dashes)
+        laps_s, errors_m = [float(result.row[0]) for result in shown], [result.flown.rms_m for result in shown]
+        axes.plot(laps_s, errors_m, marker="o", markersize=5, label=group, **line_style(Style(color, 1.6, dashes)))
     axes.set_yscale("log")
     axes.invert_xaxis()
     _dress(axes, "RMS (m)")
@@ -248,10 +248,6 @@ _FOUR = ("#000000", "#E69F00", "#0072B2", "#009E73")
 def _series(axes: Axes, t: Array, curves: Iterable[tuple[str, Array]]) -> None:
     for number, (label, values) in enumerate(curves):
         axes.plot(t, values, label=label or None, **line_style(Style(_FOUR[(0, 1, 2)[number]], 1.6)))
-
-
-def _dotted(axes: Axes, x: list[float], y: list[float], label: str, color: str, dashes: str = "-") -> None:
-    axes.plot(x, y, marker="o", markersize=5, label=label, **line_style(Style(color, 1.6, dashes)))
 
 
 def _dress(axes: Axes, quantity: str) -> None:

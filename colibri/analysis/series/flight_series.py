@@ -21,7 +21,6 @@ class FlightSeries:
         moment_n_m: Norm of U2, U3 and U4, (n,).
         upright: Cosine of the tilt, (n,).
         touches, aloft: Masks of samples on the ground, and with the reference above it, (n,).
-        constrained: Number of samples with active constraints, by kind.
     """
 
     def __init__(self, samples: int, vehicle: Vehicle) -> None:
@@ -49,11 +48,8 @@ class FlightSeries:
         self.aloft[at] = part["z_ref"] > _ABOVE_GROUND_M
         self._samples = at.stop
         at = slice(self._decisions, self._decisions + len(part.slack))
-        self.solve_time_us[at] = part.solve_time_us
-        self.control_step_us[at] = part.control_step_us
-        self.qp_iterations[at] = part.qp_iterations
-        self.qp_status[at] = part.qp_status
-        self.fallback[at] = part.fallback
+        for name in ("solve_time_us", "control_step_us", "qp_iterations", "qp_status", "fallback"):
+            getattr(self, name)[at] = getattr(part, name)
         self._decisions = at.stop
         active = np.count_nonzero(part.active, axis=0) + self.constrained
         self.constrained = Active(*active.tolist())

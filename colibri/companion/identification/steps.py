@@ -10,7 +10,7 @@ PAUSE_S = 1.2
 
 
 class Doublet(NamedTuple):
-    """A rate added about one axis (0, 1, 2 for p, q, r), then the opposite rate, for `half_s` each."""
+    """A rate added about one axis (0..2), then the opposite rate, for `half_s` each."""
 
     axis: int
     rate_rad_s: float
@@ -33,10 +33,7 @@ def step_at(time_s: float) -> Vector:
             return _NOTHING
         if left_s < 2.0 * doublet.half_s:
             rate = doublet.rate_rad_s if left_s < doublet.half_s else -doublet.rate_rad_s
-            return (
-                rate if doublet.axis == 0 else 0.0,
-                rate if doublet.axis == 1 else 0.0,
-                rate if doublet.axis == 2 else 0.0,
-            )
+            p, q, r = (rate if axis == doublet.axis else 0.0 for axis in range(3))
+            return (p, q, r)
         left_s -= 2.0 * doublet.half_s
     return _NOTHING

@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 from math import sqrt
 
-_LEAST = 0.0
-_MAX = 1.0
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThrustCurve:
@@ -26,12 +23,12 @@ class ThrustCurve:
         """Convert a thrust, in weights, to a command, 0..1."""
         hover = self._signal(self.hover)
         signal = hover * sqrt(max(load, 0.0)) if self.quadratic else hover * max(load, 0.0)
-        x = min(max((signal - self.spin_min) / (self.spin_max - self.spin_min), _LEAST), _MAX)
+        x = min(max((signal - self.spin_min) / (self.spin_max - self.spin_min), 0.0), 1.0)
         return (1.0 - self.expo) * x + self.expo * x * x
 
     def load(self, command: float) -> float:
         """Convert a command, 0..1, to a thrust in weights."""
-        ratio = self._signal(min(max(command, _LEAST), _MAX)) / self._signal(self.hover)
+        ratio = self._signal(min(max(command, 0.0), 1.0)) / self._signal(self.hover)
         return ratio * ratio if self.quadratic else ratio
 
     def _signal(self, command: float) -> float:

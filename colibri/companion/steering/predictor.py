@@ -116,25 +116,22 @@ class Predictor:
         return there
 
     def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
-        part = np.full(model.STATES, self._part(passed_s, 0.0))
-        part[model.RATE] = [self._part(passed_s, late_s) for late_s in self._late_s.tolist()]
+        parts = np.full(model.STATES, self._part(passed_s, 0.0))
+        parts[model.RATE] = [self._part(passed_s, late_s) for late_s in self._late_s.tolist()]
         if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
             measured[model.ATTITUDE] *= -1.0
-        missed = part * (measured - expected)
+        missed = parts * (measured - expected)
         y: Array = expected + missed
         y[model.ATTITUDE] /= np.linalg.norm(y[model.ATTITUDE])
-        self._learn_drift(missed[model.POSITION], passed_s)
+        part = 1.0 - exp(-_DRIFT_1_S * passed_s)
+        drift = self.drift_m_s + part * missed[model.POSITION] / passed_s
+        self.drift_m_s = np.clip(drift, -_MAX_DRIFT_M_S, _MAX_DRIFT_M_S)
         self._learn(y, np.concatenate((missed[model.VELOCITY], self._turn_part * missed[model.RATE])), passed_s)
         return y
 
     def _part(self, passed_s: float, late_s: float) -> float:
         corrected_in_s = self.corrected_in_s + late_s
         return 1.0 - exp(-passed_s / corrected_in_s) if corrected_in_s > 0.0 else 1.0
-
-    def _learn_drift(self, missed_m: Array, passed_s: float) -> None:
-        part = 1.0 - exp(-_DRIFT_1_S * passed_s)
-        drift = self.drift_m_s + part * missed_m / passed_s
-        self.drift_m_s = np.clip(drift, -_MAX_DRIFT_M_S, _MAX_DRIFT_M_S)
 
     def _learn(self, y: Array, missed: Array, passed_s: float) -> None:
         part = 1.0 - exp(-_DISTURBANCE_1_S * passed_s)

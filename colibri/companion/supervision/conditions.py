@@ -1,6 +1,6 @@
 """Gather the conditions of the phase table from one situation."""
 
-from collections.abc import Iterator
+from math import inf
 from typing import NamedTuple
 
 from colibri.companion.stacks.stack import Stack
@@ -37,40 +37,25 @@ class Situation(NamedTuple):
 
 
 def conditions(now: Situation) -> frozenset[Condition]:
-    return frozenset(_holding(now))
-
-
-def _holding(now: Situation) -> Iterator[Condition]:
-    if now.stopped:
-        yield Condition.STOPPED
-    if now.must_end:
-        yield Condition.MUST_END
-    if now.connected:
-        yield Condition.CONNECTED
-    if now.finished:
-        yield Condition.FINISHED
-    if now.in_phase_s > WITHIN_S.get(now.phase, now.gives_up_s) and now.phase is not Phase.FLYING:
-        yield Condition.TOO_LATE
-    if now.stack is None:
-        return
-    yield from _of_the_mode(now, now.stack)
-    if now.armed:
-        yield Condition.ARMED
-    else:
-        yield Condition.DISARMED
-    if now.is_up:
-        yield Condition.UP
-    if now.failing == 0 and now.armed and now.airborne is not False:
-        if now.mode in now.stack.steady or now.mode == now.stack.offboard.custom:
-            yield Condition.CHECKED_IN_AIR
-    elif now.failing == 0 and now.may_arm and now.airborne is not True:
-        yield Condition.CHECKED_TO_ARM
-
-
-def _of_the_mode(now: Situation, stack: Stack) -> Iterator[Condition]:
-    if now.mode == stack.offboard.custom:
-        yield Condition.OFFBOARD
-    if now.held:
-        yield Condition.HELD
-    if now.mode not in now.modes:
-        yield Condition.PILOT
+    within_s = inf if now.phase is Phase.FLYING else WITHIN_S.get(now.phase, now.gives_up_s)
+    found = {
+        Condition.STOPPED: now.stopped,
+        Condition.MUST_END: now.must_end,
+        Condition.CONNECTED: now.connected,
+        Condition.FINISHED: now.finished,
+        Condition.TOO_LATE: now.in_phase_s > within_s,
+    }
+    if now.stack is not None:
+        offboard, checked = now.mode == now.stack.offboard.custom, now.failing == 0
+        flies = now.armed and now.airborne is not False
+        found |= {
+            Condition.OFFBOARD: offboard,
+            Condition.HELD: now.held,
+            Condition.PILOT: now.mode not in now.modes,
+            Condition.ARMED: now.armed,
+            Condition.DISARMED: not now.armed,
+            Condition.UP: now.is_up,
+            Condition.CHECKED_IN_AIR: checked and flies and (offboard or now.mode in now.stack.steady),
+            Condition.CHECKED_TO_ARM: checked and not flies and now.may_arm and now.airborne is not True,
+        }
+    return frozenset(condition for condition, holds in found.items() if holds)

@@ -63,7 +63,6 @@ class FlightFacts(NamedTuple):
     Attributes:
         jumped_m: Jump of the estimate at the newest state.
         pace: Computed part of the last second's setpoints.
-        gap_s: Time since the last setpoint.
     """
 
     state_age_s: float = 0.0

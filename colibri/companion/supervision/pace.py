@@ -26,7 +26,7 @@ class Pace:
         return (now_us - last_us) * 1e-6
 
     def kept(self, now_us: int, interval_us: int) -> float:
-        """Return the computed part of the last second's setpoints, one due an interval; 1 in the first second."""
+        """Return the computed part of the last second's setpoints; 1 in the first second."""
         if now_us - self._began_us < _WINDOW_US:
             return 1.0
         there = sum(1 for at_us in self._sent_us if at_us > now_us - _WINDOW_US)

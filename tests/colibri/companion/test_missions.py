@@ -121,13 +121,14 @@ def test_a_file_that_is_no_mission_is_refused(text: str, tmp_path: Path) -> None
 def test_a_mission_is_flown_from_the_vehicles_home(tmp_path: Path) -> None:
     with Flights(Setting(), None) as flights:
         sitl = flights.begin(airborne=2.5)
-        port, seeker = Port(sitl), HomeSeeker(VehiclePeer())
+        port, peer = Port(sitl), VehiclePeer()
+        seeker = HomeSeeker(peer)
         while seeker.home is None:
             assert sitl.time_s < 10.0
             port.carry(seeker.poll(sitl.time_us + AHEAD_US))
             sitl.step()
             for datagram in port.take():
-                seeker.receive(datagram, sitl.time_us + AHEAD_US)
+                peer.receive(datagram, sitl.time_us + AHEAD_US)
         mission = read_plan(plan(tmp_path, [item(TAKE_OFF), *waypoints()], speed_m_s=4.0))
         given = mission.waypoints(seeker.home)
         assert given.points_enu_m == pytest.approx(np.array(PLACES), abs=0.03)
