@@ -115,8 +115,8 @@ class Companion:
             self._begun, self._since_us, self._next_us = True, now_us, now_us
         if self.ended is not None:
             return []
-        if self.peer.stack is not None and self._thrust is None and self.peer.parameter_values is not None:
-            self._know_stack(self.peer.parameter_values)
+        if self._thrust is None:
+            self._adopt_stack()
         self._advance(now_us)
         frames = []
         if now_us >= self._next_us:
@@ -143,9 +143,10 @@ class Companion:
         if self.phase is Phase.FLYING and past is not None and past.track_enu_m is not None:
             self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
 
-    def _know_stack(self, parameters: dict[str, float]) -> None:
-        stack = self.peer.stack
-        assert stack is not None, "its parameters were read"
+    def _adopt_stack(self) -> None:
+        stack, parameters = self.peer.stack, self.peer.parameter_values
+        if stack is None or parameters is None:
+            return
         self._thrust = stack.thrust(parameters, self._vehicle)
         self._response = self._settings.response or stack.response
         self._pilot.adopt(self._response)
@@ -199,9 +200,7 @@ class Companion:
         )
 
     def _is_up(self) -> bool:
-        if self._newest is None or not self.peer.report.armed:
-            return False
-        if not self._orders.climbed:
+        if self._newest is None or not self.peer.report.armed or not self._orders.climbed:
             return False
         state = self._newest.state
         off_m = abs(state.position_enu_m[2] - self._orders.height_enu_m)
@@ -304,7 +303,7 @@ class Companion:
     # Facts.
 
     def _check_facts(self, now_us: int) -> CheckFacts:
-        peer, report = self.peer, self.peer.report
+        peer = self.peer
         assert peer.stack is not None, "it is connected"
         return CheckFacts(
             stack=peer.stack,
@@ -315,34 +314,26 @@ class Companion:
             state_age_s=self._age_s(now_us),
             state_rate_hz=peer.state_rate_hz(now_us),
             state_delay_s=peer.state_delay_s,
-            mode_rate_hz=report.mode_rate_hz(now_us),
-            estimator_ok=report.estimator_ok,
-            prearm_ok=report.prearm_ok,
-            battery=report.battery,
-            fence_breached=report.fence_breached,
-            armed=report.armed,
+            mode_rate_hz=peer.report.mode_rate_hz(now_us),
+            report=peer.report,
             may_arm=self._settings.may_arm,
             box=self._box,
             limits=self._settings.limits,
         )
 
     def _flight_facts(self, now_us: int) -> FlightFacts:
-        report, newest = self.peer.report, self._newest
-        flies = self.phase is Phase.FLYING
+        newest, flies = self._newest, self.phase is Phase.FLYING
         reference = None
         if newest is not None and flies:
             past = self._history.at(newest.at_us)
             reference = None if past is None else past.position_enu_m
         return FlightFacts(
+            report=self.peer.report,
             state_age_s=self._age_s(now_us),
             position_enu_m=newest.state.position_enu_m if newest else (nan, nan, nan),
             tilt_deg=tilt_deg(newest.state.attitude) if newest else 0.0,
             reference_enu_m=reference,
-            estimator_ok=report.estimator_ok,
             jumped_m=self._jumped_m,
-            battery=report.battery,
-            system_status=report.system_status,
-            fence_breached=report.fence_breached,
             law_error=self._law_error,
             pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
             gap_s=self._pace.gap_s(now_us) if flies else 0.0,

@@ -1,12 +1,13 @@
 """Checks before a companion arms or takes over, each with advice for a failure."""
 
 from collections.abc import Callable, Mapping
-from math import hypot, isfinite
+from math import hypot
 from typing import NamedTuple
 
 from colibri.companion.stacks.stack import Stack
 from colibri.companion.stacks.thrust_curve import Thrust
 from colibri.companion.supervision.limits import Box, FlightLimits
+from colibri.mavlink.client.report import VehicleReport
 
 MIN_STATE_RATE_HZ = 40.0
 MAX_DELAY_S = 0.08
@@ -16,7 +17,7 @@ _MIN_HOVER, _MAX_HOVER = 0.05, 0.8
 
 
 class CheckFacts(NamedTuple):
-    """Facts before a flight; reports of the vehicle are `None`, the battery is nan, while unknown."""
+    """Facts before a flight."""
 
     stack: Stack
     thrust: Thrust | None
@@ -27,11 +28,7 @@ class CheckFacts(NamedTuple):
     state_rate_hz: float
     state_delay_s: float
     mode_rate_hz: float
-    estimator_ok: bool | None
-    prearm_ok: bool | None
-    battery: float
-    fence_breached: bool
-    armed: bool
+    report: VehicleReport
     may_arm: bool
     box: Box
     limits: FlightLimits
@@ -97,22 +94,22 @@ CHECKS: tuple[Check, ...] = (
     ),
     Check(
         "estimator",
-        lambda now: now.estimator_ok is not False,
+        lambda now: now.report.estimator_ok is not False,
         lambda _: "the vehicle does not know where it is: wait for GPS, or look at its estimator",
     ),
     Check(
         "pre-arm",
-        lambda now: now.armed or not now.may_arm or now.prearm_ok is not False,
+        lambda now: now.report.armed or not now.may_arm or now.report.prearm_ok is not False,
         lambda _: "the vehicle says that it cannot be armed: see its messages",
     ),
     Check(
         "battery",
-        lambda now: not isfinite(now.battery) or now.battery >= START_BATTERY,
-        lambda now: f"{100 * now.battery:.0f} % are left, {100 * START_BATTERY:.0f} are needed: charge it",
+        lambda now: not now.report.battery < START_BATTERY,
+        lambda now: f"{100 * now.report.battery:.0f} % are left, {100 * START_BATTERY:.0f} are needed: charge it",
     ),
     Check(
         "fence",
-        lambda now: not now.fence_breached and _inside_fence(now),
+        lambda now: not now.report.fence_breached and _inside_fence(now),
         lambda _: "the track, with its margin, leads beyond the vehicle's fence: choose another, or move the fence",
     ),
 )

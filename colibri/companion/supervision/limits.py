@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import dist, inf
+from math import dist
 from typing import NamedTuple
 
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common.types import Vector
+from colibri.mavlink.client.report import VehicleReport
 
 MAX_STATE_AGE_S = 0.1
 MIN_BATTERY = 0.15
@@ -58,22 +59,19 @@ class FlightLimits:
 
 
 class FlightFacts(NamedTuple):
-    """Facts of a flight; reports of the vehicle are `None`, the battery is nan, while unknown.
+    """Facts of a flight.
 
     Attributes:
         jumped_m: Jump of the estimate at the newest state.
         pace: Computed part of the last second's setpoints.
     """
 
+    report: VehicleReport
     state_age_s: float = 0.0
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     tilt_deg: float = 0.0
     reference_enu_m: Vector | None = None
-    estimator_ok: bool | None = None
     jumped_m: float = 0.0
-    battery: float = inf
-    system_status: int = 0
-    fence_breached: bool = False
     law_error: str = ""
     pace: float = 1.0
     gap_s: float = 0.0
@@ -101,7 +99,7 @@ LIMITS: tuple[Limit, ...] = (
     ),
     Limit(
         "estimate lost",
-        lambda now, _limits, _box: now.estimator_ok is False,
+        lambda now, _limits, _box: now.report.estimator_ok is False,
         lambda _now, _limits: "the vehicle does not know its attitude, velocity or position any more",
         blind=True,
     ),
@@ -152,20 +150,20 @@ LIMITS: tuple[Limit, ...] = (
     ),
     Limit(
         "battery",
-        lambda now, limits, _: now.battery < limits.min_battery,
+        lambda now, limits, _: now.report.battery < limits.min_battery,
         lambda now, limits: (
-            f"{100 * now.battery:.0f} % of the battery are left, less than {100 * limits.min_battery:.0f}"
+            f"{100 * now.report.battery:.0f} % of the battery are left, less than {100 * limits.min_battery:.0f}"
         ),
     ),
     Limit(
         "fence",
-        lambda now, _limits, _box: now.fence_breached,
+        lambda now, _limits, _box: now.report.fence_breached,
         lambda _now, _limits: "the vehicle is beyond its fence",
     ),
     Limit(
         "failsafe",
-        lambda now, _limits, _box: now.system_status in _CRITICAL,
-        lambda now, _limits: f"the vehicle reports an emergency (system status {now.system_status})",
+        lambda now, _limits, _box: now.report.system_status in _CRITICAL,
+        lambda now, _limits: f"the vehicle reports an emergency (system status {now.report.system_status})",
     ),
 )
 

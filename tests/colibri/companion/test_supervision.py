@@ -1,6 +1,8 @@
 """The table of phases, of limits and of checks: each row by itself."""
 
+from dataclasses import replace
 from math import inf, nan
+from typing import Any
 
 import pytest
 
@@ -11,8 +13,10 @@ from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
 from colibri.companion.supervision.limits import LIMITS, Box, FlightFacts, FlightLimits, exceeded
 from colibri.companion.supervision.pace import Pace
 from colibri.companion.supervision.phases import TABLE, Condition, Phase, next_phase
+from colibri.mavlink.client.report import VehicleReport
 
 BOX = Box((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
+QUIET = VehicleReport()
 GOOD = CheckFacts(
     stack=PX4,
     thrust=ThrustCurve(hover=0.4),
@@ -23,15 +27,17 @@ GOOD = CheckFacts(
     state_rate_hz=100.0,
     state_delay_s=0.01,
     mode_rate_hz=25.0,
-    estimator_ok=True,
-    prearm_ok=True,
-    battery=0.8,
-    fence_breached=False,
-    armed=False,
+    report=VehicleReport(estimator_ok=True, prearm_ok=True, battery=0.8),
     may_arm=True,
     box=BOX,
     limits=FlightLimits(),
 )
+
+
+def reporting(**changed: Any) -> CheckFacts:
+    return GOOD._replace(report=replace(GOOD.report, **changed))
+
+
 FAILS: list[tuple[str, CheckFacts]] = [
     ("clock", GOOD._replace(clock_known=False)),
     ("states", GOOD._replace(state_rate_hz=10.0)),
@@ -44,10 +50,10 @@ FAILS: list[tuple[str, CheckFacts]] = [
     ("settings", GOOD._replace(stack=ARDUPILOT, parameters={"GUID_OPTIONS": 4.0})),
     ("hover thrust", GOOD._replace(thrust=ThrustCurve(hover=0.95))),
     ("hover thrust", GOOD._replace(thrust=None)),
-    ("estimator", GOOD._replace(estimator_ok=False)),
-    ("pre-arm", GOOD._replace(prearm_ok=False)),
-    ("battery", GOOD._replace(battery=0.2)),
-    ("fence", GOOD._replace(fence_breached=True)),
+    ("estimator", reporting(estimator_ok=False)),
+    ("pre-arm", reporting(prearm_ok=False)),
+    ("battery", reporting(battery=0.2)),
+    ("fence", reporting(fence_breached=True)),
     ("fence", GOOD._replace(parameters={"GF_MAX_VER_DIST": 4.0})),
     ("fence", GOOD._replace(parameters={"GF_MAX_HOR_DIST": 4.0})),
 ]
@@ -55,7 +61,7 @@ FAILS: list[tuple[str, CheckFacts]] = [
 
 def test_a_vehicle_that_is_ready_passes_every_check() -> None:
     assert failing(GOOD) == failing(GOOD, required=False) == []
-    assert failing(GOOD._replace(battery=nan, estimator_ok=None, prearm_ok=None)) == []
+    assert failing(reporting(battery=nan, estimator_ok=None, prearm_ok=None)) == []
     assert failing(GOOD._replace(stack=ARDUPILOT, parameters={"FENCE_ENABLE": 0.0, "FENCE_RADIUS": 1.0})) == []
 
 
@@ -72,25 +78,25 @@ def test_every_check_was_seen_to_fail() -> None:
 
 
 EXCEEDS = [
-    ("late states", FlightFacts(state_age_s=0.11), ""),
-    ("estimate lost", FlightFacts(estimator_ok=False), ""),
-    ("estimate jumped", FlightFacts(jumped_m=2.0), ""),
-    ("control law", FlightFacts(law_error="it raised"), ""),
-    ("overloaded", FlightFacts(pace=0.79), ""),
-    ("overloaded", FlightFacts(gap_s=0.21), "210 ms ago"),
-    ("box", FlightFacts(position_enu_m=(0.0, 3.1, 0.0)), ""),
-    ("box", FlightFacts(position_enu_m=(nan, 0.0, 0.0)), ""),
-    ("tilt", FlightFacts(tilt_deg=51.0), ""),
-    ("error", FlightFacts(reference_enu_m=(1.6, 0.0, 0.0)), ""),
-    ("battery", FlightFacts(battery=0.1), ""),
-    ("fence", FlightFacts(fence_breached=True), ""),
-    ("failsafe", FlightFacts(system_status=5), ""),
+    ("late states", FlightFacts(QUIET, state_age_s=0.11), ""),
+    ("estimate lost", FlightFacts(VehicleReport(estimator_ok=False)), ""),
+    ("estimate jumped", FlightFacts(QUIET, jumped_m=2.0), ""),
+    ("control law", FlightFacts(QUIET, law_error="it raised"), ""),
+    ("overloaded", FlightFacts(QUIET, pace=0.79), ""),
+    ("overloaded", FlightFacts(QUIET, gap_s=0.21), "210 ms ago"),
+    ("box", FlightFacts(QUIET, position_enu_m=(0.0, 3.1, 0.0)), ""),
+    ("box", FlightFacts(QUIET, position_enu_m=(nan, 0.0, 0.0)), ""),
+    ("tilt", FlightFacts(QUIET, tilt_deg=51.0), ""),
+    ("error", FlightFacts(QUIET, reference_enu_m=(1.6, 0.0, 0.0)), ""),
+    ("battery", FlightFacts(VehicleReport(battery=0.1)), ""),
+    ("fence", FlightFacts(VehicleReport(fence_breached=True)), ""),
+    ("failsafe", FlightFacts(VehicleReport(system_status=5)), ""),
 ]
 
 
 def test_each_limit_is_exceeded_alone_and_says_by_how_much() -> None:
     assert {limit.name for limit in LIMITS} == {name for name, _, _ in EXCEEDS}
-    assert exceeded(FlightFacts(), FlightLimits(), BOX) is None
+    assert exceeded(FlightFacts(QUIET), FlightLimits(), BOX) is None
     for name, facts, words in EXCEEDS:
         limit = exceeded(facts, FlightLimits(), BOX)
         assert limit is not None
