@@ -46,7 +46,7 @@ def read_log(log: Path) -> "ULog":
             return ULog(file)
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error
-    except Exception as error:  # whatever pyulog stumbles over in what is none
+    except Exception as error:  # pyulog raises many kinds for an invalid file
         raise ExportError(f"{log} is no ULog") from error
 
 
@@ -55,7 +55,7 @@ def write_mcap(log: "ULog", path: Path) -> Path:
     with _needed("mcap", "export"):
         from mcap.writer import Writer
     with path.open("wb") as file:
-        writer: Any = Writer(file)  # parts of it have no types
+        writer: Any = Writer(file)  # partly untyped
         writer.start(library="colibri")
         streams = [_messages(topic, _channel(writer, name, name, schema)) for name, topic, schema in _topics(log)]
         streams.append(_texts(log, _channel(writer, "logged_messages", "foxglove.Log", _LOG_SCHEMA)))

@@ -39,7 +39,7 @@ class Style(NamedTuple):
     dashes: str = "-"
 
 
-# Okabe and Ito's colours. What lies lower is wider, so that it shows on both sides of a curve that coincides with it.
+# Okabe and Ito's colours. Lower curves are wider, so that they show beside a coinciding one.
 FLOWN = Style("#000000", 1.1)
 REFERENCE = Style("#56B4E9", 4.5)
 LIMIT = Style("#D55E00", 1.4, "--")

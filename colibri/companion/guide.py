@@ -125,8 +125,6 @@ class Companion:
         self._orders.poll(self.phase, now_us - self._since_us, ready=self._may_hand_over(now_us))
         return self.peer.poll(now_us) + frames
 
-    # What is known.
-
     def _take_in(self, received: ReceivedState) -> None:
         at_us, state = received
         if self._newest is not None and at_us > self._newest.at_us:
@@ -158,8 +156,6 @@ class Companion:
     def _acts_us(self, now_us: int) -> int:
         """Predict the time of effect of a command sent now."""
         return now_us + self.peer.clock.round_trip_us // 2 + round(self._response.latency_s * 1e6)
-
-    # Phases.
 
     def _advance(self, now_us: int) -> None:
         self._look(now_us)
@@ -248,8 +244,6 @@ class Companion:
         slow = dist(self._newest.state.velocity_enu_m_s, (0.0, 0.0, 0.0)) < _SLOW_M_S
         return slow or now_us - self._since_us > _BRAKES_US
 
-    # Setpoints.
-
     def _setpoint(self, now_us: int) -> list[bytes]:
         rehearses = self._settings.dry_run and self.phase is Phase.CHECKING
         blind = self.limit is not None and self.limit.blind
@@ -299,8 +293,6 @@ class Companion:
         p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
         self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
         return asked._replace(rate_flu_rad_s=(p, q, r))
-
-    # Facts.
 
     def _check_facts(self, now_us: int) -> CheckFacts:
         peer = self.peer

@@ -115,7 +115,7 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
             pass
     except DecisionError as error:
         return Flown(recorders[0].steps, str(error), error)
-    except InFlightError:  # the plant's: the vehicle has left what the model describes
+    except InFlightError:  # the vehicle has left the range of the plant's model
         pass
     return Flown(recorders[0].steps, "", None)
 
@@ -138,14 +138,14 @@ def copied(references: Horizon) -> Horizon:
 def pickled_or_none(memory: Any) -> bytes | None:
     try:
         return dumps(memory)
-    except Exception:  # whatever the memory's own `__reduce__` raises: that it cannot be kept is what is found
+    except Exception:  # its own `__reduce__` may raise anything
         return None
 
 
 def own_copy(memory: Any) -> Any:
     try:
         return deepcopy(memory)
-    except Exception:  # whatever its own `__deepcopy__` raises: the check of the pickle says so
+    except Exception:  # its own `__deepcopy__` may raise anything; the check of the pickle reports it
         return memory
 
 

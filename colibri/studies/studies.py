@@ -104,8 +104,8 @@ _BATTERY: dict[str, Settings] = {"with": {}, "without": _NO_BATTERY}
 
 
 def _speed() -> Iterable[Case]:
-    # High up, so that what saturates falls short of its track rather than on the ground; begun on the track and as
-    # fast, so that no start decides. At its middle the lemniscate is straight and fastest, along both axes alike.
+    # Height keeps a saturated vehicle off the ground; the start is on the track at its speed, so that it has no effect.
+    # In its middle the lemniscate is straight and fastest, along both axes alike.
     for lap_s in (9.0, 7.5, 6.0, 5.5, 5.0, 4.5, 4.25, 4.0, 3.75, 3.5, 3.0, 2.5, 2.0):
         along_m_s = _SIZE_M * 2.0 * pi / lap_s
         track = f"lemniscate:lap={lap_s:g},height=20"

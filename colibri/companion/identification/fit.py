@@ -21,7 +21,7 @@ _FIRST_ORDER = np.zeros(1)
 _LEAST_LAG_S = 0.004
 """A shorter lag of the acceleration counts as zero."""
 _CLEARLY_LESS = 0.9
-"""Largest ratio of unexplained variances at which the second order is taken."""
+"""Largest ratio of unexplained variances that justifies the second order."""
 _LEAST_SAMPLES = 200
 MIN_EXPLAINED = 0.5
 

@@ -6,7 +6,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.companion.stacks.stack import Response
 
 _AS_TUNED_S = 0.06
-"""Delay, dead time and lag together, up to which a law needs no change."""
+"""Largest delay, dead time and lag together, of a law as tuned."""
 _MOST = 1.6
 _WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
 """Power of the slowness in each weight: less demand on position, more cost of each change."""
