@@ -50,13 +50,10 @@ def extras() -> Iterator[Finding]:
             continue
         missing = [asked.name for asked in _asked(extra) if _wrong(asked)]
         if missing:
-            yield Finding(f"extra {extra}", Verdict.NOTE, f"without {', '.join(missing)}", _how(extra))
+            advice = f"if you need it: pip install '{PACKAGE}[{extra}]'"
+            yield Finding(f"extra {extra}", Verdict.NOTE, f"without {', '.join(missing)}", advice)
         else:
             yield Finding(f"extra {extra}", Verdict.FINE, "installed")
-
-
-def _how(extra: str) -> str:
-    return f"if you need it: pip install '{PACKAGE}[{extra}]'"
 
 
 def _asked(extra: str = "") -> list[Requirement]:

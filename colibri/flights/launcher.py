@@ -15,14 +15,18 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing import current_process, get_context
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from select import select
-from typing import Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.spec import Starter
 from colibri.common.spec import to_json
 from colibri.plant.spec import PlantSpec
+
+if TYPE_CHECKING:
+    import subprocess
 
 ProcessSpec: TypeAlias = PlantSpec | AutopilotSpec
 
@@ -52,15 +56,16 @@ class Child:
         read, out = os.pipe() if log is None else (None, os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND))
         error = 2 if log is None else out
         try:
-            self._process = Fork(spec, out, error) if self.forked else _Anew(spec, out, error)
+            self._process = _forked(spec, out, error) if self.forked else _started(spec, out, error)
         finally:
             os.close(out)
-        self.number = self._process.number
+        assert self._process.pid is not None, "it was started"
+        self.number = self._process.pid
         self.stdout = None if read is None else os.fdopen(read, "rb", buffering=0)
 
     def code(self) -> int | None:
         """Return the exit code, negative for a signal; `None` while it runs."""
-        return self._process.code()
+        return self._process.exitcode if isinstance(self._process, BaseProcess) else self._process.poll()
 
     def read(self) -> list[dict[str, Any]]:
         """Return the events printed since the last time; wait for the first."""
@@ -73,7 +78,14 @@ class Child:
             os.kill(self.number, signal.SIGTERM)
 
     def wait(self, timeout_s: float | None = None) -> int | None:
-        return self._process.wait(timeout_s)
+        if isinstance(self._process, BaseProcess):
+            self._process.join(timeout_s)
+        else:
+            from subprocess import TimeoutExpired
+
+            with suppress(TimeoutExpired):
+                self._process.wait(timeout_s)
+        return self.code()
 
     def kill(self) -> None:
         if self.code() is None:
@@ -85,49 +97,26 @@ class Child:
             self.stdout.close()
 
 
-class Fork:
-    """A process forked from this one."""
-
-    def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
-        self._process = get_context("fork").Process(target=_fly, args=(spec, stdout, stderr, os.getpid()), daemon=True)
-        self._process.start()
-        assert self._process.pid is not None, "it was started"
-        self.number = self._process.pid
-
-    def code(self) -> int | None:
-        return self._process.exitcode
-
-    def wait(self, timeout_s: float | None = None) -> int | None:
-        self._process.join(timeout_s)
-        return self._process.exitcode
+def _forked(spec: ProcessSpec, stdout: int, stderr: int) -> BaseProcess:
+    process = get_context("fork").Process(target=_fly, args=(spec, stdout, stderr, os.getpid()), daemon=True)
+    process.start()
+    return process
 
 
-class _Anew:
-    """A process started as a command; -P keeps modules of the working directory from shadowing Python's."""
+def _started(spec: ProcessSpec, stdout: int, stderr: int) -> "subprocess.Popen[bytes]":
+    """Start a command; -P keeps modules of the working directory from shadowing Python's."""
+    import subprocess
 
-    def __init__(self, spec: ProcessSpec, stdout: int, stderr: int) -> None:
-        import subprocess
-
-        text = to_json(spec)
-        options = ["--json", "--parent", str(os.getpid()), "--spec"]
-        command = [sys.executable, "-P", "-m", f"colibri.{name_of(spec)}", *options]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=stdout, stderr=stderr if stderr != 2 else None, process_group=0
-        )
-        assert self._process.stdin is not None, "it is piped"
-        with suppress(BrokenPipeError), self._process.stdin as stdin:
-            stdin.write(text)
-        self.number = self._process.pid
-
-    def code(self) -> int | None:
-        return self._process.poll()
-
-    def wait(self, timeout_s: float | None = None) -> int | None:
-        from subprocess import TimeoutExpired
-
-        with suppress(TimeoutExpired):
-            return self._process.wait(timeout_s)
-        return None
+    text = to_json(spec)
+    options = ["--json", "--parent", str(os.getpid()), "--spec"]
+    command = [sys.executable, "-P", "-m", f"colibri.{name_of(spec)}", *options]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=stdout, stderr=stderr if stderr != 2 else None, process_group=0
+    )
+    assert process.stdin is not None, "it is piped"
+    with suppress(BrokenPipeError), process.stdin as stdin:
+        stdin.write(text)
+    return process
 
 
 def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:

@@ -1,6 +1,7 @@
 """`colibri verify`: fly each case three times and replay it; compare all bits."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,14 +73,11 @@ def verify(args: argparse.Namespace) -> int:
 
 def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
     folder: Path = args.out / case.name
-    first, second = (_flown(case, folder / again, args.link, args.duration) for again in ("first", "second"))
-    third = _flown(case, folder / "memory", "memory", args.duration)
+    fly = partial(case.fly, duration=args.duration, seed=SEED)
+    first, second = (fly(folder / again, args.link) for again in ("first", "second"))
+    third = fly(folder / "memory", "memory")
     replayed = replay_flight(folder / "first")
     return Verdict(case.name, (first, second, third), replayed.commands, replayed.difference is None)
-
-
-def _flown(case: Case, out: Path, link: str, duration_s: float) -> str:
-    return case.fly(out, link, duration=duration_s, seed=SEED)
 
 
 def _print(verdicts: list[Verdict], args: argparse.Namespace) -> None:

@@ -25,7 +25,8 @@ def fly(args: Namespace) -> int:
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}
         options = {name: said[name] for name in (*OF_ALL, *keywords_of(FlightSpec)) if name in said}
-        given = tables | {"fly": options, "grid": _grid(args), "draw": _once(_draw, args.draws)}
+        grid = ({"track": args.tracks} if args.tracks else {}) | _once(_setting, args.settings)
+        given = tables | {"fly": options, "grid": grid, "draw": _once(_draw, args.draws)}
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
         engine = engine_of(args.workers, args.dask)
         with closing(_Bar(planned.name, planned.flights, quiet=args.quiet)) as bar:
@@ -38,11 +39,6 @@ def fly(args: Namespace) -> int:
     if not args.quiet:
         _print(results, args)
     return EXIT_FAILED if results.verdicts[Verdict.REFUSED] == len(results.flown) else 0
-
-
-def _grid(args: Namespace) -> dict[str, Any]:
-    tracks = {"track": args.tracks} if args.tracks else {}
-    return tracks | _once(_setting, args.settings)
 
 
 def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[str, Any]:

@@ -28,7 +28,9 @@ def main() -> None:
     for line in sys.stdin:
         what, first, *rest = json.loads(line)
         if what == "start":
-            child = _fork(first, *rest)
+            kind: type[PlantSpec | AutopilotSpec] = PlantSpec if first == "plant" else AutopilotSpec
+            log, text = rest
+            child = Child(from_json(kind, text.encode()), fork=True, log=Path(log))
             children[child.number] = child
             answer: int | None = child.number
         else:
@@ -54,11 +56,6 @@ def _load() -> None:
             lockstep = LockstepSession(MemoryPlant(setting.plant_spec()), autopilot, setting.system)
             lockstep.advance(())
             autopilot.close()
-
-
-def _fork(package: str, log: str, text: str) -> Child:
-    kind: type[PlantSpec | AutopilotSpec] = PlantSpec if package == "plant" else AutopilotSpec
-    return Child(from_json(kind, text.encode()), fork=True, log=Path(log))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """`colibri verify`: the same flights twice, and what is not the same."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,13 +24,13 @@ def test_what_is_not_the_same_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verify, "CASES", verify.CASES[1:2])
-    flown = verify._flown  # noqa: SLF001
+    fly = Case.fly
     seeds = iter((1, 2, 3))
 
-    def another_each_time(case: Case, out: Path, link: str, duration_s: float) -> str:
-        return f"{next(seeds)}{flown(case, out, link, duration_s)}"
+    def another_each_time(case: Case, out: Path, link: str, **more: Any) -> str:
+        return f"{next(seeds)}{fly(case, out, link, **more)}"
 
-    monkeypatch.setattr(verify, "_flown", another_each_time)
+    monkeypatch.setattr(Case, "fly", another_each_time)
     with pytest.raises(SystemExit) as end:
         main(["verify", "--link", "memory", "--duration", "1", "--out", str(tmp_path)])
     assert end.value.code == 1
