@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+from colibri.analysis.tables import markdown, print_table
 from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.conformance.flight_checks import flight_checks, time_checks
@@ -61,8 +62,6 @@ class Conformance:
         return "".join(f"FAILED  {row.area}: {row.tried}: {row.found}\n   see  {row.see}\n" for row in self.failed)
 
     def __str__(self) -> str:
-        from colibri.analysis.tables import markdown
-
         return markdown(HEADINGS, [_cells(row) for row in self.rows], names=len(HEADINGS)) + self.failures
 
     def _repr_html_(self) -> str:
@@ -111,8 +110,6 @@ def check_controller(
 
 def check_by_command(args: argparse.Namespace) -> int:
     from rich.console import Console
-
-    from colibri.analysis.tables import print_table
 
     console = Console(stderr=True)
     try:

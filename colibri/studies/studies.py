@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 from matplotlib.figure import Figure
+from rich.console import Console
 
 from colibri.analysis.figures import write_figure
 from colibri.analysis.tables import Row, write_table
@@ -242,7 +243,7 @@ def study(args: argparse.Namespace) -> int:
     for one in wanted:
         written = write(one, [flown[flights.index(case.flight)] for case in one.cases], args.out)
         if not args.quiet:
-            _print(one, written)
+            Console().print(f"{one.name}: {', '.join(path.name for path in written)} in {written[0].parent}")
     return 0
 
 
@@ -280,9 +281,3 @@ def _wanted(names: Sequence[str]) -> list[Study]:
         if name not in known:
             fail(f"there is no study {name}: choose {', '.join(known)}")
     return [study for study in STUDIES if not names or study.name in names]
-
-
-def _print(study: Study, written: Sequence[Path]) -> None:
-    from rich.console import Console
-
-    Console().print(f"{study.name}: {', '.join(path.name for path in written)} in {written[0].parent}")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
+from rich.console import Console
 
 from colibri.analysis.figures import (
     ANGLES,
@@ -83,8 +84,6 @@ def figures(args: argparse.Namespace) -> int:
     ]
     written = in_order(draw, jobs, "flights", quiet=args.quiet)
     if not args.quiet:
-        from rich.console import Console
-
         Console().print(f"{sum(map(len, written))} files in {args.out}")
     return 0
 

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from colibri.companion.identification.fit import Fit
 
 _AXES = ("p", "q", "r")
 
 
 def draw(fit: Fit, path: Path) -> None:
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     t = fit.grid_s - fit.grid_s[0]
     for axis, (name, plot) in enumerate(zip(_AXES, figure.subplots(3, 1, sharex=True), strict=True)):

@@ -6,6 +6,8 @@ The simulated rates follow the commands alone, so feedback of the law does not b
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.signal import lfilter
 
 from colibri.common.types import Array
 from colibri.companion.errors import CompanionError
@@ -107,8 +109,6 @@ def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[floa
 def _refined(
     commands: Array, measured: Array, axis: int, late: int, near_s: tuple[float, float]
 ) -> tuple[tuple[float, float], float]:
-    from scipy.optimize import minimize
-
     compared = measured[_LATENCIES:, axis]
     is_second = near_s[1] > 0.0
 
@@ -130,8 +130,6 @@ def _late(rates: Array, late: int) -> Array:
 
 
 def _lagged(commands: Array, lag_s: float, behind_s: float) -> Array:
-    from scipy.signal import lfilter
-
     if behind_s == 0.0:
         stays = float(np.exp(-_GRID_S / lag_s))
         b, a = np.array([0.0, 1.0 - stays]), np.array([1.0, -stays])
