@@ -1,7 +1,6 @@
 """A relay that hides each good datagram in a burst of bad ones from the same address."""
 
 import random
-import socket
 from collections.abc import Mapping
 
 from colibri.mavlink.wire.dialect import Codec
@@ -12,8 +11,6 @@ from tools.harness.relay import Relay
 UNREADABLE = ("malformed", "unknown", "truncated")
 """Counts of a codec that depend on the datagram alone."""
 
-_RECEIVE_BUFFER = 2**20
-
 
 class FuzzingRelay(Relay):
     """A relay with an attacker in it.
@@ -23,8 +20,6 @@ class FuzzingRelay(Relay):
 
     def __init__(self, plant_url: str, *, burst: int, quota: int, seed: int) -> None:
         super().__init__(plant_url)
-        for sock in (self._near, self._far):
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._chance = random.Random(seed)
         self._fuzzers = {
             "plant": Fuzzer(self._chance, AUTOPILOT, PLANT),

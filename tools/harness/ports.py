@@ -10,6 +10,14 @@ _LOOK_EVERY_S = 0.05
 _BUFFER_BYTES = 4_000_000
 
 
+def bound_socket() -> tuple[socket.socket, str]:
+    """Return a socket on a free port, and the URL by which others call it."""
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+    bound.bind(("127.0.0.1", 0))
+    return bound, f"udpout:127.0.0.1:{bound.getsockname()[1]}"
+
+
 class Talker(Protocol):
     """Answers datagrams of the vehicle."""
 
@@ -22,10 +30,7 @@ class OnPort:
     def __init__(self, talker: Talker) -> None:
         self.sender: tuple[str, int] | None = None
         self._talker = talker
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
-        self._socket.bind(("127.0.0.1", 0))
-        self.url = f"udpout:127.0.0.1:{self._socket.getsockname()[1]}"
+        self._socket, self.url = bound_socket()
         self._ended = Event()
         self._thread = Thread(target=self._run, daemon=True)
 

@@ -1,12 +1,13 @@
 """A UDP relay between autopilot and plant, which damages the traffic."""
 
 import random
-import socket
 from abc import ABC, abstractmethod
 from select import select
 from threading import Event, Thread
 from types import TracebackType
 from typing import Self
+
+from tools.harness.ports import bound_socket
 
 LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
 """Parts of the datagrams on a `BadLink`."""
@@ -18,11 +19,11 @@ class Relay(ABC):
     def __init__(self, plant_url: str) -> None:
         _, host, port = plant_url.split(":")
         self._plant = (host, int(port))
-        self._near, self._far = _bound_socket(), _bound_socket()
+        self._near, self.url = bound_socket()
+        self._far, _ = bound_socket()
         self._autopilot: tuple[str, int] | None = None
         self._ended = Event()
         self._thread = Thread(target=self._run, daemon=True)
-        self.url = f"udpout:127.0.0.1:{self._near.getsockname()[1]}"
 
     @abstractmethod
     def pass_on(self, to: str, datagram: bytes) -> None:
@@ -81,9 +82,3 @@ class BadLink(Relay):
                 self.deliver(to, datagram)
             if to in self._held:
                 self.deliver(to, self._held.pop(to))
-
-
-def _bound_socket() -> socket.socket:
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.bind(("127.0.0.1", 0))
-    return sock

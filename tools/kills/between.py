@@ -8,11 +8,11 @@ from select import select
 from time import monotonic
 
 from colibri.mavlink.wire import dialect
+from tools.harness.ports import bound_socket
 from tools.kills.station import Station
 
 GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
 """By the clock: bounds for what hangs, never a part of a verdict; the first autopilot may have to compile."""
-ADDRESS = ("127.0.0.1", 0)
 _MAX_DATAGRAM_BYTES = 65536
 _LOOK_S = 0.02
 _HEAD = 10
@@ -80,8 +80,10 @@ class Between:
         self._far.close()
 
     def _open(self) -> None:
-        self._near, self._far = _bound(), _bound()
-        self.url = f"udpout:127.0.0.1:{self._near.getsockname()[1]}"
+        self._near, self.url = bound_socket()
+        self._far, _ = bound_socket()
+        for sock in (self._near, self._far):
+            sock.setblocking(False)
         self._autopilot: tuple[str, int] | None = None
 
     def _pass_on(self, sock: socket.socket) -> None:
@@ -136,10 +138,3 @@ class Between:
 
 def _number(datagram: bytes) -> int:
     return int.from_bytes(datagram[7:_HEAD], "little")
-
-
-def _bound() -> socket.socket:
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.bind(ADDRESS)
-    sock.setblocking(False)
-    return sock

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colibri.mavlink.hil.feedback import Feedback
-from tools.harness.processes import Process
 from tools.kills.autopilots import start, start_plant
 from tools.kills.between import COMPILES_S, Between, Phase
 from tools.kills.station import Station, mission
@@ -32,9 +31,32 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
         _, host, port = url.split(":")
         between = Between((host, int(port)))
         autopilot = start(folder, between.url, station, feedback)
-        processes.append(autopilot)
-        flights = _Flights(folder, url, autopilot, between, station, processes, chance)
-        done = [flights.kill(seed) for _ in range(kills)]
+        processes.insert(0, autopilot)
+
+        def kill() -> Kill:
+            """Kill the plant; start another at once, or after the autopilot's report."""
+            plant = processes[-1]
+            between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
+            phase = chance.choice(list(Phase))
+            due_us = between.time_us + round(1e6 * chance.uniform(0.0, _MAX_DELAY_S))
+            between.at(due_us, phase, plant.process.kill)
+            between.fly_until(station, lambda: not between.waits, "the instant of the kill")
+            plant.process.wait()
+            died_us, silences = between.time_us, len(autopilot.events("silence"))
+            if chance.random() < 0.5:
+                between.fly_until(
+                    station, lambda: len(autopilot.events("silence")) > silences, "the words that the plant is gone"
+                )
+            said = [event["text"] for event in autopilot.events("silence")[silences:]]
+            station.begin_anew()
+            station.drain()
+            processes.append(start_plant(folder, url, seed))
+            between.fly_until(
+                station, lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight"
+            )
+            return Kill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False)
+
+        done = [kill() for _ in range(kills)]
         between.fly_until(station, lambda: station.armed is True, "the last plant's vehicle to be armed")
         between.close()
     finally:
@@ -42,45 +64,3 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
             process.kill()
         station.close()
     return done, "".join(process.errors() for process in processes)
-
-
-class _Flights:
-    def __init__(
-        self,
-        folder: Path,
-        url: str,
-        autopilot: Process,
-        between: Between,
-        station: Station,
-        processes: list[Process],
-        chance: random.Random,
-    ) -> None:
-        self._folder, self._url = folder, url
-        self._autopilot, self._between, self._station = autopilot, between, station
-        self._processes = processes
-        self._plant = processes[0]
-        self._chance = chance
-
-    def kill(self, seed: int) -> Kill:
-        """Kill the plant; start another at once, or after the autopilot's report."""
-        between, station, chance = self._between, self._station, self._chance
-        between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
-        phase = chance.choice(list(Phase))
-        due_us = between.time_us + round(1e6 * chance.uniform(0.0, _MAX_DELAY_S))
-        between.at(due_us, phase, self._plant.process.kill)
-        between.fly_until(station, lambda: not between.waits, "the instant of the kill")
-        self._plant.process.wait()
-        died_us, silences = between.time_us, len(self._autopilot.events("silence"))
-        if chance.random() < 0.5:
-            between.fly_until(
-                station, lambda: len(self._autopilot.events("silence")) > silences, "the words that the plant is gone"
-            )
-        said = [event["text"] for event in self._autopilot.events("silence")[silences:]]
-        station.begin_anew()
-        station.drain()
-        self._plant = start_plant(self._folder, self._url, seed)
-        self._processes.append(self._plant)
-        between.fly_until(
-            station, lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight"
-        )
-        return Kill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False)

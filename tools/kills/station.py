@@ -1,6 +1,5 @@
 """A ground station that has a mission flown, whatever restarts."""
 
-import socket
 from collections.abc import Sequence
 from math import nan
 from time import monotonic
@@ -15,6 +14,7 @@ from colibri.mavlink.client.plans import Upload
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Message, mav
 from colibri.sitl.mission_items import Item
+from tools.harness.ports import bound_socket
 
 _VEHICLE = (1, AUTOPILOT_COMPONENT)
 _MAX_DATAGRAM_BYTES = 65536
@@ -42,11 +42,8 @@ class Station:
     """A ground station on a port of this computer."""
 
     def __init__(self, items: Sequence[MissionItem]) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
-        self.socket.bind(("127.0.0.1", 0))
+        self.socket, self.url = bound_socket()
         self.socket.setblocking(False)
-        self.url = f"udpout:127.0.0.1:{self.socket.getsockname()[1]}"
         self._items = items
         self.begin_anew()
 
