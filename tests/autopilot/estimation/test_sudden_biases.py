@@ -41,8 +41,8 @@ def told(lie: GpsLie) -> Change:
 @pytest.mark.parametrize(
     "bias",
     [
-        *((0.0, 0.0, 2.0), (0.8, -0.6, 0.9), (-6.0, 0.0, 0.0)),
-        *(pytest.param(bias, marks=LONG) for bias in ((0.0, 0.0, -2.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0))),
+        *((0.0, 0.0, 2.0), (0.8, -0.6, 0.9), (-6.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        *(pytest.param(bias, marks=LONG) for bias in ((0.0, 0.0, -2.0), (0.0, -1.0, 0.0))),
     ],
 )
 def test_a_sudden_accelerometer_bias_is_found_in_time(path: source.Path, bias: Vector) -> None:
@@ -51,6 +51,7 @@ def test_a_sudden_accelerometer_bias_is_found_in_time(path: source.Path, bias: V
     last = known(of)[-1]
     learning = [one for one in known(of) if not one.health.accel_bias]
     assert (learning[0].frame.time_us * 1e-6 - BEGAN_S) < 1.2
+    assert all(one.health.gyro_bias for one in known(of))
     assert last.resets == 1
     assert last.health.accel_bias
     assert np.allclose(last.accel_bias_m_s2, flight.accel_bias[-1] + bias, atol=0.25)
@@ -104,15 +105,6 @@ def test_a_late_receiver_is_no_accelerometer_bias(late_s: float) -> None:
 
     of = known(estimates(flight.frames, late))
     assert of[-1].health.gps_glitch
-    assert all(one.health.accel_bias for one in of)
-
-
-def test_a_gyroscope_that_errs_is_no_accelerometer_bias() -> None:
-    def turning(frame: SensorFrame, _: float) -> SensorFrame:
-        return frame._replace(rate_flu_rad_s=plus(frame.rate_flu_rad_s, (0.0, 0.06, 0.0)))
-
-    of = known(estimates(recorded(source.hover, 6, 22.0).frames, fails(turning)))
-    assert any(one.health.gps_glitch for one in of)
     assert all(one.health.accel_bias for one in of)
 
 
@@ -186,17 +178,4 @@ def test_a_gyroscope_drift_is_followed() -> None:
 def test_a_field_beside_the_magnetometer_is_no_gyroscope_bias(path: source.Path, change: Change) -> None:
     of = known(estimates(recorded(path, 5, 25.0).frames, change))
     assert any(Source.MAGNETOMETER in one.health.not_accepted for one in of)
-    assert all(one.health.gyro_bias for one in of)
-
-
-@pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize(
-    "bias",
-    [
-        *((0.0, 0.0, 2.0), (1.0, 0.0, 0.0)),
-        *(pytest.param(bias, marks=LONG) for bias in ((0.0, -0.5, 0.0), (0.2, 0.2, 0.0))),
-    ],
-)
-def test_an_accelerometer_that_errs_is_no_gyroscope_bias(path: source.Path, bias: Vector) -> None:
-    of = known(estimates(recorded(path, 3, 22.5).frames, felt(bias)))
     assert all(one.health.gyro_bias for one in of)

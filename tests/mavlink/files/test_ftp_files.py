@@ -103,15 +103,6 @@ def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory
     assert client.poll() == []
 
 
-def test_a_growing_file_keeps_its_size_while_open(client: Client, memory: Memory) -> None:
-    client.do(Opcode.OPEN_TO_READ, b"text")
-    memory.write(("text",), len(TEXT), b"more")
-    assert b"".join(reply.data for reply in client.burst()) == TEXT
-    client.do(Opcode.TERMINATE)
-    client.do(Opcode.OPEN_TO_READ, b"text")
-    assert b"".join(reply.data for reply in client.burst()) == TEXT + b"more"
-
-
 def test_a_file_is_written(client: Client, memory: Memory) -> None:
     assert client.do(Opcode.CREATE, b"new") == b""
     second = client.ask(Opcode.WRITE, b"world", offset=6)
@@ -124,11 +115,6 @@ def test_a_file_is_written(client: Client, memory: Memory) -> None:
     assert memory.open(("new",)).read(0, 100) == b"Hello world"  # type: ignore[union-attr]
     client.do(Opcode.CREATE, b"new")
     assert memory.open(("new",)).size == 0  # type: ignore[union-attr]
-
-
-def test_opening_to_write_makes_a_file(client: Client) -> None:
-    client.do(Opcode.OPEN_TO_WRITE, b"made")
-    assert b"Fmade\t0" in client.listed(b"/")
 
 
 def test_what_is_open_to_read_is_not_written_and_the_reverse(client: Client) -> None:
@@ -179,6 +165,10 @@ def test_refusals(client: Client, opcode: int, data: bytes, offset: int, error: 
 
 
 def test_changes(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_WRITE, b"made")
+    assert b"Fmade\t0" in client.listed(b"/")
+    client.do(Opcode.TERMINATE)
+    client.do(Opcode.REMOVE, b"made")
     client.do(Opcode.MAKE_FOLDER, b"d")
     client.do(Opcode.RENAME, b"text\0d/renamed\0")
     assert client.ask(Opcode.REMOVE_FOLDER, b"d").data == bytes((Error.FAIL_ERRNO, 39))  # ENOTEMPTY
@@ -196,10 +186,6 @@ def test_a_size_that_no_payload_has_is_refused(client: Client, opcode: int) -> N
 
 def test_an_answer_is_not_answered(client: Client) -> None:
     assert client.send(Opcode.ACK) == client.send(Opcode.NAK, bytes([Error.UNKNOWN_COMMAND])) == []
-
-
-def test_none_is_acknowledged(client: Client) -> None:
-    assert client.do(Opcode.NONE) == b""
 
 
 def test_a_long_folder_is_listed_in_parts(client: Client, memory: Memory) -> None:

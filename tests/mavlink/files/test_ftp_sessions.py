@@ -52,16 +52,6 @@ def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Mem
     assert memory.open(("new",)).size == 5  # type: ignore[union-attr]
 
 
-def test_a_new_client_reusing_sequence_numbers_is_served(client: Client) -> None:
-    for _ in range(2):
-        client.sequence = 0
-        client.do(Opcode.CREATE, b"new")
-        client.do(Opcode.WRITE, b"hello")
-        client.do(Opcode.TERMINATE)
-        client.do(Opcode.REMOVE, b"new")
-        client.do(Opcode.RESET)
-
-
 def test_memory_is_bounded(service: Ftp) -> None:
     for number in range(1500):
         client = Client(service, Peer(number, number % 256, 1), number % 256)

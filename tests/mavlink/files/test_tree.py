@@ -73,53 +73,6 @@ def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_p
     again.close()
 
 
-class Model:
-    def __init__(self) -> None:
-        self.files: dict[str, bytes] = {}
-
-    def create(self, name: str) -> None:
-        self.files[name] = b""
-
-    def write(self, name: str, offset: int, data: bytes) -> None:
-        if name in self.files and data:
-            old = self.files[name].ljust(offset, b"\0")
-            self.files[name] = old[:offset] + data + old[offset + len(data) :]
-
-    def truncate(self, name: str, size: int) -> None:
-        if name in self.files:
-            self.files[name] = self.files[name][:size]
-
-    def remove(self, name: str) -> None:
-        self.files.pop(name, None)
-
-    def rename(self, old: str, new: str) -> None:
-        if old in self.files and new not in self.files:
-            self.files[new] = self.files.pop(old)
-
-
-FLAT = st.sampled_from("abc")
-
-
-@given(
-    st.lists(
-        st.one_of(
-            st.tuples(st.sampled_from(["create", "remove"]), FLAT),
-            st.tuples(st.just("write"), FLAT, OFFSETS, DATA),
-            st.tuples(st.just("truncate"), FLAT, OFFSETS),
-            st.tuples(st.just("rename"), FLAT, FLAT),
-        )
-    )
-)
-def test_files_hold_what_was_written(operations: list[tuple[object, ...]]) -> None:
-    memory, model = Memory(), Model()
-    tree = Tree(memory, {}, {})
-    for name, *arguments in operations:
-        getattr(model, str(name))(*arguments)
-        getattr(tree, str(name))(*[(item,) if isinstance(item, str) else item for item in arguments])
-        assert tree.list(()) == [Entry(file, False, len(data)) for file, data in sorted(model.files.items())]
-        assert all(content(tree, (file,)) == data for file, data in model.files.items())
-
-
 @pytest.mark.parametrize("make", [lambda path: Folder(path, QUOTA), lambda _: Memory(QUOTA)], ids=["folder", "memory"])
 def test_quota(make: object, tmp_path: Path) -> None:
     files: Files = make(tmp_path / "q")  # type: ignore[operator]

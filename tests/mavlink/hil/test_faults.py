@@ -13,7 +13,6 @@ from colibri.mavlink.hil.faults import (
     GYROSCOPE,
     MOTOR,
     OFF,
-    OK,
     ROWS,
     SLOW,
     TABLE,
@@ -21,18 +20,13 @@ from colibri.mavlink.hil.faults import (
     Fault,
     Part,
     Row,
-    decode_fault,
-    encode_fault,
     fault_from,
     judged,
 )
 from colibri.mavlink.hil.plant_status import (
-    FaultResult,
     PlantBattery,
     decode_battery,
-    decode_result,
     encode_battery,
-    encode_results,
 )
 from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
 from colibri.mavlink.wire.refusal import Refusal
@@ -95,21 +89,6 @@ def test_any_numbers_are_a_fault_within_limits_or_none(
         for value, it in zip(fault.values, TABLE[fault.unit, fault.kind].values, strict=False):
             assert it.minimum <= value * (1.0 - 1e-6) or it.minimum <= value * (1.0 + 1e-6) or value == it.rest
             assert abs(value) <= 1.0001 * max(abs(it.minimum), abs(it.maximum))
-
-
-@given(st.floats(0.0625, 1.0, width=32), st.integers(0, 4))
-def test_a_fault_goes_over_the_wire(part: float, instance: int) -> None:
-    codec = Codec(1, 1)
-    fault = Fault(MOTOR, WRONG, instance, (part, 0.0, 0.0, 0.0))
-    (message,) = codec.decode(encode_fault(codec, fault, (1, 2)))
-    assert decode_fault(message.fields) == fault
-
-
-def test_results_go_over_the_wire() -> None:
-    codec = Codec(1, 2)
-    results = (FaultResult(MOTOR, OFF, 0), FaultResult(GPS, OK, 3))
-    frames = b"".join(encode_results(codec, results, (1, 1)))
-    assert tuple(map(decode_result, codec.decode(frames))) == results
 
 
 @pytest.mark.parametrize("battery", [PlantBattery(16.8, 0.0, 0.0, 1.0), PlantBattery(9.61, 21.34, 1.234, 0.25)])

@@ -13,16 +13,16 @@ from colibri.mavlink.wire.dialect import Codec
 from tests.support.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, call, command_at, frame_at, offered
 
 BATTERY = PlantBattery(15.5, 12.25, 0.5, 0.75)
-LOST = Fault(MOTOR, OFF, 1)
+WEAK = Fault(MOTOR, WRONG, 1, (0.5, 0.0, 0.0, 0.0))
 
 
 def test_a_fault_comes_with_the_answer_and_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     autopilot.receive(offered(plant, frame_at(0)), 0.0)
-    autopilot.answer(command_at(0), [LOST])
+    autopilot.answer(command_at(0), [WEAK])
     (answer,) = autopilot.take_outbox()
     assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
-    assert plant.take_faults() == [LOST]
+    assert plant.take_faults() == [WEAK]
     assert plant.receive(answer, ADDRESS, 0.0) is None
     assert plant.take_faults() == []
 
@@ -31,7 +31,7 @@ def test_a_fault_without_an_answer_is_dropped(plant: PlantEnd, autopilot: Autopi
     call(autopilot, plant)
     offered(plant, frame_at(0))
     codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
-    plant.receive(encode_fault(codec, LOST, (1, dialect.PLANT_COMPONENT)), ADDRESS, 0.0)
+    plant.receive(encode_fault(codec, WEAK, (1, dialect.PLANT_COMPONENT)), ADDRESS, 0.0)
     assert plant.take_faults() == []
     assert plant.dropped["repeated"] == 1
 

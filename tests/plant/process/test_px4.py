@@ -20,7 +20,6 @@ from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.tlog import decode
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world, state_frame
-from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.px4 import Px4, serve
 from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, topic_rows, wait_for
@@ -172,20 +171,6 @@ def test_nothing_that_comes_breaks_it(datagrams: list[bytes]) -> None:
     for datagram in datagrams:
         end.receive(datagram, PX4)
     assert end.motors == STOPPED
-
-
-@pytest.mark.parametrize("name", ["jmavsim", "iris"])
-def test_the_vehicles_of_px4_stand_and_have_thrust_to_spare(name: str) -> None:
-    vehicle = load_vehicle(name)
-    physics, world = Physics(vehicle, "rk4"), starting_world(Start(), vehicle)
-    for _ in range(250):
-        world = physics.step(world, ActuatorCommand(0, (0.0,) * 4, armed=False), FRAME_US)
-    assert world.state[8] == pytest.approx(0.0, abs=1e-4)
-    assert np.abs(world.state[:6]).max() < 1e-6
-    assert vehicle.max_wrench()[0] > 1.8 * vehicle.body.mass_kg * vehicle.gravity_m_s2
-    assert vehicle.sensors is not None
-    suite = SensorSuite(vehicle.sensors, physics, DEFAULT_ORIGIN, seed=1, interval_us=FRAME_US)
-    assert suite.measure(world).specific_force_flu_m_s2[2] == pytest.approx(9.81, abs=1.0)
 
 
 @contextmanager

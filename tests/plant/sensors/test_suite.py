@@ -257,15 +257,6 @@ def test_a_frame_asked_for_again_is_the_same_frame() -> None:
         assert frame == once.measure(world)
 
 
-@pytest.mark.parametrize("sensor", ["magnetometer", "barometer", "gps"])
-def test_no_sensors_rate_changes_another_ones_errors(sensor: str) -> None:
-    one = watch(standing(), suite(), 1.0)
-    other = watch(standing(), suite(parts(**{sensor: {"rate_hz": 3.0}})), 1.0)
-    names = {"magnetometer": "magnetic_field_flu_gauss", "barometer": "pressure_pa", "gps": "gps"}
-    for kept in {*names.values(), "specific_force_flu_m_s2", "rate_flu_rad_s"} - {names[sensor]}:
-        assert [getattr(frame, kept) for frame in one] == [getattr(frame, kept) for frame in other]
-
-
 def test_the_rtk_vehicle_differs_by_its_receiver_alone() -> None:
     rtk = load_vehicle("hummingbird-rtk")
     assert rtk.sensors is not None

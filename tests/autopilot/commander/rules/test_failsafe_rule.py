@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS, failsafe_parameters, limits, settings
+from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS, limits, settings
 from colibri.autopilot.commander.rules.failsafe_rule import CLEAR_AFTER_US, Flight, Memory, Setting, Verdict, following
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, Row
 from colibri.autopilot.commander.rules.modes import Mode
@@ -46,13 +46,6 @@ def test_every_condition_has_one_row_with_a_valid_default() -> None:
         rows = [row for row in TABLE if row.parameter == parameter]
         assert len({tuple(number for number, _ in row.choices) for row in rows}) == 1
         assert len({row.default for row in rows}) == 1
-
-
-def test_the_table_and_the_parameters_match() -> None:
-    known = {parameter.name for parameter in definitions(load_profile("flight"), load_vehicle("hummingbird"))}
-    in_table = {name for row in TABLE for name in (*row.limits, row.delay, row.parameter) if name}
-    assert in_table <= known
-    assert {parameter.name for parameter in failsafe_parameters()} <= in_table
 
 
 def test_parameters_make_the_settings() -> None:

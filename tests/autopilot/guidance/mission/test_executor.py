@@ -66,17 +66,6 @@ def test_a_mission_that_begins_with_a_waypoint_takes_off_first() -> None:
     assert low.orders[0].height_enu_m == pytest.approx(HOME[2] + 2.5)
 
 
-def test_altitudes_above_sea_and_above_home() -> None:
-    heights = []
-    for frame, z in ((0, 500.0), (5, 500.0), (3, 12.0), (6, 12.0), (10, 12.0), (11, 12.0)):
-        flight = begun(item("NAV_WAYPOINT", (5.0, 0.0, z))._replace(frame=frame))
-        flight.step()
-        (order,) = flight.orders
-        assert isinstance(order, GoTo)
-        heights.append(order.position_enu_m[2])
-    assert heights == pytest.approx([12.0] * 2 + [12.5] * 4)
-
-
 def test_waypoints_without_hold_are_flown_through() -> None:
     through = begun(item("NAV_WAYPOINT", (20.0, 0.0, 5.0), p2=4.0), item("NAV_WAYPOINT", (20.0, 20.0, 5.0)))
     while not through.reached:
@@ -145,12 +134,6 @@ def test_a_stale_judgement_ends_nothing() -> None:
     assert dist(from_home(flight), (90.0, 0.0, 5.0)) < 0.6
 
 
-def test_what_the_navigator_calls_arrived_is_reached() -> None:
-    flight = begun(item("NAV_WAYPOINT", (9.0, 0.0, 5.0), p2=1e-9))
-    flight.fly(MINUTE_S)
-    assert flight.reached == [0]
-
-
 @pytest.mark.parametrize(
     ("p1", "p3", "p4", "yaw"),
     [(90.0, 0.0, 0.0, 0.0), (0.0, nan, nan, 0.5 * pi), (45.0, 1.0, 1.0, -0.25 * pi), (45.0, -1.0, 1.0, 0.25 * pi)],
@@ -194,13 +177,6 @@ def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
         assert flight.mission.set_current(0) is None
         flight.mission.pause()
         assert flight.mission.progress.state == PAUSED
-
-
-def test_many_items_that_take_no_time_are_done_soon() -> None:
-    flight = begun(*[item("IMAGE_START_CAPTURE")] * 900, item("NAV_WAYPOINT", (5.0, 0.0, 5.0)))
-    while flight.mission.progress.seq < 900:
-        flight.step()
-    assert flight.now_us < 60 * STEP_US
 
 
 def test_pausing_goes_on_with_the_current_item() -> None:

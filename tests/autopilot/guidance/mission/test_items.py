@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
-from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, RALLY_RULES, SKIPPED, places
+from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES, places
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.services.command import NOT_GIVEN
@@ -104,10 +104,6 @@ def test_rally_points() -> None:
     assert RALLY_RULES.check_item(item("NAV_RALLY_POINT", z=nan)) == P7
     assert RALLY_RULES.check_item(item("NAV_RALLY_POINT", frame=2)) == BAD_FRAME
     assert RALLY_RULES.check_item(item("NAV_WAYPOINT")) == mav.MAV_MISSION_UNSUPPORTED
-
-
-def test_every_command_is_one_or_the_other() -> None:
-    assert not FLOWN & SKIPPED
 
 
 def test_where_items_are() -> None:
