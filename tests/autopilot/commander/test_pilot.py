@@ -131,15 +131,6 @@ def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
     assert cockpit.said("no take-off, rotors stopped")
 
 
-def test_a_return_flies_home_and_lands() -> None:
-    cockpit = Cockpit((20.0, 0.0, 5.0))
-    cockpit.home.move((0.0, 0.0, 0.0), 0.0)
-    assert cockpit.pilot.select(Mode.RETURN, ()) is None
-    cockpit.fly_for(60.0)
-    assert cockpit.pilot.state == FIRST
-    assert cockpit.state.position_enu_m == pytest.approx((0.0, 0.0, 0.0), abs=0.3)
-
-
 def test_home_is_set_at_arming_unless_it_was_chosen() -> None:
     cockpit = Cockpit()
     cockpit.state = at((3.0, 4.0, 0.0), yaw_rad=1.0)

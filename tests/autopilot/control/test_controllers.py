@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.geometric import track_direction
 from colibri.autopilot.control.interface import Controller
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import (
@@ -16,7 +15,6 @@ from colibri.autopilot.control.registry import (
     DecisionError,
     check_controller,
     check_rotor_speeds,
-    controller_names,
     load_controller,
 )
 from colibri.common.config import SettingsError
@@ -31,10 +29,6 @@ PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "s
 def build(name: str) -> Controller[Any]:
     vehicle = load_vehicle("hummingbird-thesis")
     return load_controller(name)(load_profile(PROFILES[name]).table(name), vehicle, lambda: 0.0)
-
-
-def test_four_come_along() -> None:
-    assert controller_names() == ["cascade", "geometric-se3", "global-lpv-mpc", "lpv-mpc", "whole-lpv-mpc"]
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -74,18 +68,6 @@ def test_what_is_no_controller_is_refused() -> None:
 def test_what_no_rotor_can_follow_is_refused(speeds: list[float]) -> None:
     with pytest.raises(DecisionError, match="expected four from 0 to 8002"):
         check_rotor_speeds("wild", np.array(speeds), 8002.0)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_target_attitude_turns_as_it_says(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    force, force_rate = rng.normal(size=3) + np.array([0.0, 0.0, 9.81]), rng.normal(size=3)
-    yaw, yaw_rate, step = float(rng.normal()), float(rng.normal()), 1e-6
-    target = track_direction(force, force_rate, yaw, yaw_rate)
-    later = track_direction(force + step * force_rate, force_rate, yaw + step * yaw_rate, yaw_rate)
-    turned = (target.rotation.T @ later.rotation - np.eye(3)) / step
-    assert [turned[2, 1], turned[0, 2], turned[1, 0]] == pytest.approx(target.rate, abs=1e-4)
-    assert target.rotation @ target.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
 
 
 @pytest.mark.parametrize("link", ["direct", "memory"])

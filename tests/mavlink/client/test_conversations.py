@@ -18,11 +18,10 @@ from colibri.mavlink.mission.items import ALL, FENCE, MISSION, PLAN_TYPES
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, ParamError, Parameter, Parameters
-from colibri.mavlink.services.command import PENDING, CommandService
 from colibri.mavlink.services.command import Command as Received
+from colibri.mavlink.services.command import CommandService
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
-from colibri.mavlink.wire.refusal import Refusal
 from tests.support.log_conversations import DownloadLog, ListLogs
 from tests.support.mission_ends import Ground, bits, some_item
 from tests.support.unruly_link import MINUTE_US, TARGET, Link, Vehicle
@@ -43,9 +42,8 @@ few = settings(max_examples=10, deadline=None)
 class Rig:
     def __init__(self, seed: int = 0, loss: float = 0.0, unruly: float = 0.0, rules: Rules | None = None) -> None:
         self.obeyed: list[Received] = []
-        self.later = False
         numbers = (mav.MAV_CMD_COMPONENT_ARM_DISARM, mav.MAV_CMD_DO_REPOSITION, mav.MAV_CMD_PREFLIGHT_CALIBRATION)
-        self.commands = CommandService(dict.fromkeys(numbers, self._obey), StatusText())
+        self.commands = CommandService(dict.fromkeys(numbers, self.obeyed.append), StatusText())
         self.parameters = Parameters(PARAMETERS)
         self.ground = Ground(rules) if rules else Ground()
         memory = Memory()
@@ -62,10 +60,6 @@ class Rig:
         self.link.run(lambda: conversation.result is not None, 10 * MINUTE_US)
         self.link.run(lambda: False, 100_000)  # until no copy of an answer is under way
         return conversation.result
-
-    def _obey(self, command: Received) -> Refusal | None:
-        self.obeyed.append(command)
-        return PENDING if self.later else None
 
 
 @few
@@ -154,15 +148,6 @@ def test_a_refused_plan_names_the_item() -> None:
 )
 def test_a_refused_parameter(name: str, value: float, result: int) -> None:
     assert Rig().ended(SetParameter(TARGET, name, value)) == result
-
-
-def test_a_command_that_takes_its_time() -> None:
-    rig = Rig()
-    rig.later = True
-    calibration = rig.client.begin(Command(TARGET, mav.MAV_CMD_PREFLIGHT_CALIBRATION, 1.0))
-    assert not rig.link.run(lambda: calibration.result is not None, 20_000_000)
-    assert calibration.progress is not None
-    assert len(rig.obeyed) == 1
 
 
 @pytest.mark.parametrize(

@@ -79,16 +79,6 @@ def test_a_burst_ends_with_its_session(client: Client, opcode: int) -> None:
     assert client.poll() == []
 
 
-def test_a_new_burst_replaces_the_old_one(client: Client) -> None:
-    client.do(Opcode.OPEN_TO_READ, b"text")
-    client.send(Opcode.BURST, size=1)
-    client.poll()
-    assert client.do(Opcode.READ, offset=5, size=1) == TEXT[5:6]
-    assert [reply.offset for reply in client.poll()] == list(range(8, 16))
-    client.send(Opcode.BURST, offset=100, size=1)
-    assert [reply.offset for reply in client.poll()] == list(range(100, 108))
-
-
 def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.send(Opcode.BURST, size=100)

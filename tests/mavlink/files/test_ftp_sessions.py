@@ -36,13 +36,6 @@ def test_a_repeated_request_gets_the_remembered_answer(
     assert client.send(opcode, data)[0].opcode == Opcode.NAK
 
 
-def test_a_refusal_is_not_remembered(client: Client, memory: Memory) -> None:
-    """Nothing was done, so that it may well be done when it is asked for again."""
-    assert client.ask(Opcode.REMOVE, b"new").error == Error.NOT_FOUND
-    memory.create(("new",))
-    assert client.send(Opcode.REMOVE, b"new")[0].opcode == Opcode.ACK
-
-
 def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Memory) -> None:
     client.do(Opcode.CREATE, b"new")
     created = client.sequence

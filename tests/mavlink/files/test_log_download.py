@@ -88,12 +88,6 @@ def test_a_list_is_paced(memory: Memory, logs: Logs) -> None:
     assert [entry[0] for entry in entries(logs)] == list(range(103))
 
 
-def test_a_chunk_comes_in_blocks(logs: Logs) -> None:
-    found = data(logs, 0, CHUNK, CHUNK)
-    assert [(number, offset) for number, offset, _ in found] == [(0, CHUNK + i * BLOCK_BYTES) for i in range(128)]
-    assert b"".join(block for _, _, block in found) == BIG[CHUNK : 2 * CHUNK]
-
-
 def test_a_chunk_is_sent_fast_and_a_whole_log_slowly(logs: Logs) -> None:
     ask(logs, "LOG_REQUEST_DATA", 0, 0, CHUNK)
     assert len(list(logs.poll(0))) == MESSAGES_A_POLL
@@ -146,12 +140,6 @@ def test_another_log_or_the_end_stops_a_download(logs: Logs) -> None:
     assert {number for number, _, _ in blocks([send for send in sends if send.channel == OTHER.channel])} == {0}
     ask(logs, "LOG_REQUEST_END", peer=OTHER)
     assert drain(logs, []) == []
-
-
-def test_a_log_can_be_read_while_it_is_written(memory: Memory, logs: Logs) -> None:
-    entries(logs)
-    memory.write(("logs", "00003.ulg"), 180, b"more")
-    assert data(logs, 2, 180, 90) == [(2, 180, b"more")]
 
 
 def test_ids_are_those_of_the_last_list(memory: Memory, logs: Logs) -> None:

@@ -164,12 +164,6 @@ def test_a_folder_swapped_for_a_link_leads_nowhere(tmp_path: Path) -> None:
     folder.close()
 
 
-def test_a_folder_that_cannot_be_had_says_so(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(OSError, match="File exists"):
-        Folder(tmp_path / "file")
-
-
 def test_what_vanishes_is_not_found(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.create(("a",))
@@ -181,14 +175,6 @@ def test_what_vanishes_is_not_found(tmp_path: Path) -> None:
     assert reading.read(0, 5) is FileRefusal.NOT_FOUND
     folder.close()
     assert folder.list(()) is FileRefusal.FAILED  # whatever the system says: a handle that is closed
-
-
-@given(st.text())
-def test_no_path_leads_up(path: str) -> None:
-    names = names_of(path)
-    if not isinstance(names, FileRefusal):
-        assert not {"", ".", ".."} & set(names)
-        assert not any("/" in name or "\0" in name for name in names)
 
 
 @pytest.mark.parametrize(

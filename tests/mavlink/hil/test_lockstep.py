@@ -199,12 +199,6 @@ def test_a_fix_without_a_frame_is_dropped() -> None:
     assert autopilot.dropped["invalid"] == 1
 
 
-def test_an_autopilot_at_another_rate_learns_that_it_is_refused(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
-    plant.offer(frame_at(0), 0.0)
-    call(autopilot, plant)
-    assert autopilot.refused == dialect.RESULT_TEMPORARILY_REJECTED
-
-
 @pytest.mark.parametrize("source", [(2, dialect.AUTOPILOT_COMPONENT), (1, 42)])
 def test_a_foreign_command_is_not_obeyed(plant: PlantEnd, autopilot: AutopilotEnd, source: tuple[int, int]) -> None:
     call(autopilot, plant)

@@ -1,6 +1,6 @@
 """HIL_SENSOR and HIL_GPS: round trips, the units and frames on the wire, and that no number is judged."""
 
-from math import isnan, nan
+from math import isnan
 
 import pytest
 from hypothesis import given
@@ -148,10 +148,3 @@ def test_whatever_comes_is_decoded_and_not_judged(
     told = [*frame.specific_force_flu_m_s2, *frame.rate_flu_rad_s, *frame.magnetic_field_flu_gauss]
     for value, sent in zip(told, numbers, strict=False):
         assert abs(value) == abs(sent) or isnan(sent)
-
-
-@pytest.mark.parametrize("bad", [nan, float("inf"), -1e30])
-def test_the_plants_end_can_send_any_number(bad: float) -> None:
-    frame = SensorFrame(0, ALL, (bad, 0.0, 0.0), (bad, 0.0, 0.0), (bad, 0.0, 0.0), 1e5, bad)
-    told = through_the_wire(frame)
-    assert told.specific_force_flu_m_s2[0] == pytest.approx(bad, nan_ok=True, rel=FLOAT32)

@@ -196,14 +196,6 @@ def test_a_blocked_line_drops_whole_frames(device: Device, link: SerialLink) -> 
     assert (frames + arrived(device, 1))[-1] == text(999)
 
 
-def test_a_device_that_sends_without_a_pause_does_not_hold_up(device: Device, link: SerialLink) -> None:
-    frames = 0
-    for number in range(200):
-        device.send(text(number))
-        frames += len(link.receive_now())
-    assert frames + len(heard(link, 200 - frames)) == 200
-
-
 def test_after_its_end_it_is_opened_no_more(device: Device, link: SerialLink, clock: Clock) -> None:
     link.close()
     clock.now_s += 10.0 * REOPEN_AFTER_S

@@ -175,15 +175,6 @@ def test_unknown_messages_are_forwarded_but_open_no_channel(ours: Hub, service: 
     assert service.names == ["HEARTBEAT"]
 
 
-def test_mavlink_1_is_heard_and_forwarded(ours: Hub, service: Recorder) -> None:
-    mav = common.MAVLink(None, srcSystem=255, srcComponent=0)
-    old = bytes(common.MAVLink_heartbeat_message(*HEARTBEAT).pack(mav, force_mavlink1=True))
-    ours.open(1, SDK)
-    ours.receive(old, 0, GCS, 0)
-    assert service.names == ["HEARTBEAT"]
-    assert frames_to(ours, SDK) == old
-
-
 def test_what_is_lost_shows_in_the_gaps(ours: Hub) -> None:
     station = Station()
     frames = [station.says() for _ in range(300)]

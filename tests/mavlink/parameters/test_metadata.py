@@ -45,11 +45,6 @@ def test_the_checksum_is_that_of_mavlink() -> None:
     assert checksum(b"123456789") == 0x2DFD2D88 != crc32(b"123456789")
 
 
-def test_the_time_goes_round() -> None:
-    (message,) = on_the_wire(Metadata(b"").provide(GROUND, (2**32 + 7) * 1000))
-    assert message.fields.time_boot_ms == 7
-
-
 SPEED = Parameter(
     name="SPEED",
     kind=Kind.REAL,

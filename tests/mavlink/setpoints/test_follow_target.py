@@ -64,14 +64,6 @@ def test_it_goes_on_at_its_velocity_up_to_a_bound(follow: Follow) -> None:
     assert last.velocity_enu_m_s == here.velocity_enu_m_s
 
 
-def test_going_on_twice_is_going_on_once(follow: Follow) -> None:
-    tell(follow)
-    once = latest(follow, 1_500_000)
-    assert once.at(1_500_000, GOES_ON_US) == once
-    for end_us in (1_900_000, 3_000_000):
-        assert once.at(end_us, GOES_ON_US).position_enu_m == pytest.approx(latest(follow, end_us).position_enu_m)
-
-
 def test_it_grows_old(follow: Follow) -> None:
     tell(follow)
     assert follow.latest(1_000_000, 1_000_000) is not None

@@ -73,13 +73,6 @@ def test_it_blows_from_the_first_frame_on() -> None:
     assert np.abs(np.corrcoef(first.T) - np.eye(3)).max() < 0.08
 
 
-def test_seeds_differ() -> None:
-    """A minute apart, eddies have forgotten each other: 4000 samples are independent."""
-    one, other = blow(4000, 60.0, 1), blow(4000, 60.0, 2)
-    assert all(abs(np.corrcoef(one[:, axis], other[:, axis])[0, 1]) < 0.08 for axis in range(3))
-    assert (blow(10, 0.004, 1) == blow(10, 0.004, 1)).all()
-
-
 def test_turbulence_depends_on_airspeed_alone() -> None:
     standing, flying = (Air(Weather(wind(text), turbulence="light", seed=5)) for text in ("8@270", "0@0"))
     velocity_0, eddies_0 = standing.begin(HEIGHT_M)

@@ -114,22 +114,6 @@ def test_motion_rows_hold_iff_slacks_cover_the_excess(rng: np.random.Generator) 
     assert verdicts == {True, False}
 
 
-def test_the_tilts_row_is_the_tangent_in_the_direction_expected(rng: np.random.Generator) -> None:
-    u = rng.normal(size=3) * 0.05
-    responses = responses_of(rng, u)
-    schedule = rng.uniform(-1.0, 1.0, (STEPS, len(prediction.SCHEDULE)))
-    G = np.zeros((condensing.MOTION_ROWS * len(PROBLEM.checked), N))
-    h, normal = np.zeros(len(G)), np.empty(2)
-    condensing.limit_motion(responses, schedule, PROBLEM, 0, G, h)
-    for place, step in enumerate(PROBLEM.checked):
-        row = condensing.MOTION_ROWS * place
-        phi, theta = schedule[step - 1, :2]
-        distance = condensing.tilt_tangent(phi, theta, LIMITS[0], normal)
-        z = np.concatenate([rng.normal(size=MOVED) * 0.1, [0.2, 7.0]])
-        angles = (responses @ [1.0, *z[:MOVED]])[step, list(ANGLES[:2])]
-        assert h[row] - G[row] @ z == pytest.approx(1.2 - normal @ angles / distance)
-
-
 @pytest.mark.parametrize("max_tilt", [0.3, 1.0, 1.3])
 def test_no_tilt_within_the_limit_is_beyond_any_tangent_to_it(rng: np.random.Generator, max_tilt: float) -> None:
     normal = np.empty(2)

@@ -82,14 +82,3 @@ def test_roll_and_pitch_point_thrust_along_the_force_at_any_yaw(
     up = np.array(rotation_matrix(quaternion_from_euler(phi, theta, yaw)))[:, 2]
     assert up * np.linalg.norm([x, y, z]) == pytest.approx([x, y, z], abs=1e-9)
     assert psi == wanted
-
-
-def test_commanded_thrust_leads_its_lag() -> None:
-    forces = np.array([[0.0, 0.0, 6.0], [0.0, 0.0, 6.5], [1.0, 2.0, 6.5], [0.0, 0.0, 30.0]])
-    commands = np.empty(3)
-    position_loop.thrust_commands(6.0, forces, np.array([0.0, 0.0, 1.0]), 0.3, LIMITS, commands)
-    thrust = 6.0
-    for wanted, command in zip((6.5, float(np.linalg.norm(forces[2]))), commands, strict=False):
-        thrust += 0.3 * (command - thrust)
-        assert thrust == pytest.approx(wanted)
-    assert commands[2] == LIMITS.max_n

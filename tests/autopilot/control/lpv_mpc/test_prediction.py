@@ -79,11 +79,3 @@ def test_a_step_is_a_zero_order_hold(seed: int) -> None:
         block[list(RATES), STATES] = d / BODY[:3]
         state = (expm(block * INTERVAL_S) @ [*state, 1.0])[:STATES]
         assert responses[step + 1] @ [1.0, *increments.ravel()] == pytest.approx(state, rel=1e-3, abs=1e-4)
-
-
-def test_increments_do_nothing_before_they_are_made() -> None:
-    responses = predicted(random_state(2), np.zeros(3), np.zeros(3), np.zeros((STEPS, len(SCHEDULE))), BODY)
-    for move, start in enumerate(STARTS):
-        columns = responses[:, :, 1 + INPUTS * move : 1 + INPUTS * (move + 1)]
-        assert not columns[: start + 1].any()
-        assert columns[start + 1].any()

@@ -13,7 +13,7 @@ from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import model_of
 from colibri.common.jit import packed
-from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, rotation_matrix
+from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
 
 INTERVAL_S = 0.008
@@ -121,15 +121,3 @@ def test_a_motion_without_a_jump_is_followed_as_it_is(lap_s: float) -> None:
     p, v, a, yaw = circle(4.0, lap_s)
     followed = feed_forward.before_jump((p, v, a, yaw), INTERVAL_S)
     assert all((one == other).all() for one, other in zip(followed, (p, v, a, yaw), strict=True))
-
-
-def test_a_demanded_attitude_stands_as_demanded() -> None:
-    asked, angles = flat(), np.tile([0.2, -0.4, 1.3], (STEPS + 2, 1))
-    feed_forward.stand(angles, np.full(STEPS + 2, 40.0), WIDE, asked)
-    q = quaternion_from_euler(0.2, -0.4, 1.3)
-    assert asked.attitudes[5] == pytest.approx(np.array(rotation_matrix(q)))
-    assert np.linalg.norm(asked.forces[0]) == pytest.approx(WIDE.max_n)
-    feed_forward.turn(asked, np.zeros(3), FROM_WRENCH, PACKED)
-    assert asked.rates == pytest.approx(np.zeros((STEPS, 3)), abs=1e-9)
-    assert euler_from_quaternion(q) == pytest.approx((0.2, -0.4, 1.3))
-    assert asked.squared[3] == pytest.approx(FROM_WRENCH[:, 0] * WIDE.max_n, rel=1e-9)

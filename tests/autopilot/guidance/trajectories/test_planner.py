@@ -165,14 +165,6 @@ def test_a_flight_starts_with_the_first_yaw() -> None:
     assert start_yaw(track("line"), "by-formula") == pytest.approx(np.pi / 4)
 
 
-@pytest.mark.parametrize("name", THESIS_TRACKS)
-def test_yaw_points_along_the_track_and_never_jumps(name: str) -> None:
-    horizon = horizon_from(name, 0, SAMPLES + 1)
-    vx, vy = horizon.velocity_enu_m_s[1:, 0], horizon.velocity_enu_m_s[1:, 1]
-    assert np.cos(horizon.yaw_rad[1:] - np.arctan2(vy, vx)) == pytest.approx(np.ones(SAMPLES), abs=1e-12)
-    assert np.abs(np.diff(horizon.yaw_rad)).max() < np.pi
-
-
 def test_a_horizon_begins_with_the_sample_it_lies_in() -> None:
     everything = horizon_from("spiral", 0, SAMPLES + 1)
     for time_us, sample in ((0, 0), (399_999, 0), (400_000, 1), (700_000, 1), (99_999_999, 249)):
