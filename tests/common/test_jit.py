@@ -87,28 +87,12 @@ def _write(folder: Path, factor: float, argument: str = "Number") -> None:
 
 
 @pytest.mark.long
-def test_machine_code_is_renewed_with_callees_and_types(
-    tmp_path: Path,
-) -> None:
+def test_machine_code_is_renewed_with_callees_and_types(tmp_path: Path) -> None:
     said = []
     for factor, argument in ((2.0, "Number"), (2.0, "Number"), (3.0, "Number"), (3.0, "Length")):
         _write(tmp_path, factor, argument)
         said.append(_run(tmp_path).stdout.strip())
     assert said == ["4.0 0", "4.0 1", "9.0 0", "9.0 0"]
-
-
-@pytest.mark.long
-def test_machine_code_is_tied_to_its_version(tmp_path: Path) -> None:
-    """As two processes leave it that write at once."""
-    _write(tmp_path, 2.0)
-    assert _run(tmp_path).stdout == "4.0 0\n"
-    (old,) = tmp_path.rglob("caller.quadrupled*.nbc")
-    before = old.read_bytes()
-    _write(tmp_path, 3.0)
-    assert _run(tmp_path).stdout == "9.0 0\n"
-    assert old.read_bytes() != before
-    old.write_bytes(before)
-    assert [_run(tmp_path).stdout for _ in range(2)] == ["9.0 0\n", "9.0 1\n"]
 
 
 @pytest.mark.long

@@ -6,8 +6,6 @@ import numpy as np
 
 from colibri.common.jit import compiled, inlined, opened, packed
 
-LINE = 64
-
 
 class Inner(NamedTuple):
     weight: float
@@ -40,20 +38,6 @@ def test_a_record_owns_the_numbers_packed_in_it() -> None:
     it.many[3], inner.rows[1, 2] = -1.0, -2.0
     assert record["many"][0, 3] == -1.0
     assert record["inner"]["rows"][0, 1, 2] == -2.0
-
-
-def test_large_arrays_begin_with_a_line_of_the_cache() -> None:
-    for _ in range(5):
-        it = opened(packed(outer()), Outer)
-        assert it.many.ctypes.data % LINE == 0
-        assert Inner(*it.inner).rows.ctypes.data % LINE == 0
-
-
-def test_records_of_one_kind_have_one_type() -> None:
-    """Kernels tell types by identity, or slowly."""
-    one, other = packed(outer()), packed(outer())
-    assert one.dtype is other.dtype
-    assert one.dtype is not packed(outer()._replace(few=np.zeros(3))).dtype
 
 
 @inlined

@@ -12,7 +12,6 @@ from tools.harness.processes import begins_as_recorded
 
 FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mpc", "crown", "tumbling-by-se3")
 """Those that showed a difference of kernels first, and others of other parts."""
-FEWER = ("at-its-limits-in-gusts", "wave-by-global-lpv-mpc")
 ALL = {variation.name: variation for variation in variations()}
 
 
@@ -35,13 +34,6 @@ def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: t
 def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
     only = [f"--only={name}" for name in FEW]
     assert main(["verify", "--golden", "--link", "memory", "--out", str(tmp_path), "--quiet", *only]) == 0
-
-
-@begins_as_recorded
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["openblas-nehalem", "glibc-without-avx2-and-fma"])
-def test_fewer_are_the_same_under_a_few_variations(tmp_path: Path, name: str) -> None:
-    check(ALL[name], fly_here(ALL[name], tmp_path, only=FEWER))
 
 
 @begins_as_recorded

@@ -25,12 +25,6 @@ def test_flights_off_track_early_or_inverted_are_lost() -> None:
         assert merit(lost, STEP) is None
 
 
-def test_overshoot_is_how_far_it_goes_past() -> None:
-    went = merit(recording(x=-0.25), STEP)
-    assert went is not None
-    assert went.overshoot_m == pytest.approx(0.25)
-
-
 def test_the_page_says_up_to_where_it_flies() -> None:
     flown: dict[float, tuple[Merit | None, Merit | None]] = {0: (GOOD, GOOD), 8: (BAD, GOOD), 16: (GOOD, None)}
     points = [Point(law, way, ms, *flown[ms]) for law in LAWS for way in WAYS for ms in flown]

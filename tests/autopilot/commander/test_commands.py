@@ -11,14 +11,7 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.mission.items import FENCE, MISSION
-from colibri.mavlink.services.command import (
-    ACCEPTED,
-    DENIED,
-    FAILED,
-    TEMPORARILY_REJECTED,
-    UNSUPPORTED,
-    Command,
-)
+from colibri.mavlink.services.command import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Command
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.cockpit import FLYING, GROUND, Cockpit, item

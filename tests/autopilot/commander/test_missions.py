@@ -9,10 +9,7 @@ from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.cockpit import FLYING, Cockpit, item
 
-PLAN = (
-    item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)),
-    item("NAV_WAYPOINT", place=(5.0, 5.0, 10.0)),
-)
+PLAN = (item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)), item("NAV_WAYPOINT", place=(5.0, 5.0, 10.0)))
 
 
 def test_a_mission_is_flown_item_after_item_and_then_held() -> None:

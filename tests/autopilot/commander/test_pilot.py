@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.commander.mode_tasks import task_record
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
@@ -65,14 +64,6 @@ def test_a_failsafe_action_sets_its_mode_from_any_mode(action: Action, mode: Mod
     assert cockpit.pilot.saving is action
     assert cockpit.pilot.context().blind is (action is Action.DESCEND)
     assert cockpit.pilot.select(Mode.HOLD, ()) is None
-    assert cockpit.pilot.saving is Action.NONE
-
-
-@pytest.mark.parametrize("action", LEADS)
-def test_no_failsafe_moves_rotors_that_stand(action: Action) -> None:
-    cockpit = Cockpit()
-    cockpit.pilot.save(action)
-    assert cockpit.pilot.state == FIRST
     assert cockpit.pilot.saving is Action.NONE
 
 
@@ -164,29 +155,6 @@ def test_a_requested_speed_is_limited_and_ends_with_the_flight() -> None:
     assert cockpit.pilot.context().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.max_speed_m_s
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.speed_m_s is None
-
-
-@pytest.mark.parametrize("seamless", [False, True])
-@pytest.mark.parametrize("mode", Mode)
-def test_after_a_restart_every_mode_goes_on(mode: Mode, seamless: bool) -> None:
-    before = in_the_air()
-    before.pilot.select(mode, ())
-    before.step()
-    record, task = before.pilot.record(), task_record(before.pilot.task)
-    after = in_the_air()
-    after.pilot.resume(
-        before.now_us + 4_000,
-        before.state,
-        record,
-        lambda again, context: after.tasks.again(task, again, context),
-        seamless=seamless,
-    )
-    assert after.pilot.state == before.pilot.state
-    if before.pilot.state.mode is not Mode.HOLD:  # there a stop goes on as the place where it came to rest
-        assert type(after.pilot.task) is type(before.pilot.task)
-    assert after.home.position_enu_m == before.home.position_enu_m
-    after.steered = STICKS
-    assert after.step() is not RESTS
 
 
 def test_after_a_restart_a_vehicle_that_has_come_down_stays_down() -> None:

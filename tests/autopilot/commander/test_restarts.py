@@ -21,14 +21,7 @@ from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
-from colibri.autopilot.guidance.tasks.position import (
-    GoToTask,
-    HoldTask,
-    LandTask,
-    TakeoffTask,
-    TaskSequence,
-    TrackTask,
-)
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, LandTask, TakeoffTask, TaskSequence, TrackTask
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, Steered
 from colibri.common.serialization import of_bytes, to_bytes

@@ -132,11 +132,6 @@ def test_nan_is_a_value(name: str, spoilt: str) -> None:
     assert result[:2] == (QpStatus.NOT_ACCURATE, None)
 
 
-def test_an_unknown_solver_lists_the_installed_ones() -> None:
-    with pytest.raises(SolverError, match="unknown solver simplex: installed are clarabel"):
-        QpSolver("simplex", TOLERANCE)
-
-
 def test_a_solver_that_is_not_installed_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SolverError, match=r"gurobi is not installed: pip install 'qpsolvers\[gurobi\]'"):
         QpSolver("gurobi", TOLERANCE)

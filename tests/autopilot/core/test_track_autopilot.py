@@ -67,8 +67,7 @@ def test_yaw_is_unwrapped_by_continuity() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wanted_s", "interval_us"),
-    [(0.004, 4000), (0.008, 8000), (0.005, 4000), (0.001, 1000), (0.1, 8000), (None, 8000)],
+    ("wanted_s", "interval_us"), [(0.004, 4000), (0.008, 8000), (0.005, 4000), (0.001, 1000), (0.1, 8000), (None, 8000)]
 )
 def test_frames_divide_the_control_interval(wanted_s: float | None, interval_us: int) -> None:
     assert build(flight(frame_interval_s=wanted_s)).frame_interval_us == interval_us

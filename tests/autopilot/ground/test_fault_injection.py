@@ -72,12 +72,7 @@ def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
 
 @pytest.mark.parametrize(
     ("params", "result"),
-    [
-        ((nan, OFF), DENIED),
-        ((MOTOR, 0.5), DENIED),
-        ((MOTOR, WRONG, 1.0, -0.5), DENIED),
-        ((MOTOR, 99.0), UNSUPPORTED),
-    ],
+    [((nan, OFF), DENIED), ((MOTOR, 0.5), DENIED), ((MOTOR, WRONG, 1.0, -0.5), DENIED), ((MOTOR, 99.0), UNSUPPORTED)],
 )
 def test_impossible_numbers_are_refused(failures: Failures, params: tuple[float, ...], result: int) -> None:
     refusal = failures.inject(asked(*params), enabled=True)

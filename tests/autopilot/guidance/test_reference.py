@@ -135,10 +135,7 @@ def test_a_plan_that_is_reached_is_the_reference(turns: int, since_s: float) -> 
     target = circling(since_s)
     start = Reference(target.motion[0, :4].copy(), target.heading[0, :2] + np.array([tau * turns, 0.0]))
     plan = Horizon(*(target.motion[:, order] for order in range(5)), *target.heading.T)
-    for horizon, after in (
-        lead(start, target, Limits(), INTERVAL_S),
-        lead_along(start, plan, Limits(), INTERVAL_S),
-    ):
+    for horizon, after in (lead(start, target, Limits(), INTERVAL_S), lead_along(start, plan, Limits(), INTERVAL_S)):
         assert (np.stack(horizon[:5], axis=1) == target.motion).all()
         assert horizon.yaw_rad == pytest.approx(target.heading[:, 0] + tau * turns, abs=1e-12)
         assert (after.motion == target.motion[1, :4]).all()

@@ -18,7 +18,7 @@ from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_n
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
-from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float32
+from colibri.mavlink.parameters.store import Kind, ParamError, Parameters
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
@@ -107,14 +107,6 @@ def test_each_parameter_of_the_vehicle_changes_its_own_number() -> None:
         after = msgspec.to_builtins(vehicle)
         assert differences(tree, after) == {described(number.path)}
         assert read(after, number.path) == pytest.approx(0.9 * before + 1e-3 * number.scale, rel=1e-6)
-
-
-def test_units_of_the_vehicle() -> None:
-    parameters = parameters_of()
-    assert parameters["VEH_IXX"] == float32(3.4)  # g m^2
-    assert parameters["VEH_CT"] == float32(6.9472)
-    units = {parameter.name: parameter.unit for parameter in parameters_of(vehicle=load_vehicle("hummingbird-thesis"))}
-    assert (units["VEH_CT"], units["VEH_ROT_MAX"]) == ("uN/rpm^2", "rpm")
 
 
 def test_a_vehicle_outside_our_bounds_has_parameters() -> None:

@@ -13,7 +13,7 @@ from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.common.config import SettingsError
-from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
+from colibri.mavlink.parameters.store import ParamError, Parameters, Value
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from tests.support.states import staying, turned
 
@@ -93,16 +93,6 @@ def test_each_number_can_be_at_its_bounds_or_is_refused(controller: str) -> None
                 refused.add(parameter.name)
             flight.parameters.set(parameter.name, parameter.default)
     assert all(name.startswith("VEH_") for name in refused)
-
-
-def test_what_is_only_asked_about_is_not_kept(flight: Flight) -> None:
-    values = {**flight.parameters.values, "VEH_MASS": 0.75}
-    prepared = flight.tuning.prepare("VEH_MASS", values)
-    assert isinstance(prepared, Prepared)
-    assert isinstance(prepared.made, Tuned)
-    assert prepared.made.vehicle.body.mass_kg == 0.75
-    assert flight.parameters.take_made() is None
-    assert flight.parameters.revision == 0
 
 
 def test_subscribers_receive_each_change_once(flight: Flight) -> None:

@@ -96,12 +96,6 @@ def test_a_flooded_link_is_not_heard_before_others(stations: Stations) -> None:
     assert heard[0] > 10
 
 
-def test_what_comes_in_good_measure_is_heard_at_once(stations: Stations) -> None:
-    clock = Clock()
-    links = GroundLinks([FakeLink(0, 20), FakeLink(1, 20)], clock, clock)
-    assert heard_in_a_frame(links, stations, clock, 1e-4) == {0: 20, 1: 20}
-
-
 def test_the_last_bytes_of_a_connection_are_processed(stations: Stations) -> None:
     clock = Clock()
     link = FakeLink(0, 3)

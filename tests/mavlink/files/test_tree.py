@@ -10,17 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import (
-    Entry,
-    FileRefusal,
-    Files,
-    Names,
-    Quota,
-    Reading,
-    Tree,
-    can_be_new,
-    names_of,
-)
+from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, Quota, Reading, Tree, can_be_new, names_of
 
 QUOTA = Quota(200, 6)
 LONG = "x" * 256
@@ -201,83 +191,80 @@ def test_names_that_nobody_could_list_again_are_refused(name: str) -> None:
     assert isinstance(Memory().create((name,)), FileRefusal)
 
 
-class TestTree:
-    @pytest.fixture
-    def logs(self) -> Memory:
-        logs = Memory()
-        logs.create(("1.ulg",))
-        logs.write(("1.ulg",), 0, b"log")
-        return logs
+@pytest.fixture
+def tree() -> Tree:
+    logs = Memory()
+    logs.create(("1.ulg",))
+    logs.write(("1.ulg",), 0, b"log")
+    root = Memory()
+    root.create(("mine",))
+    root.make_folder(("logs",))  # hidden behind the mount
+    root.create(("logs", "hidden"))
+    generated = {"general.json": lambda _: b"{}", "@PARAM/param.pck": lambda query: b"<" + query.encode() + b">"}
+    return Tree(root, {"logs": logs, "@MAV_LOG": logs}, generated)
 
-    @pytest.fixture
-    def root(self) -> Memory:
-        root = Memory()
-        root.create(("mine",))
-        root.make_folder(("logs",))  # hidden behind the mount
-        root.create(("logs", "hidden"))
-        return root
 
-    @pytest.fixture
-    def tree(self, root: Memory, logs: Memory) -> Tree:
-        generated = {"general.json": lambda _: b"{}", "@PARAM/param.pck": lambda query: b"<" + query.encode() + b">"}
-        return Tree(root, {"logs": logs, "@MAV_LOG": logs}, generated)
+def test_a_tree_shows_everything(tree: Tree) -> None:
+    assert tree.list(()) == [
+        Entry("@MAV_LOG", True),
+        Entry("@PARAM", True),
+        Entry("general.json", False, 2),
+        Entry("logs", True),
+        Entry("mine", False, 0),
+    ]
+    assert tree.list(("@PARAM",)) == [Entry("param.pck", False, 2)]
+    assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.ulg", False, 3)]
+    assert tree.list(("general.json",)) is FileRefusal.NOT_A_FOLDER
+    assert tree.list(("nope",)) is FileRefusal.NOT_FOUND
 
-    def test_it_shows_everything(self, tree: Tree) -> None:
-        assert tree.list(()) == [
-            Entry("@MAV_LOG", True),
-            Entry("@PARAM", True),
-            Entry("general.json", False, 2),
-            Entry("logs", True),
-            Entry("mine", False, 0),
-        ]
-        assert tree.list(("@PARAM",)) == [Entry("param.pck", False, 2)]
-        assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.ulg", False, 3)]
-        assert tree.list(("general.json",)) is FileRefusal.NOT_A_FOLDER
-        assert tree.list(("nope",)) is FileRefusal.NOT_FOUND
 
-    def test_it_opens_everything(self, tree: Tree) -> None:
-        assert content(tree, ("general.json",)) == b"{}"
-        assert content(tree, ("@PARAM", "param.pck?withdefaults=1")) == b"<withdefaults=1>"
-        assert content(tree, ("logs", "1.ulg")) == content(tree, ("@MAV_LOG", "1.ulg")) == b"log"
-        assert tree.open(("@PARAM",)) is FileRefusal.IS_FOLDER
-        assert tree.open(("logs",)) is FileRefusal.IS_FOLDER
-        assert tree.open(("logs", "hidden")) is FileRefusal.NOT_FOUND
-        assert tree.open(("mine?query",)) is FileRefusal.NOT_FOUND
+def test_a_tree_opens_everything(tree: Tree) -> None:
+    assert content(tree, ("general.json",)) == b"{}"
+    assert content(tree, ("@PARAM", "param.pck?withdefaults=1")) == b"<withdefaults=1>"
+    assert content(tree, ("logs", "1.ulg")) == content(tree, ("@MAV_LOG", "1.ulg")) == b"log"
+    assert tree.open(("@PARAM",)) is FileRefusal.IS_FOLDER
+    assert tree.open(("logs",)) is FileRefusal.IS_FOLDER
+    assert tree.open(("logs", "hidden")) is FileRefusal.NOT_FOUND
+    assert tree.open(("mine?query",)) is FileRefusal.NOT_FOUND
 
-    def test_a_folder_has_a_second_path(self) -> None:
-        root = Memory()
-        root.make_folder(("logs",))
-        tree = Tree(root, {}, {}, {"@MAV_LOG": "logs"})
-        assert tree.create(("@MAV_LOG", "a")) is None
-        assert content(tree, ("logs", "a")) == b""
-        assert tree.list(("@MAV_LOG",)) == tree.list(("logs",)) == [Entry("a", False, 0)]
-        assert tree.rename(("@MAV_LOG", "a"), ("b",)) is None
-        assert tree.remove_folder(("@MAV_LOG",)) is FileRefusal.PROTECTED
-        assert tree.list(()) == [Entry("@MAV_LOG", True), Entry("b", False), Entry("logs", True)]
 
-    def test_what_is_generated_stays_as_it_was_when_opened(self) -> None:
-        contents = iter([b"one", b"three"])
-        tree = Tree(Memory(), {}, {"g": lambda _: next(contents)})
-        first, second = tree.open(("g",)), tree.open(("g",))
-        assert isinstance(first, Reading)
-        assert isinstance(second, Reading)
-        assert (first.size, first.read(0, 9), second.size, second.read(0, 9)) == (3, b"one", 5, b"three")
+def test_a_folder_has_a_second_path() -> None:
+    root = Memory()
+    root.make_folder(("logs",))
+    tree = Tree(root, {}, {}, {"@MAV_LOG": "logs"})
+    assert tree.create(("@MAV_LOG", "a")) is None
+    assert content(tree, ("logs", "a")) == b""
+    assert tree.list(("@MAV_LOG",)) == tree.list(("logs",)) == [Entry("a", False, 0)]
+    assert tree.rename(("@MAV_LOG", "a"), ("b",)) is None
+    assert tree.remove_folder(("@MAV_LOG",)) is FileRefusal.PROTECTED
+    assert tree.list(()) == [Entry("@MAV_LOG", True), Entry("b", False), Entry("logs", True)]
 
-    @pytest.mark.parametrize("names", [(), ("logs",), ("@PARAM",), ("general.json",), ("@PARAM", "param.pck")])
-    def test_what_it_is_made_of_stays(self, tree: Tree, names: Names) -> None:
-        before = tree.list(())
-        assert all(isinstance(outcome, FileRefusal) for outcome in changes(tree, names)[:8])
-        assert tree.list(()) == before
 
-    def test_mounts_can_be_written_to(self, tree: Tree, root: Memory, logs: Memory) -> None:
-        assert tree.remove(("@MAV_LOG", "1.ulg")) is None
-        assert logs.list(()) == []
-        assert tree.make_folder(("d",)) is None
-        assert tree.rename(("mine",), ("d", "mine")) is None
-        assert tree.write(("d", "mine"), 0, b"data") is None
-        assert content(root, ("d", "mine")) == b"data"
-        assert tree.rename(("d", "mine"), ("@MAV_LOG", "mine")) is FileRefusal.PROTECTED
-        assert tree.truncate(("d", "mine"), 2) is None
-        assert content(root, ("d", "mine")) == b"da"
-        assert tree.remove(("d", "mine")) is None
-        assert tree.remove_folder(("d",)) is None
+def test_what_is_generated_stays_as_it_was_when_opened() -> None:
+    contents = iter([b"one", b"three"])
+    tree = Tree(Memory(), {}, {"g": lambda _: next(contents)})
+    first, second = tree.open(("g",)), tree.open(("g",))
+    assert isinstance(first, Reading)
+    assert isinstance(second, Reading)
+    assert (first.size, first.read(0, 9), second.size, second.read(0, 9)) == (3, b"one", 5, b"three")
+
+
+@pytest.mark.parametrize("names", [(), ("logs",), ("@PARAM",), ("general.json",), ("@PARAM", "param.pck")])
+def test_what_it_is_made_of_stays(tree: Tree, names: Names) -> None:
+    before = tree.list(())
+    assert all(isinstance(outcome, FileRefusal) for outcome in changes(tree, names)[:8])
+    assert tree.list(()) == before
+
+
+def test_mounts_can_be_written_to(tree: Tree) -> None:
+    assert tree.remove(("@MAV_LOG", "1.ulg")) is None
+    assert tree.list(("logs",)) == []
+    assert tree.make_folder(("d",)) is None
+    assert tree.rename(("mine",), ("d", "mine")) is None
+    assert tree.write(("d", "mine"), 0, b"data") is None
+    assert content(tree, ("d", "mine")) == b"data"
+    assert tree.rename(("d", "mine"), ("@MAV_LOG", "mine")) is FileRefusal.PROTECTED
+    assert tree.truncate(("d", "mine"), 2) is None
+    assert content(tree, ("d", "mine")) == b"da"
+    assert tree.remove(("d", "mine")) is None
+    assert tree.remove_folder(("d",)) is None

@@ -23,11 +23,7 @@ from colibri.mavlink.hil.faults import (
     fault_from,
     judged,
 )
-from colibri.mavlink.hil.plant_status import (
-    PlantBattery,
-    decode_battery,
-    encode_battery,
-)
+from colibri.mavlink.hil.plant_status import PlantBattery, decode_battery, encode_battery
 from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
 from colibri.mavlink.wire.refusal import Refusal
 

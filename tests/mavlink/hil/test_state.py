@@ -50,15 +50,8 @@ def test_state_is_ned_and_frd_on_the_wire() -> None:
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 @pytest.mark.parametrize("field", ["position_enu_m", "velocity_enu_m_s", "rate_flu_rad_s"])
 def test_a_state_that_is_not_finite_is_refused(field: str, bad: float) -> None:
-    fields: dict[str, Any] = {
-        "time_us": 0,
-        "position_enu_m": ZERO,
-        "velocity_enu_m_s": ZERO,
-        "attitude": LEVEL,
-        "rate_flu_rad_s": ZERO,
-        field: (0.0, bad, 0.0),
-    }
-    assert through_the_wire(StateFrame(**fields)) is None
+    level: Any = StateFrame(0, ZERO, ZERO, LEVEL, ZERO)
+    assert through_the_wire(level._replace(**{field: (0.0, bad, 0.0)})) is None
 
 
 @pytest.mark.parametrize("q", [(nan, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (0.9, 0.0, 0.0, 0.0), (inf, 0.0, 0.0, 0.0)])

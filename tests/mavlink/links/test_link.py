@@ -6,12 +6,7 @@ from contextlib import closing
 import pytest
 
 from colibri.mavlink.links.link import LinkError
-from colibri.mavlink.links.open import (
-    beyond_loopback,
-    open_ground_link,
-    open_link,
-    unsigned_refusal,
-)
+from colibri.mavlink.links.open import beyond_loopback, open_ground_link, open_link, unsigned_refusal
 from colibri.mavlink.links.udp import UdpLink
 
 TIMEOUT_S = 2.0

@@ -169,18 +169,6 @@ def test_a_device_that_goes_is_noticed_by_what_is_sent(device: Device, link: Ser
     assert link.receive_now() == []
 
 
-def test_one_that_was_away_unnoticed_keeps_its_channel(device: Device, link: SerialLink, clock: Clock) -> None:
-    device.pull_out()
-    while link._port is not None:  # noqa: SLF001 - nobody asks who has gone
-        link.send(text(1))
-    device.plug_in()
-    clock.now_s += REOPEN_AFTER_S
-    link.receive_now()
-    assert link.take_opened() == link.take_closed() == []
-    device.send(text(2))
-    assert heard(link, 1) == [text(2)]
-
-
 def test_a_blocked_line_drops_whole_frames(device: Device, link: SerialLink) -> None:
     sent = [text(number) for number in range(400)]
     for frame in sent:
@@ -194,14 +182,6 @@ def test_a_blocked_line_drops_whole_frames(device: Device, link: SerialLink) -> 
     assert frames == sent[: len(frames)]
     link.send(text(999))
     assert (frames + arrived(device, 1))[-1] == text(999)
-
-
-def test_after_its_end_it_is_opened_no_more(device: Device, link: SerialLink, clock: Clock) -> None:
-    link.close()
-    clock.now_s += 10.0 * REOPEN_AFTER_S
-    link.send(text(1))
-    assert happened(link) == []
-    assert device.received() == b""
 
 
 def test_what_cannot_be_opened_is_said_with_what_to_do(

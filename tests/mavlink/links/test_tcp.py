@@ -180,18 +180,6 @@ def test_a_client_calls_again(server: GroundLink, monkeypatch: pytest.MonkeyPatc
             assert client.take_opened() == []
 
 
-def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
-    url = server.url
-    server.close()
-    with closing(open_ground_link(url.replace("tcpin", "tcp"))) as client:
-        for _ in range(20):
-            client.receive_now()
-            sleep(0.002)
-        with closing(open_ground_link(url)) as again:
-            client.receive_now()
-            assert again.receive_now() == []
-
-
 def test_a_sleeping_server_is_woken_by_a_new_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "perf_counter", lambda: 10.0)
     with closing(open_ground_link("tcpin:127.0.0.1:0")) as server, caller(server) as one:

@@ -75,12 +75,7 @@ class Conversations(RuleBasedStateMachine):
     ) -> None:
         self.say(peer, "MISSION_ITEM", seq, *numbers, *params, kind)
 
-    @rule(
-        peer=PEERS,
-        name=st.sampled_from(["MISSION_REQUEST_INT", "MISSION_REQUEST"]),
-        seq=SEQUENCES,
-        plan_type=TYPES,
-    )
+    @rule(peer=PEERS, name=st.sampled_from(["MISSION_REQUEST_INT", "MISSION_REQUEST"]), seq=SEQUENCES, plan_type=TYPES)
     def asks(self, peer: Peer, name: str, seq: int, plan_type: int) -> None:
         self.say(peer, name, seq, plan_type)
 

@@ -53,12 +53,6 @@ def test_integers_are_packed_as_integers(value: int) -> None:
     assert unpacked(packed(parameters, "withdefaults=1")) == ({"X": value}, {"X": 5})
 
 
-def test_a_name_that_begins_another() -> None:
-    names = ["A", "AB", "ABCDEFGHIJKLMNO", "ABCDEFGHIJKLMNOP", "AC"]
-    file = packed(parameters_of(names))
-    assert sorted(unpacked(file)[0]) == names
-
-
 @given(NAMES)
 def test_no_value_lies_across_two_blocks(names: list[str]) -> None:
     file = packed(parameters_of(names), "withdefaults=1")

@@ -160,12 +160,6 @@ def test_reading_what_does_not_exist(name: str, index: int) -> None:
     assert (error.fields.param_id, error.fields.param_index) == (name, index)
 
 
-def test_a_name_of_16_characters_has_no_nul() -> None:
-    (answer,) = Talk(parameters_of(1)).read("MANY_00000000000")
-    assert b"MANY_00000000000" in answer.frame
-    assert answer.fields.param_id == "MANY_00000000000"
-
-
 def listed(talk: Talk, channel: int, seconds: float) -> list[int]:
     indices = []
     for _ in range(round(seconds * 1e6 / FRAME_US)):

@@ -23,12 +23,9 @@ def test_timesync_tells_the_simulated_time() -> None:
     assert (answer.fields.tc1, answer.fields.ts1) == (1_500_000_000, 987_654_321)
 
 
-def test_an_answer_is_not_answered() -> None:
+def test_an_answer_is_not_answered_and_nobody_sets_the_clock() -> None:
     assert answers("TIMESYNC", 5, 6) == []
     assert answers("PING", 5, 6, 1, 1) == []
-
-
-def test_nobody_sets_the_clock() -> None:
     assert answers("SYSTEM_TIME", 1_800_000_000_000_000, 5) == []
 
 

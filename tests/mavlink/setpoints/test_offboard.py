@@ -94,10 +94,7 @@ RIGHT = (sin(HEADING), -cos(HEADING))
 
 
 def beside(base: tuple[float, float], ahead: float, right: float) -> tuple[float, float]:
-    return (
-        base[0] + ahead * AHEAD[0] + right * RIGHT[0],
-        base[1] + ahead * AHEAD[1] + right * RIGHT[1],
-    )
+    return (base[0] + ahead * AHEAD[0] + right * RIGHT[0], base[1] + ahead * AHEAD[1] + right * RIGHT[1])
 
 
 @pytest.mark.parametrize(

@@ -19,15 +19,7 @@ MS = {"time_boot_ms": 12345}
 US = {"time_usec": 12_345_678}
 RATES = {"rollspeed": 0.1, "pitchspeed": -0.2, "yawspeed": -0.3}
 EXPECTED: dict[str, dict[str, Any]] = {
-    "GLOBAL_POSITION_INT": {
-        **MS,
-        "alt": 430_000,
-        "relative_alt": 25_000,
-        "vx": 400,
-        "vy": 300,
-        "vz": 150,
-        "hdg": 0,
-    },
+    "GLOBAL_POSITION_INT": {**MS, "alt": 430_000, "relative_alt": 25_000, "vx": 400, "vy": 300, "vz": 150, "hdg": 0},
     "LOCAL_POSITION_NED": {**MS, "x": 20.0, "y": 10.0, "z": -30.0, "vx": 4.0, "vy": 3.0, "vz": 1.5},
     "ATTITUDE": {**MS, "roll": 0.1, "pitch": -0.2, "yaw": 0.0, **RATES},
     "ATTITUDE_QUATERNION": {**MS, **RATES},

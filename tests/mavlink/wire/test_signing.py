@@ -202,8 +202,7 @@ def test_a_key_is_bytes_or_digits(content: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "content",
-    [b"", KEY[:31], KEY + b"\n", KEY.hex().encode()[:-1], b"g" * 64, b"\xff" * 64, bytes(32), b"0" * 64],
+    "content", [b"", KEY[:31], KEY + b"\n", KEY.hex().encode()[:-1], b"g" * 64, b"\xff" * 64, bytes(32), b"0" * 64]
 )
 def test_what_is_no_key_is_refused(content: bytes) -> None:
     with pytest.raises(SigningError, match=r"expected 32 bytes or 64 hexadecimal digits, found \d+ bytes|zeros"):

@@ -9,7 +9,7 @@ from scipy.signal import welch
 
 from colibri.common.types import Array
 from colibri.plant.environment.air import Air
-from colibri.plant.environment.turbulence import MIN_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
+from colibri.plant.environment.turbulence import Turbulence, eddy_velocity, scales
 from colibri.plant.environment.weather import Intensity, Weather
 from colibri.plant.texts import wind
 
@@ -88,9 +88,3 @@ def test_the_eddies_are_along_the_wind() -> None:
         Air(Weather(wind(text), turbulence="light", seed=5)).begin(HEIGHT_M)[0] for text in ("8@270", "8@180")
     )
     assert north == pytest.approx((-east[1], east[0], east[2]))
-
-
-def test_who_drifts_with_the_air_still_meets_eddies() -> None:
-    turbulence = Turbulence(1)
-    begin = turbulence.begin()
-    assert turbulence.step(begin, SCALE, 0.0, 0.1) == turbulence.step(begin, SCALE, MIN_AIRSPEED_M_S, 0.1)

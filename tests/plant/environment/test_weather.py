@@ -10,15 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.common.spec import from_values
 from colibri.plant.environment.air import CALM, Air
-from colibri.plant.environment.weather import (
-    INTENSITIES,
-    NO_WIND,
-    Gust,
-    Intensity,
-    RecordedWind,
-    Weather,
-    Wind,
-)
+from colibri.plant.environment.weather import INTENSITIES, NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
 from colibri.plant.spec import WorldSpec
@@ -154,11 +146,3 @@ def test_a_world_has_one_future() -> None:
     for frame in (299, 0, 150):
         assert physics.step(worlds[frame], hover(VEHICLE), FRAME_US) == worlds[frame + 1]
     assert flown(weather._replace(seed=5), 300)[-1].state != worlds[-1].state
-
-
-def test_turbulence_shakes_what_still_air_does_not() -> None:
-    def shaking(turbulence: Intensity | None) -> float:
-        weather = Weather(NO_WIND, turbulence=turbulence, seed=1)
-        return float(np.std([world.state[2] for world in flown(weather, 500)]))
-
-    assert shaking(None) < 1e-9 < shaking("light") < shaking("severe")

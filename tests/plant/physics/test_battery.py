@@ -55,12 +55,6 @@ def test_the_top_speed_is_proportional_to_the_voltage(lag: bool, integrator: Int
     assert max(world.rotor_speeds) < 0.95 * TOP
 
 
-def test_what_the_battery_can_hold_is_held_exactly() -> None:
-    vehicle = VEHICLE.without({"rotor-lag"})
-    world = flight(vehicle, Start(z=50.0), command(500.0, vehicle=vehicle), 0.004)[-1]
-    assert world.rotor_speeds == pytest.approx([500.0] * 4, rel=1e-15)
-
-
 def test_an_empty_battery_gives_what_its_voltage_allows() -> None:
     empty = starting_world(Start(z=500.0), VEHICLE)._replace(charge_used_ah=3.0 * AH)
     world = flight(VEHICLE, empty, command(TOP, vehicle=VEHICLE), 1.0)[-1]

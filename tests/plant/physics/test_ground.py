@@ -47,14 +47,6 @@ def test_a_landing_neither_bounces_nor_sinks(speed_m_s: float, integrator: Integ
     assert height_m[-1] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_a_crooked_landing_comes_to_rest_on_its_feet() -> None:
-    start = Start(z=0.05, phi=8.0, theta=-5.0, vx=0.5, vz=-1.0)
-    end = states(flight(VEHICLE, start, OFF, 3.0))[-1]
-    assert end[:6] == pytest.approx(0.0, abs=1e-6)
-    assert end[8] == pytest.approx(0.0, abs=1e-6)
-    assert end[10:12] == pytest.approx(0.0, abs=1e-6)
-
-
 def test_friction_stops_a_slide_as_coulomb_says() -> None:
     end = states(flight(VEHICLE.without({"drag"}), Start(vx=1.0), OFF, 2.0))[-1]
     assert end[6] == pytest.approx(1.0 / (2.0 * 0.6 * 9.81), rel=0.05)

@@ -132,15 +132,6 @@ def test_disarmed_the_rotors_stand() -> None:
     assert min(end.world.rotor_speeds) > 0.0
 
 
-def test_the_hummingbird_is_a_reversed_plus() -> None:
-    assert (MOTORS.shape, MOTORS.reverse, MOTORS.ardupilot_frame_type) == ("+", True, 6)
-    end = standing(Start(z=50.0))
-    for count in range(100):
-        answered(end, request(count, (1400, 1500, 1600, 1700)))
-    front, right, rear, left = end.world.rotor_speeds
-    assert right < left < front < rear
-
-
 @pytest.mark.parametrize(
     ("bearings_deg", "directions", "shape", "rotors", "frame_type"),
     [

@@ -55,12 +55,6 @@ def test_a_drift_keeps_its_variance_and_forgets_in_its_time(elapsed_s: float) ->
     assert np.mean(before * after) / deviation**2 == pytest.approx(exp(-elapsed_s / time_s), abs=0.06)
 
 
-def test_a_drift_without_time_between_does_not_move() -> None:
-    drift = GaussMarkov(1.0, 60.0, chance())
-    before = drift.value
-    assert drift.after(0.0) == before
-
-
 def test_streams_are_the_seeds_and_nobody_elses() -> None:
     def first(seed: int, source: Source, count: int) -> list[list[float]]:
         return [list(islice(stream, 2000)) for stream in streams(seed, source, count)]

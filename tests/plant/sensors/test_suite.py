@@ -130,22 +130,6 @@ def test_flawless_sensors_tell_the_truth() -> None:
         assert (fix.fix_type, fix.satellites) == (3, 14)
 
 
-def test_noise_of_those_that_are_read_at_every_frame() -> None:
-    sensors = parts(
-        accelerometer={"bias_walk_m_s3_rthz": 0.0, "turn_on_bias_m_s2": 0.0},
-        gyroscope={"bias_walk_rad_s2_rthz": 0.0, "turn_on_bias_rad_s": 0.0},
-    )
-    for interval_us in (1000, 4000):
-        world = flight(HUMMINGBIRD, Start(), OFF, 0.5)[-1]
-        frames = watch(world, suite(sensors, interval_us=interval_us), 5000 * interval_us * 1e-6, interval_us)
-        force = np.array([frame.specific_force_flu_m_s2 for frame in frames])
-        rate = np.array([frame.rate_flu_rad_s for frame in frames])
-        root_s = (interval_us * 1e-6) ** 0.5
-        assert force.std(axis=0) * root_s == pytest.approx(sensors.accelerometer.noise_density_m_s2_rthz, rel=0.05)
-        assert rate.std(axis=0) * root_s == pytest.approx(sensors.gyroscope.noise_density_rad_s_rthz, rel=0.05)
-        assert force.mean(axis=0) == pytest.approx(GRAVITY, abs=2e-3)
-
-
 def test_the_magnetometers_iron_stays_and_its_noise_does_not() -> None:
     truth = np.array(suite(flawless()).measure(standing()).magnetic_field_flu_gauss)
     errors = [
@@ -255,14 +239,6 @@ def test_a_frame_asked_for_again_is_the_same_frame() -> None:
         frame = twice.measure(world)
         assert twice.measure(world) is frame
         assert frame == once.measure(world)
-
-
-def test_the_rtk_vehicle_differs_by_its_receiver_alone() -> None:
-    rtk = load_vehicle("hummingbird-rtk")
-    assert rtk.sensors is not None
-    assert msgspec.structs.replace(rtk, sensors=parts(gps={})) == HUMMINGBIRD
-    assert msgspec.structs.replace(rtk.sensors, gps=parts().gps) == parts()
-    assert rtk.sensors.gps.horizontal_drift_m < 0.01
 
 
 def test_the_wind_of_the_moment_is_felt() -> None:

@@ -28,12 +28,7 @@ def test_hover_is_at_the_speed_that_carries_the_weight() -> None:
 def test_the_allocation_is_the_one_of_the_thesis() -> None:
     vehicle = load_vehicle("hummingbird-thesis")
     cT, cQ, arm = 7.6184e-8, 2.6839e-9, 0.171
-    expected = [
-        [cT, cT, cT, cT],
-        [0.0, -cT * arm, 0.0, cT * arm],
-        [-cT * arm, 0.0, cT * arm, 0.0],
-        [-cQ, cQ, -cQ, cQ],
-    ]
+    expected = [[cT, cT, cT, cT], [0.0, -cT * arm, 0.0, cT * arm], [-cT * arm, 0.0, cT * arm, 0.0], [-cQ, cQ, -cQ, cQ]]
     assert vehicle.allocation() == pytest.approx(np.array(expected), abs=1e-20)
 
 
@@ -82,8 +77,3 @@ def test_a_wrong_file_is_refused_by_file_and_key(tmp_path: Path, old: str, new: 
 def test_a_missing_file_is_named() -> None:
     with pytest.raises(VehicleError, match=r"nowhere\.toml: No such file"):
         load_vehicle("nowhere.toml")
-
-
-def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(VehicleError, match=r'unknown vehicle "dragonfly" \(choose .*hummingbird'):
-        load_vehicle("dragonfly")

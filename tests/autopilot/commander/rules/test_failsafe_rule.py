@@ -38,16 +38,6 @@ def begun(wanted: Mapping[Condition, Action], flight: Flight = IN_FLIGHT) -> Ver
     return following(ARMED, NOW_US, dict.fromkeys(wanted, NOW_US - SECOND_US), set_to, flight)
 
 
-def test_every_condition_has_one_row_with_a_valid_default() -> None:
-    assert sorted(row.condition for row in TABLE) == sorted(Condition)
-    for row in TABLE:
-        assert row.default in dict(row.choices)
-    for parameter in {row.parameter for row in TABLE}:
-        rows = [row for row in TABLE if row.parameter == parameter]
-        assert len({tuple(number for number, _ in row.choices) for row in rows}) == 1
-        assert len({row.default for row in rows}) == 1
-
-
 def test_parameters_make_the_settings() -> None:
     parameters = Parameters(definitions(load_profile("flight"), load_vehicle("hummingbird")))
     assert settings(parameters)[Condition.SETPOINTS_LOST] == Setting(SECOND_US, Action.HOLD)

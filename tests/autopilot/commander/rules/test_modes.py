@@ -44,11 +44,6 @@ def test_a_number_is_a_mode_of_the_table_or_none(number: int) -> None:
     assert mode is None or custom_mode(mode) == number or (mode is Mode.STABILIZED and number == 1 << 16)
 
 
-def test_the_modes_that_fly_by_place_need_the_position() -> None:
-    by_hand_or_level = {Mode.STABILIZED, Mode.ALTITUDE, Mode.LAND, Mode.OFFBOARD}
-    assert {mode for mode in Mode if Need.POSITION not in ROWS[mode].needs} == by_hand_or_level
-
-
 def test_standard_modes_name_one_mode_each() -> None:
     standards = [row.standard for row in MODES if row.standard]
     assert len(standards) == len(set(standards)) == 7

@@ -95,24 +95,11 @@ def test_a_heavier_vehicle_descends_on_more_thrust(monkeypatch: pytest.MonkeyPat
     assert squared[1] > 0.0 > squared[0]
 
 
-def test_without_any_plan_the_lqr_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    controller, planner = build()
-    failing(monkeypatch, QpStatus.TIME_OUT, after=0)
-    assert steps(controller, planner, ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
-
-
-def test_a_solved_qp_ends_every_fallback() -> None:
-    controller, planner = build()
-    memory = controller.initial(VEHICLE.hover_speed)._replace(age=1000)
-    _, decision = controller.step(memory, 0, ON_SPIRAL, planner.horizon(0))
-    assert decision.diagnostics.fallback is None
-    assert decision.diagnostics.qp_status is QpStatus.SOLVED
-
-
 def test_the_shifted_plan_is_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     controller, planner = build()
-    memory = controller.initial(VEHICLE.hover_speed)
-    memory, _ = controller.step(memory, 0, leaning(5.0, -5.0), planner.horizon(0))
+    memory = controller.initial(VEHICLE.hover_speed)._replace(age=1000)
+    memory, decision = controller.step(memory, 0, leaning(5.0, -5.0), planner.horizon(0))
+    assert (decision.diagnostics.fallback, decision.diagnostics.qp_status) == (None, QpStatus.SOLVED)
     assert memory.plan is not None
     planned = memory.plan.moments[1]
     failing(monkeypatch, QpStatus.TIME_OUT, after=0)

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
 from colibri.autopilot.control.lpv_mpc import position_loop
 from colibri.autopilot.control.lpv_mpc.position_loop import Loop, Motion
-from colibri.autopilot.control.parts.error_dynamics import error_transition
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
@@ -22,14 +20,6 @@ LIMITS = ForceLimits(tan(1.0), 1.0, 18.0, 1.0)
 MAX_ERROR_M = 1.5
 GAINS = (20.0, 9.0)
 NOTHING = np.zeros(3)
-
-
-@pytest.mark.parametrize("poles", [(-4.0, -5.0), (-3.0, -3.0)])
-def test_errors_go_on_as_the_poles_say(poles: tuple[float, float]) -> None:
-    first, second = poles
-    A = np.array([[0.0, 1.0], [-first * second, first + second]])
-    for sample, transition in enumerate(error_transition(poles, 0.05, 12)):
-        assert transition == pytest.approx(expm(A * 0.05 * sample), abs=1e-12)
 
 
 def forces_for(

@@ -119,13 +119,6 @@ def test_an_opposite_rotor_without_an_arm_opens_no_cone() -> None:
     assert np.isfinite(commands).all()
 
 
-def test_where_body_and_rotors_cancel_the_solution_is_finite() -> None:
-    attitude = law(0)
-    r = -attitude._momentum / (0.006 - 0.0034)  # noqa: SLF001
-    rate = attitude.solution(r * attitude.trio.sign).rate
-    assert np.isfinite(rate).all()
-
-
 def test_rotors_that_do_not_turn_in_two_pairs_are_refused() -> None:
     vehicle = with_rotors(direction=("ccw", "ccw", "ccw", "cw"))
     with pytest.raises(ThreeRotorsError, match="two pairs"):

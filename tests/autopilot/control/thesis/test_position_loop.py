@@ -32,16 +32,6 @@ def test_the_thrust_gives_the_acceleration_of_the_poles(error: Vector, speed: Ve
         assert force_n / VEHICLE.body.mass_kg == pytest.approx(wanted, abs=1e-9)
 
 
-@given(vectors(1e6), vectors(1e6), reals(100.0))
-def test_no_error_is_too_large_to_fly(error: Vector, speed: Vector, yaw: float) -> None:
-    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
-    demand = controller.step(AT_REST, speed, error, AT_REST, yaw)
-    assert np.isfinite(demand).all()
-    assert abs(demand.phi) <= np.pi / 2
-    assert abs(demand.theta) <= np.pi / 2
-    assert demand.thrust_n > 0.0
-
-
 SPEED = st.floats(0.0, VEHICLE.rotors.max_speed)
 
 

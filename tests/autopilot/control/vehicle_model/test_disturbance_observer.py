@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
-from colibri.autopilot.control.vehicle_model.disturbance_observer import (
-    MEASURED,
-    Observer,
-    gains,
-    observe,
-)
+from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, Observer, gains, observe
 from colibri.common.jit import packed
 
 INTERVAL_S = 0.008
@@ -32,10 +27,6 @@ def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: 
         estimate = observe(estimate, measured, now, HOVER, 0.0, 0.7, packed(observer))
         measured = now
     return estimate
-
-
-def test_without_a_disturbance_none_is_seen() -> None:
-    assert fly(NO_MOMENT, NO_MOMENT, 2.0)[6:] == pytest.approx(np.zeros(6), abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -50,10 +50,6 @@ def test_the_mass_stays_within_its_bounds() -> None:
     assert followed(3.0 * NOMINAL_KG, 7.0, 60.0) == pytest.approx(SETTINGS.max_ratio * NOMINAL_KG)
 
 
-def test_little_thrust_tells_little() -> None:
-    assert follow_mass(NOMINAL_KG, -UP, UP, 0.0, packed(MODEL)) == pytest.approx(NOMINAL_KG, rel=1e-3)
-
-
 def test_without_a_rate_the_nominal_mass_is_kept() -> None:
     off, disturbance = MODEL._replace(rate_1_s=0.0), np.array([0.0, 0.0, -2.0])
     assert follow_mass(NOMINAL_KG, disturbance, UP, 7.0, packed(off)) == NOMINAL_KG

@@ -4,7 +4,7 @@ from math import exp, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.vehicle_model.rotor_lag import follow, lead, rotor_lag
@@ -25,19 +25,10 @@ def test_rotors_follow_as_the_vehicle_file_says() -> None:
     assert down == pytest.approx(0.3 + 0.5 * exp(-INTERVAL_S / 0.025))
 
 
-@given(st.floats(0.3, 0.95), st.floats(0.25, 0.95))
-def test_force_is_where_the_plan_has_it_after_one_sample(speed: float, commanded: float) -> None:
-    """One linear lag of the squared speed, whatever two lags and a square the rotor really has."""
-    squared = speed**2 + (commanded**2 - speed**2) * (1.0 - exp(-INTERVAL_S / 0.025))
-    commands = lead(four(speed), four(commanded**2), LAG, 1.0)
-    assume(LAG.min_speed < commands[0] < 1.0)
-    assert follow(four(speed), commands, LAG)[0] == pytest.approx(sqrt(squared))
-
-
 @given(st.floats(0.3, 1.0), st.floats(LAG.min_speed, 1.0))
 def test_a_plan_within_the_limits_needs_no_cutting(speed: float, commanded: float) -> None:
     """The plan's lag is the slower one, so that what it asks for within the limits can be had within the limits."""
-    squared = speed**2 + (commanded**2 - speed**2) * LAG.planned
+    squared = speed**2 + (commanded**2 - speed**2) * (1.0 - exp(-INTERVAL_S / 0.025))
     after = follow(four(speed), lead(four(speed), four(commanded**2), LAG, 1.0), LAG)
     assert after[0] == pytest.approx(sqrt(squared))
 

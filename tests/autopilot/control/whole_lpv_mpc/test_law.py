@@ -74,17 +74,6 @@ def test_fallbacks_are_shifted_plan_then_recovery(monkeypatch: pytest.MonkeyPatc
     assert errors[-1] < 0.1
 
 
-def test_its_plan_is_what_it_flies() -> None:
-    flight = Flight(HOVERING._replace(x=0.5))
-    flight.follow("hover:height=20", 0.4)
-    predicted = flight.decisions[-1].diagnostics.predicted
-    assert predicted is not None
-    flight.follow("hover:height=20", 0.08)
-    state = flight.state()
-    assert predicted[11, :3] == pytest.approx(state.position_enu_m, abs=0.01)
-    assert predicted[11, 6:9] == pytest.approx(state.euler, abs=0.1)
-
-
 def test_what_the_battery_gives_bounds_its_commands() -> None:
     flight = Flight(HOVERING._replace(z=2.0))
     flight.memory = flight.law.with_charge(flight.memory, 2.0)

@@ -54,13 +54,6 @@ def test_references_at_a_steady_speed_are_those_of_path_time(speed: float) -> No
     assert yaw == pytest.approx(np.arctan2(v[:, 1], v[:, 0]), abs=1e-6)
 
 
-def test_references_at_a_changing_speed_move_as_they_say() -> None:
-    (p, v, a, _), _, _ = slid(horizon(), speeds_of(SPEEDS))
-    within = slice(8, 19)
-    assert np.abs((p[2:] - p[:-2]) / (2.0 * INTERVAL_S) - v[1:-1])[within].max() < 2e-3
-    assert np.abs((v[2:] - v[:-2]) / (2.0 * INTERVAL_S) - a[1:-1])[within].max() < 5e-3
-
-
 def test_path_speeds_are_carried_over_within_their_bounds() -> None:
     speeds, last = np.empty(SAMPLES), np.linspace(1.0, 0.2, 12)
     path.carry_speeds(last, STARTS, 0.3, 0.9, speeds)

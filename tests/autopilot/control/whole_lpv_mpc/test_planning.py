@@ -51,13 +51,6 @@ def test_bounds_keep_the_commands_within_their_limits(seed: int) -> None:
         assert (held <= limits[:, 1:] + 1e-12).all()
 
 
-def test_the_last_plan_is_carried_over_as_block_means() -> None:
-    last, commands = np.arange(1.0, 5.0)[:, None] * np.ones(ROTORS), np.full((6, ROTORS), 0.5)
-    corrections = np.zeros((4, ROTORS))
-    planning.carry_over(last, commands, STARTS, corrections)
-    assert corrections[:, 0].tolist() == pytest.approx([0.5, 0.5, 2.0, 3.5])
-
-
 def test_a_block_of_extreme_commands_keeps_a_correction() -> None:
     limits = np.tile([0.0, 1.0], (6, 1))
     commands = np.tile(np.array([0.4, 0.6, 0.5, 0.0, 1.0, 1.0])[:, None], ROTORS)

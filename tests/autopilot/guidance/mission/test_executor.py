@@ -230,14 +230,6 @@ def test_setting_the_current_item() -> None:
     assert flight.mission.progress == (3, PAUSED, 2)
 
 
-def test_no_mission() -> None:
-    empty = MissionExecutor()
-    assert empty.progress == (0, NO_MISSION, 2)
-    assert empty.start() is not None
-    assert empty.set_current(0) is not None
-    assert empty.pause() == ()
-
-
 def test_a_mission_that_is_replaced_in_flight() -> None:
     flight = begun(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
     flight.fly(1.0)

@@ -50,15 +50,3 @@ def test_derivatives_are_continuous_up_to_twice_the_order(order: int) -> None:
         assert before == pytest.approx(after, abs=1e-7 * (1.0 + np.abs(after).max()))
     before, after = (derivatives(curve, t, 2 * order - 1) for t in (inner - 1e-12, inner))
     assert np.abs(before - after).max() > 1.0, "the next one jumps"
-
-
-def test_rest_to_rest_is_the_known_polynomial() -> None:
-    curve = minimise(SNAP, np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))
-    assert curve.coefficients[0, :, 0] == pytest.approx([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])
-
-
-def test_many_points() -> None:
-    rng = np.random.default_rng(1)
-    points, times_s = rng.normal(size=(5_000, 3)), np.cumsum(rng.uniform(0.05, 0.7, size=5_000))
-    curve = minimise(SNAP, times_s, points)
-    assert derivatives(curve, times_s, 0) == pytest.approx(points, abs=1e-9)

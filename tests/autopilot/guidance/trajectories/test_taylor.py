@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2
 from colibri.common.types import Array
 from tests.support.strategies import reals
 
@@ -32,14 +32,3 @@ def test_the_direction_of_a_line_is_the_arc_tangent(t: float) -> None:
 def test_nothing_has_no_direction() -> None:
     nothing = 0.0 * at(1.0)
     assert not derivatives(atan2(nothing, nothing)).any()
-
-
-@given(reals(10.0))
-def test_rate_is_the_derivative(t: float) -> None:
-    assert derivatives(sin(at(t)).rate()) == pytest.approx(derivatives(cos(at(t)))[:-1], abs=1e-12)
-
-
-def test_constants_of_their_own_at_each_time() -> None:
-    x = TaylorSeries.time(np.array([1.0, 2.0]), 1) * np.array([3.0, 4.0]) - np.array([1.0, 2.0])
-    assert x.derivative(0) == pytest.approx([2.0, 6.0])
-    assert x.derivative(1) == pytest.approx([3.0, 4.0])
