@@ -109,6 +109,11 @@ def test_each_parameter_of_the_vehicle_changes_its_own_number() -> None:
         assert read(after, number.path) == pytest.approx(0.9 * before + 1e-3 * number.scale, rel=1e-6)
 
 
+def test_units_of_the_vehicle() -> None:
+    units = {parameter.name: parameter.unit for parameter in parameters_of(vehicle=load_vehicle("hummingbird-thesis"))}
+    assert (units["VEH_CT"], units["VEH_ROT_MAX"]) == ("uN/rpm^2", "rpm")
+
+
 def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
     big = msgspec.structs.replace(
         HUMMINGBIRD,
