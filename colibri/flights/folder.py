@@ -1,6 +1,6 @@
 """The folder of a flight: its files and its lock."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -16,12 +16,7 @@ FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "roto
 
 def prepare(out: Path) -> None:
     """Make the folder of a flight and delete the files of an earlier one."""
-    make_folder(out)
-    try:
-        for name in (*LOGS, *FIGURES):
-            (out / name).unlink(missing_ok=True)
-    except OSError as error:
-        fail(f"cannot write to --out {out}: {error.strerror}")
+    make_folder(out, without=(*LOGS, *FIGURES))
 
 
 @contextmanager
@@ -36,10 +31,12 @@ def occupied(out: Path) -> Iterator[None]:
         yield
 
 
-def make_folder(out: Path) -> None:
+def make_folder(out: Path, *, without: Iterable[str] = ()) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):
             pass
+        for name in without:
+            (out / name).unlink(missing_ok=True)
     except OSError as error:
         fail(f"cannot write to --out {out}: {error.strerror}")

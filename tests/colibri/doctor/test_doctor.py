@@ -106,7 +106,7 @@ def test_the_way_out_of_a_container_is_the_default_gateway(tmp_path: Path, monke
 
 
 def test_a_folder_for_machine_code_that_is_none_is_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(MachineCode, "cache_path", None)
+    monkeypatch.setattr(MachineCode, "cache_path", None, raising=False)
     found = flying.machine_code()
     assert (found.verdict, found.advice) == (Verdict.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
 
