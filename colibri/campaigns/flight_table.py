@@ -112,7 +112,7 @@ class FlightTable:
         return headings, rows
 
     def through(self, places: Sequence[int]) -> list[int]:
-        """Return the flights that were not lost."""
+        """Return the flights with verdict `flown`."""
         return [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
 
     def lost(self, places: Sequence[int]) -> tuple[int, int, int]:

@@ -126,12 +126,12 @@ class FlightPlan:
 
     @property
     def vehicle_name(self) -> str:
-        """Its name or file."""
+        """Name or file of the autopilot's vehicle."""
         return _names(self.spec, self.profile)[0]
 
     @property
     def plant_vehicle_name(self) -> str:
-        """Its name or file."""
+        """Name or file of the plant's vehicle."""
         return _names(self.spec, self.profile)[1]
 
     @property
