@@ -18,6 +18,7 @@ class Supervision:
         self._parts, self._guard = parts, parts.defence.guard
         self._missed_us: int | None = None
         self._listening_us = NEVER_US
+        self._doubts = False
 
     def listen(self, now_us: int) -> None:
         """Count the loss of clients from `now_us` on: the restart."""
@@ -35,7 +36,8 @@ class Supervision:
         steered, position_known = guard(table.SETPOINTS, self._sensed, _not_steered, now_us)
         delay_us = 0 if table.DELAY in parts.defence.off else parts.delay.delay_us
         waited_us, path_speed = parts.loop.take_waited_us(), parts.loop.path_speed
-        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed))
+        lift = parts.rotor_loss.watch.expected[0] / parts.loop.vehicle.gravity_m_s2 if self._doubts else None
+        parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift))
         guard(table.FAILSAFES, self._execute, _nothing, now_us, state)
         self._missed_us = None
 
@@ -57,11 +59,15 @@ class Supervision:
         if not pilot.state.armed:
             rotor_loss.end()
         feels = estimate is None or (estimate.health.gyroscope and estimate.health.accelerometer)
+        if estimate is not None and (estimate.health.any_lost or self._doubts):
+            self._doubts = pilot.state.armed
         airborne = feels and pilot.state.armed and not pilot.ground.standing
         sent, charge_ah = parts.actuation.sent, parts.battery.charge_ah
         if rotor_loss.look(state, sent, charge_ah, airborne=airborne, ground_m=pilot.ground.height_m):
             assert rotor_loss.lost is not None, "what is lost has a number"
             pilot.readiness.lose_rotor(rotor_loss.lost)
+        if not feels:
+            parts.state_source.help_inertial(rotor_loss.watch.expected, armed=pilot.state.armed)
 
     def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
         """Return the inputs of the failsafes' conditions."""

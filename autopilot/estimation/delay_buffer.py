@@ -5,11 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.estimation.eskf_predict import SAMPLE
+from colibri.autopilot.estimation.eskf_predict import BLIND_FORCE, BLIND_RATE, FORCE, RATE, SAMPLE
 from colibri.autopilot.estimation.measurements.instrument import Value
 from colibri.autopilot.estimation.sensing.inertial import Reading, sample_between
-from colibri.common.types import Array
+from colibri.common.jit import compiled
+from colibri.common.types import Array, Vector
 
+_FEWEST = 6
+"""Samples that show noise."""
 _BRIDGED_S = 0.1
 """Longer gaps between frames are crossed without the measurements at their ends."""
 
@@ -31,7 +34,7 @@ class DelayBuffer:
 
     def put(self, before: Reading, after: Reading, interval_s: float, measured: Waiting) -> None:
         if interval_s > _BRIDGED_S:
-            before = before._replace(force_good=False, rate_good=False)
+            before = before._replace(force_good=False, rate_good=False, force_modelled=False, rate_modelled=False)
         last = (self.first + len(self.waiting)) % len(self.samples)
         self.samples[last] = sample_between(before, after, interval_s)
         self.waiting.append(measured)
@@ -39,3 +42,34 @@ class DelayBuffer:
     def take(self) -> Waiting:
         self.first = (self.first + 1) % len(self.samples)
         return self.waiting.popleft()
+
+    def mean_rate(self) -> Vector:
+        rows = np.arange(self.first, self.first + len(self.waiting)) % len(self.samples)
+        p, q, r = np.mean(self.samples[rows, RATE : RATE + 3], axis=0).tolist()
+        return p, q, r
+
+
+@compiled
+def roughness(samples: Array, first: int, count: int, force: float, rate: float) -> tuple[float, float]:
+    """Return the parts of `count` samples whose second differences exceed those of `force` and `rate`.
+
+    White noise exceeds them all the time; a knock, even with the standard deviation of noise, does so seldom.
+    """
+    n, found, rough = len(samples), 0, [0, 0]
+    for k in range(2, count):
+        a, b, c = (first + k - 2) % n, (first + k - 1) % n, (first + k) % n
+        blind = 0.0
+        for row in (a, b, c):
+            blind += samples[row, BLIND_FORCE] + samples[row, BLIND_RATE]
+        if blind > 0.0:
+            continue
+        found += 1
+        for sensor, column, limit in ((0, FORCE, force), (1, RATE, rate)):
+            most = 0.0
+            for i in range(column, column + 3):
+                most = max(most, abs(samples[a, i] - 2.0 * samples[b, i] + samples[c, i]))
+            if most > limit:
+                rough[sensor] += 1
+    if found < _FEWEST:
+        return 0.0, 0.0
+    return rough[0] / found, rough[1] / found

@@ -59,6 +59,10 @@ _UNSURE_TURN = 2.0
 """The attitude error may exceed the turn of the field, which does not show a turn about itself."""
 _UNSURE_S = 0.5
 """Mean duration of the velocity error."""
+_MODELLED_M_S2, _MODELLED_RAD_S = 2.0, 0.2
+"""Errors of a modelled force, by drag in wind and a wrong mass, and of the rate at first."""
+_MISTURNED_RAD = 0.05
+"""Error of the attitude by a gyroscope up to the detection of its failure."""
 _PATIENCE_US = 7_000_000
 _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
@@ -215,6 +219,21 @@ class Filter:
         update.inflate_covariance(P, ACCEL_BIAS, 3, _UNSURE_TIMES * found.variance)
         self.velocity.reset(time_us)
         self.accel_bias_us = time_us
+
+    def replace_force(self, *, modelled: bool) -> None:
+        """Forget the bias of the accelerometer for that of the model, or the reverse."""
+        self._forget_bias(ACCEL_BIAS, _MODELLED_M_S2 if modelled else self._sensors.accelerometer.turn_on_bias_m_s2)
+
+    def replace_rate(self, *, modelled: bool) -> None:
+        """Forget the bias of the gyroscope for that of the model, or the reverse."""
+        self._forget_bias(GYRO_BIAS, _MODELLED_RAD_S if modelled else self._sensors.gyroscope.turn_on_bias_rad_s)
+        if modelled:
+            update.inflate_covariance(self.P, ATTITUDE, 3, square(_MISTURNED_RAD))
+
+    def _forget_bias(self, first: int, sigma: float) -> None:
+        self.x[first + 1 : first + 4] = 0.0
+        self.P[first : first + 3, :] = self.P[:, first : first + 3] = 0.0
+        update.inflate_covariance(self.P, first, 3, square(max(sigma, _MIN_NOISE)))
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
         """Inflate the covariance after a gyroscope fault that turned the field by `turned_rad` in `since_s`."""

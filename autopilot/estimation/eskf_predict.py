@@ -23,12 +23,17 @@ NOMINAL = 23
 INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
 SAMPLE = 9
 """Columns of a sample: duration, s; mean specific force and rate; 1.0 where either is unknown, with velocity or
-attitude then assumed constant."""
+attitude then assumed constant; 2.0 where the model of the rotors has replaced it."""
+UNKNOWN, MODELLED = 1.0, 2.0
 
 _BLIND_FORCE_DENSITY = 3.0**2
 """(m/s²)²/Hz: 3 m/s after a second without an accelerometer."""
 _BLIND_RATE_DENSITY = 0.5**2
 """(rad/s)²/Hz."""
+_MODELLED_FORCE_DENSITY, _MODELLED_FORCE_WALK = 0.3**2, 0.5**2
+"""(m/s²)²/Hz and (m/s³)²/Hz: the bias of a modelled force is drag, and the ground's."""
+_MODELLED_RATE_DENSITY, _MODELLED_RATE_WALK = 0.03**2, 0.3**2
+"""(rad/s)²/Hz and (rad/s²)²/Hz: the bias of a modelled rate is the sum of unknown moments."""
 _SMALL_TURN = 0.05
 """Half turn, rad, below which the series of sine and cosine are exact to the last bits."""
 _MAX_POSITION_VARIANCE, _MAX_VELOCITY_VARIANCE, _MAX_ATTITUDE_VARIANCE = 1e6, 1e4, 1.0
@@ -63,14 +68,14 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
     """
     dt = samples[row, INTERVAL]
     a, b, c = 0.0, 0.0, 0.0
-    if samples[row, BLIND_RATE] == 0.0:
+    if samples[row, BLIND_RATE] != UNKNOWN:
         a = (samples[row, RATE] - x[10]) * dt
         b = (samples[row, RATE + 1] - x[11]) * dt
         c = (samples[row, RATE + 2] - x[12]) * dt
     q = (x[6], x[7], x[8], x[9])
     R = _matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
     fx, fy, fz = R[6] * gravity, R[7] * gravity, R[8] * gravity
-    if samples[row, BLIND_FORCE] == 0.0:
+    if samples[row, BLIND_FORCE] != UNKNOWN:
         fx = samples[row, FORCE] - x[13]
         fy = samples[row, FORCE + 1] - x[14]
         fz = samples[row, FORCE + 2] - x[15]
@@ -93,7 +98,7 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravity: float) -> None:
     """Advance state and covariance in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
     noise, dt = packed[0], samples[row, INTERVAL]
-    sees_force, sees_rate = samples[row, BLIND_FORCE] == 0.0, samples[row, BLIND_RATE] == 0.0
+    sees_force, sees_rate = samples[row, BLIND_FORCE] != UNKNOWN, samples[row, BLIND_RATE] != UNKNOWN
     R, force, turn = strap_down(x, samples, row, gravity)
     decay = exp(-dt / noise.gps_drift_time_s)
     F = np.zeros((9, 3))
@@ -111,13 +116,19 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
     _carry(P, push, lever, back, half_s, decay, dt)
     _carry(P.T, push, lever, back, half_s, decay, dt)
     force_noise = noise.force if sees_force else _BLIND_FORCE_DENSITY
+    force_walk = noise.accel_bias
+    if samples[row, BLIND_FORCE] == MODELLED:
+        force_noise, force_walk = _MODELLED_FORCE_DENSITY, _MODELLED_FORCE_WALK
     rate_noise = noise.rate if sees_rate else _BLIND_RATE_DENSITY
+    rate_walk = noise.gyro_bias
+    if samples[row, BLIND_RATE] == MODELLED:
+        rate_noise, rate_walk = _MODELLED_RATE_DENSITY, _MODELLED_RATE_WALK
     for i in range(3):
         x[16 + i] *= decay
         P[VELOCITY + i, VELOCITY + i] += force_noise * dt
         P[ATTITUDE + i, ATTITUDE + i] += rate_noise * dt
-        P[GYRO_BIAS + i, GYRO_BIAS + i] += noise.gyro_bias * dt
-        P[ACCEL_BIAS + i, ACCEL_BIAS + i] += noise.accel_bias * dt
+        P[GYRO_BIAS + i, GYRO_BIAS + i] += rate_walk * dt
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] += force_walk * dt
         P[GPS_DRIFT + i, GPS_DRIFT + i] += noise.gps_drift[i] * (1.0 - decay * decay)
         P[HARD_IRON + i, HARD_IRON + i] += noise.hard_iron * dt
     P[BARO_OFFSET, BARO_OFFSET] += noise.baro_offset * dt

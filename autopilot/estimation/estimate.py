@@ -58,6 +58,13 @@ class Health(NamedTuple):
     not_accepted: tuple[str, ...]
 
     @property
+    def any_lost(self) -> bool:
+        """Whether a sensor has failed."""
+        return (
+            not (self.accelerometer and self.gyroscope) or bool(self.not_accepted) or self.gps_lost_since_us is not None
+        )
+
+    @property
     def flags(self) -> int:
         """ESTIMATOR_STATUS_FLAGS."""
         return _flags(self)

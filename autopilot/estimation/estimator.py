@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
-from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
+from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting, roughness
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
 from colibri.autopilot.estimation.eskf_predict import look_ahead
 from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
@@ -17,7 +17,7 @@ from colibri.autopilot.estimation.measurements.instrument import Instrument, Val
 from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
-from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading
+from colibri.autopilot.estimation.sensing.inertial import Expected, Inertial, Reading
 from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.atmosphere import altitude_m
@@ -43,6 +43,13 @@ _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes, because frames with a fix have enough work."""
+_ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25
+"""White noise of a sensor that has failed."""
+_MIN_BIAS_M_S2 = 0.3
+_ROUGH_CHECKS, _ROUGH_PART = 3, 0.6
+"""In a row, because a knock is rough for one."""
+_BOTH_REJECTED_US = 300_000
+"""GPS velocity and barometer contradict the same way for so long: the accelerometer is their one common cause."""
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
@@ -104,6 +111,8 @@ class Estimator:
         self._estimate: Estimate | None = None
         self._tests: Tests | None = None
         self._resets = 0
+        self._rough = [0, 0]
+        self._biased, self._bias_m_s2 = False, 0.0
 
     @property
     def last(self) -> Estimate | None:
@@ -152,6 +161,8 @@ class Estimator:
         self._clock_resets.clear()
         self._time_us = frame.time_us
         before, self._reading = self._reading, self._inertial.read(frame)
+        if self._reading[4:] != before[4:] and self._estimate is not None:
+            self._replace(before)
         rejected = self._rejected
         reads = frame.updated & self._groups or self._reads_messages
         values = [read(frame, rejected) for read in self._reads] if reads else None
@@ -278,11 +289,15 @@ class Estimator:
         if reason is not None:
             self._rejected.add(Source.GPS, reason)
         self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        modelled = self._reading
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
-        if found is not None:
+        if found is not None and not (modelled.force_modelled or modelled.rate_modelled):
             self.filter.reset_accel_bias(found, now_us)
+            size = float(np.abs(self.filter.x[13:16]).max())
+            self._inertial.accelerometer.failed |= self._biased and size > 1.2 * self._bias_m_s2
+            self._biased, self._bias_m_s2 = size > _MIN_BIAS_M_S2, size
         turned = turned_since(self.filter, now_us)
-        if turned is not None:
+        if turned is not None and not modelled.rate_modelled:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
@@ -301,7 +316,8 @@ class Estimator:
         self._published_us = now_us
         self._output_smoothing.give_in(since_us * 1e-6)
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
-        p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
+        reading = self._reading
+        p, q, r = reading.rate if reading.rate_good or reading.rate_modelled else (bx, by, bz)
         tests = self._note_tests()
         self._estimate = Estimate(
             StateFrame(
@@ -334,7 +350,42 @@ class Estimator:
         at_us = now_us - _CHECK_AT_US
         if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
+        self._check_inertial(now_us)
         return self.filter.check(self.filter_us)
+
+    def _replace(self, before: Reading) -> None:
+        *_, force_modelled, rate_modelled = self._reading
+        if force_modelled != before.force_modelled:
+            self.filter.replace_force(modelled=force_modelled)
+        if rate_modelled != before.rate_modelled:
+            self.filter.replace_rate(modelled=rate_modelled)
+
+    def _check_inertial(self, now_us: int) -> None:
+        """Mark an inertial sensor as failed after long noise, or contradiction by two others."""
+        buffer, rough, inertial = self._buffer, self._rough, self._inertial
+        parts = roughness(buffer.samples, buffer.first, len(buffer.waiting), _ROUGH_M_S2, _ROUGH_RAD_S)
+        for sensor, part in enumerate(parts):
+            rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
+        inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS
+        if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
+            inertial.gyroscope.failed = inertial.gyroscope.noisy = True
+            inertial.gyroscope.value = buffer.mean_rate()
+        velocity, pressure = self.filter.velocity, self.filter.barometer.kind
+        known = self._reading.rate_good
+        if known and velocity.rejected_us is not None and pressure.rejected_us is not None:
+            both_us = now_us - max(velocity.rejected_us, pressure.rejected_us)
+            alike = velocity.test.innovation[2] * pressure.test.innovation[0] > 0.0
+            inertial.accelerometer.failed |= alike and both_us > _BOTH_REJECTED_US
+
+    def expect(self, expected: Expected | None) -> None:
+        """Set the motion that the rotors cause, for inertial sensors that have failed."""
+        self._inertial.expected = expected
+
+    def trust_inertial(self) -> None:
+        """Use inertial sensors again that have failed."""
+        for axes in (self._inertial.accelerometer, self._inertial.gyroscope):
+            axes.failed = axes.noisy = False
+        self._biased = False
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading
@@ -344,7 +395,7 @@ class Estimator:
         late_us = self.filter_us - _LATE_US
         not_accepted = [one.source for one in filter_.instruments if one.kind.accepted_us < late_us]
         return Health(
-            reading.rate_good and sigma[6] <= _KNOWN_TILT_RAD and sigma[7] <= _KNOWN_TILT_RAD,
+            (reading.rate_good or reading.rate_modelled) and max(sigma[6:8]) <= _KNOWN_TILT_RAD,
             sigma[8] <= _KNOWN_YAW_RAD,
             sigma[3] <= _KNOWN_M_S and sigma[4] <= _KNOWN_M_S,
             sigma[5] <= _KNOWN_M_S,
@@ -371,3 +422,4 @@ class Estimator:
         self._take(self._interval_us)
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)
+        self._check_inertial(self._interval_us)

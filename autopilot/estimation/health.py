@@ -8,6 +8,7 @@ from typing import NamedTuple
 from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.measurements.instrument import Ratio
 from colibri.autopilot.estimation.measurements.table import RATIOS, ROWS
+from colibri.autopilot.estimation.sensing.rejection import Source
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import EstimatorState
 from colibri.mavlink.wire.dialect import mav
@@ -26,17 +27,17 @@ def _is_valid(source: str, health: Health) -> bool:
 
 
 _MATTERS = (
-    _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
     _Matter(lambda health: health.accel_bias, "accelerometer off: bias reset", "accelerometer accepted again"),
-    _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
     _Matter(lambda health: health.gyro_bias, "gyroscope off: bias reset", "gyroscope accepted again"),
     *(
         _Matter(partial(_is_valid, row.source), f"{row.source} not accepted", f"{row.source} accepted again")
         for row in ROWS
+        if row.source not in tuple(Source)  # the others have failsafes
     ),
 )
 
 _UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
+    (lambda health: health.gyroscope and health.accelerometer, "inertial sensors failed"),
     (lambda health: health.attitude, "attitude not known"),
     (lambda health: health.heading, "heading not known"),
     (lambda health: health.horizontal_velocity and health.vertical_velocity, "velocity not known"),

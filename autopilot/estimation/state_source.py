@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.sensing.inertial import Expected
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import OWN_MESSAGES, FixType, Frame, GpsFix, SensorFrame
@@ -106,6 +107,13 @@ class StateSource:
     def settle(self) -> None:
         if self._estimating is not None:
             self._estimating.settle()
+
+    def help_inertial(self, expected: Expected, *, armed: bool) -> None:
+        """Replace failed inertial sensors by the model of the rotors; at rest, try them again."""
+        if self._estimating is not None:
+            self._estimating.expect(expected if armed else None)
+            if not armed:
+                self._estimating.trust_inertial()
 
     def has_gps(self, now_us: int) -> bool:
         """Whether there is a recent 3D fix; always with state feedback."""

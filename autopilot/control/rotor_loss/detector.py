@@ -18,7 +18,7 @@ from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, 
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, opened, packed
-from colibri.common.matrices import put
+from colibri.common.matrices import matvec, put
 from colibri.common.types import Array, FourRotors, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
@@ -102,10 +102,19 @@ class RotorWatch:
     def speeds(self, speeds: Array) -> None:
         self._kept.speeds[:] = speeds
 
+    @property
+    def expected(self) -> tuple[float, float, float, float]:
+        """Specific force along z, m/s², and angular acceleration, rad/s², FLU, by the model of the rotors."""
+        force, p, q, r = (matvec(self._accelerations, self._kept.speeds**2)).tolist()
+        return force, p, q, r
+
     def adopt(self, vehicle: Vehicle) -> None:
         self._battery = BatteryModel(vehicle)
         lag = rotor_lag(vehicle, self._interval_s)
-        self._numbers = packed(Numbers(signature_of(vehicle), lag, self._interval_s))
+        signature = signature_of(vehicle)
+        inertia = np.array([signature.mass_kg, *signature.inertia])
+        self._accelerations = signature.effect * signature.full_thrust_n / inertia[:, None]
+        self._numbers = packed(Numbers(signature, lag, self._interval_s))
 
     def begin(self, controls: FourRotors) -> None:
         kept = self._kept

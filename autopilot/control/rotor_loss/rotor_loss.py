@@ -94,9 +94,10 @@ class RotorLoss:
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float
     ) -> bool:
         """Process a control sample; return whether a loss was detected in it."""
-        if not self.enabled or self.impossible or self.watch.lost is not None:
+        if self.watch.lost is not None:
             return False
-        clear = airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
+        watches = self.enabled and not self.impossible
+        clear = watches and airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
         lost = self.watch.step(state, controls, charge_ah, airborne=clear)
         if lost is None:
             return False

@@ -1,14 +1,17 @@
 """Inertial samples from frames."""
 
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
+from colibri.autopilot.estimation.eskf_predict import MODELLED, UNKNOWN
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Rejected, Source
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
 
+Expected: TypeAlias = tuple[float, float, float, float]
+"""Specific force along z, m/s², and angular acceleration, rad/s², FLU, by the model of the rotors."""
 Sample = tuple[float, ...]
 """Columns of `eskf_predict.SAMPLE`."""
 
@@ -17,10 +20,15 @@ _BEYOND_RANGE = 1.01
 _PATIENCE_US = 100_000
 _BRIDGED_US = 20_000
 """Validity of the last good value when values are missing."""
+_NOISY_1_S = 10.0
+"""Bandwidth at which the model follows a noisy gyroscope."""
+_MAX_STEP_S = 0.02
+_FAILED_US = 100_000
+"""A sensor without values for so long has failed: those that come later may be late."""
 
 
-class _Axes:
-    """One of the two sensors."""
+class Axes:
+    """One of the two sensors; one that has `failed`, or is `noisy` beside, stays so until it is trusted again."""
 
     def __init__(self, source: Source, group: int, maximum: float, noise: float) -> None:
         self._group = group
@@ -28,38 +36,64 @@ class _Axes:
         self._watch = Watch(source, -maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
         self._time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
+        self.failed = self.noisy = False
 
     def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
         if frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected):
             self.value, self._time_us = value, frame.time_us
-            return True
-        return self._time_us is not None and frame.time_us - self._time_us <= _BRIDGED_US
+            return not self.failed
+        if self._time_us is None:
+            return False
+        late_us = frame.time_us - self._time_us
+        self.failed = self.failed or late_us > _FAILED_US
+        return late_us <= _BRIDGED_US and not self.failed
 
 
 class Reading(NamedTuple):
-    """Inertial values, m/s² and rad/s, FLU, and whether each is usable."""
+    """Inertial values, m/s² and rad/s, FLU, whether each is usable, and whether it is modelled."""
 
     force: Vector
     rate: Vector
     force_good: bool
     rate_good: bool
+    force_modelled: bool = False
+    rate_modelled: bool = False
 
 
 class Inertial:
-    """Reads both sensors."""
+    """Reads both sensors; `expected` by the rotors takes the place of one that has failed."""
 
     def __init__(self, sensors: Sensors, rejected: Rejected) -> None:
         accel, gyro = sensors.accelerometer, sensors.gyroscope
         self._rejected = rejected
-        self._force = _Axes(
+        self.expected: Expected | None = None
+        self._turns: tuple[int, Vector] | None = None
+        self.accelerometer = Axes(
             Source.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2, accel.noise_density_m_s2_rthz
         )
-        self._rate = _Axes(Source.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz)
+        self.gyroscope = Axes(Source.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz)
 
     def read(self, frame: SensorFrame) -> Reading:
-        force_good = self._force.read(frame, frame.specific_force_flu_m_s2, self._rejected)
-        rate_good = self._rate.read(frame, frame.rate_flu_rad_s, self._rejected)
-        return Reading(self._force.value, self._rate.value, force_good, rate_good)
+        force_good = self.accelerometer.read(frame, frame.specific_force_flu_m_s2, self._rejected)
+        rate_good = self.gyroscope.read(frame, frame.rate_flu_rad_s, self._rejected)
+        reading = Reading(self.accelerometer.value, self.gyroscope.value, force_good, rate_good)
+        if (force_good and rate_good) or self.expected is None:
+            self._turns = None
+            return reading
+        thrust_m_s2, *turn = self.expected
+        if not force_good:
+            reading = reading._replace(force=(0.0, 0.0, thrust_m_s2), force_modelled=True)
+        if not rate_good:
+            before_us, (p, q, r) = self._turns or (frame.time_us, reading.rate)
+            dt = min((frame.time_us - before_us) * 1e-6, _MAX_STEP_S)
+            rate = (p + turn[0] * dt, q + turn[1] * dt, r + turn[2] * dt)
+            if self.gyroscope.noisy:
+                part = min(_NOISY_1_S * dt, 1.0)
+                p, q, r = (old + part * (new - old) for old, new in zip(rate, self.gyroscope.value, strict=True))
+                rate = (p, q, r)
+            self._turns = frame.time_us, rate
+            reading = reading._replace(rate=rate, rate_modelled=True)
+        return reading
 
 
 def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
@@ -74,6 +108,10 @@ def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
         0.5 * (ap + bp),
         0.5 * (aq + bq),
         0.5 * (ar + br),
-        0.0 if before.force_good and now.force_good else 1.0,
-        0.0 if before.rate_good and now.rate_good else 1.0,
+        0.0 if before.force_good and now.force_good else _blind(before.force_modelled and now.force_modelled),
+        0.0 if before.rate_good and now.rate_good else _blind(before.rate_modelled and now.rate_modelled),
     )
+
+
+def _blind(modelled: bool) -> float:
+    return MODELLED if modelled else UNKNOWN

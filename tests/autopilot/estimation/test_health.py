@@ -2,7 +2,6 @@
 
 from colibri.autopilot.estimation.estimate import Health
 from colibri.autopilot.estimation.health import HealthWatch, not_known
-from colibri.autopilot.estimation.sensing.rejection import Source
 from colibri.mavlink.services.statustext import INFO, WARNING
 
 WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, ())
@@ -14,13 +13,11 @@ def test_nothing_is_said_while_all_is_well() -> None:
 
 def test_each_change_is_said_once() -> None:
     watch = HealthWatch()
-    lost = WELL._replace(not_accepted=(Source.MAGNETOMETER,))
-    assert watch.lines(lost) == [(WARNING, "magnetometer not accepted")]
+    lost = WELL._replace(not_accepted=("rangefinder",))
+    assert watch.lines(lost) == [(WARNING, "rangefinder not accepted")]
     assert watch.lines(lost) == []
-    assert watch.lines(lost._replace(not_accepted=(Source.MAGNETOMETER, Source.BAROMETER))) == [
-        (WARNING, "barometer not accepted")
-    ]
-    assert watch.lines(WELL) == [(INFO, "magnetometer accepted again"), (INFO, "barometer accepted again")]
+    assert watch.lines(lost._replace(accel_bias=False)) == [(WARNING, "accelerometer off: bias reset")]
+    assert watch.lines(WELL) == [(INFO, "accelerometer accepted again"), (INFO, "rangefinder accepted again")]
 
 
 def test_what_is_not_known_is_named() -> None:
