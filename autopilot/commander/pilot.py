@@ -51,6 +51,7 @@ class Sensed(NamedTuple):
     Attributes:
         waited_us: Path time lost since the previous sample.
         path_speed: Rate of path time relative to the clock.
+        lift: Modelled thrust in parts of weight, where a sensor has failed in this flight.
     """
 
     now_us: int = 0
@@ -60,6 +61,7 @@ class Sensed(NamedTuple):
     delay_us: int = 0
     waited_us: int = 0
     path_speed: float = 1.0
+    lift: float | None = None
 
 
 class PilotRecord(NamedTuple):
@@ -259,7 +261,7 @@ class Pilot:
     def touch_down(self) -> None:
         """Register a landing reported by another detector, and stop the rotors."""
         self.ground.land(self.sensed.now_us)
-        self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
+        self._stop_rotors(Event.TOUCHED_DOWN, f"{self._end(Event.TOUCHED_DOWN)}, rotors stopped")
 
     def step(self) -> Guidance:
         if not self.state.armed:
@@ -273,6 +275,8 @@ class Pilot:
                 return self._idle()
             self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
+        if self.sensed.lift is not None and self._comes_down:
+            self.ground.watch_lift(self.sensed.now_us, self.sensed.lift, self.generator.interval_s)
         ended = _ENDS.get(self.state.mode)
         if ended is not None and self.task.arrived(context):
             self.happened(ended)
@@ -290,6 +294,10 @@ class Pilot:
         self.ground.watch(now_us, vehicle, sinks=is_below(context.reference.height_m, vehicle))
         return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
 
+    @property
+    def _comes_down(self) -> bool:
+        return self.state.mode is Mode.LAND or is_below(self.context().reference.height_m, self.context().state)
+
     def _rest(self) -> Guidance:
         now_us, vehicle, *_ = self.sensed
         assert vehicle is not None, "the vehicle has been seen"
@@ -301,8 +309,11 @@ class Pilot:
         self._rest()
         event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
         if event is not None:
-            self._stop_rotors(event, f"{event}, rotors stopped")
+            self._stop_rotors(event, f"{self._end(event)}, rotors stopped")
         return RESTS
+
+    def _end(self, event: Event) -> str:
+        return "impact" if event is Event.TOUCHED_DOWN and self.ground.impact else str(event)
 
     def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
         refusal = self._follow(event, text)

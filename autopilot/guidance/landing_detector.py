@@ -1,8 +1,10 @@
 """Landing detection: still while the reference sinks."""
 
+from math import degrees, sqrt
 from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
+from colibri.common.elementary import acos
 
 _BELOW_M = 0.15
 _STILL_M_S = 0.15
@@ -12,7 +14,17 @@ _DRIFTING_FOR_US = 600_000
 CARRIED = 0.5
 """Thrust relative to weight below which a vehicle of unknown velocity falls or stands."""
 
+_MODEL_ERROR, _UNCARRIED_S = 0.2, 0.5
+"""Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 5 m/s faster."""
+SUSPECTED_S = 0.1
+"""Lack of lift from which on a failed sensor may take the ground for a motion."""
+
 _CLEAR_M = 0.3
+
+_HARD_M_S, _HARD_UP = 3.0, 0.5
+"""Speed, and cosine of the tilt, beyond which a contact is an impact."""
+HARD_WITHIN_US = 4_000_000
+"""A landing is detected at most so long after its contact."""
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
@@ -48,6 +60,42 @@ def watch(
     if landing.since_us is None or not still:
         return (Landing(now_us, climb_m_s) if still or drifts else _MOVES), False
     return landing, now_us - landing.since_us >= for_us
+
+
+def uncarried_s(before_s: float, lift: float, interval_s: float) -> float:
+    """Add a sample to the lack of lift (CUSUM), in seconds of weight; `lift` is the rotors', in parts of weight."""
+    return max(before_s + (1.0 - _MODEL_ERROR - lift) * interval_s, 0.0)
+
+
+def is_carried(lack_s: float) -> bool:
+    """Whether the ground carries the vehicle, which has lacked lift for long and yet comes down on purpose."""
+    return lack_s >= _UNCARRIED_S
+
+
+class Hardest(NamedTuple):
+    """The last motion too hard to land with."""
+
+    time_us: int = -HARD_WITHIN_US
+    speed_m_s: float = 0.0
+    up: float = 1.0
+
+    def after(self, now_us: int, state: VehicleState) -> "Hardest":
+        vx, vy, vz = state.velocity_enu_m_s
+        _, x, y, _ = state.attitude
+        squared, up = vx * vx + vy * vy + vz * vz, 1.0 - 2.0 * (x * x + y * y)
+        if squared <= _HARD_M_S * _HARD_M_S and up >= _HARD_UP:
+            return self
+        old = Hardest() if now_us - self.time_us > HARD_WITHIN_US else self
+        return Hardest(now_us, max(sqrt(squared), old.speed_m_s), min(up, old.up))
+
+    def impact(self, now_us: int) -> str:
+        """Return the impact of a contact with the ground as text; empty for a landing."""
+        if now_us - self.time_us > HARD_WITHIN_US:
+            return ""
+        tilt_deg = degrees(acos(max(self.up, -1.0)))
+        return f"impact at {self.speed_m_s:.1f} m/s" + (
+            f", tilted {tilt_deg:.0f} degrees" if self.up < _HARD_UP else ""
+        )
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:

@@ -6,8 +6,16 @@ from colibri.autopilot.commander.rules.modes import Event
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.landing_detector import Landing, is_clear, watch
-from colibri.mavlink.services.statustext import INFO, NOTICE
+from colibri.autopilot.guidance.landing_detector import (
+    SUSPECTED_S,
+    Hardest,
+    Landing,
+    is_carried,
+    is_clear,
+    uncarried_s,
+    watch,
+)
+from colibri.mavlink.services.statustext import CRITICAL, INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
@@ -29,11 +37,18 @@ class GroundRecord(NamedTuple):
 
 
 class GroundContact:
-    """Ground contact of one vehicle; `height_m` is z of ENU at the last standing position."""
+    """Ground contact of one vehicle.
+
+    Attributes:
+        height_m: z of ENU at the last standing position.
+        impact: The last contact as text; empty for a landing.
+    """
 
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self._landing = Landing()
+        self._lack_s, self._hardest = 0.0, Hardest()
+        self.impact = ""
         self.standing = self.idles = True
         self.height_m = 0.0
         self.times = FlightTimes()
@@ -65,24 +80,40 @@ class GroundContact:
 
     def take_off(self, now_us: int) -> None:
         self.standing = False
-        self._landing = Landing()
+        self._landing, self._lack_s = Landing(), 0.0
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "take-off")
 
     def land(self, now_us: int) -> None:
         self.standing = True
         self.times = self.times._replace(landing_us=now_us)
-        self._lines.say(NOTICE, "landing detected")
+        self.impact = self._hardest.impact(now_us)
+        if self.impact:
+            self._lines.say(CRITICAL, self.impact)
+        else:
+            self._lines.say(NOTICE, "landing detected")
 
     def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
+        if self._lack_s < SUSPECTED_S:
+            self._hardest = self._hardest.after(now_us, vehicle)
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
         if stands:
+            self.land(now_us)
+
+    def watch_lift(self, now_us: int, lift: float, interval_s: float) -> None:
+        """Detect ground without trust in the estimate, while the vehicle comes down."""
+        self._lack_s = uncarried_s(self._lack_s, lift, interval_s)
+        if is_carried(self._lack_s) and not self.standing:
             self.land(now_us)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:
         """Process a sample with the rotors stopped or idling, on the ground or in a fall."""
         self.idles = True
         self._landing, lies = watch(self._landing, now_us, vehicle, sinks=True)
+        if not self.standing:
+            self._hardest = self._hardest.after(now_us, vehicle)
+            if lies and self._hardest.impact(now_us):
+                self.land(now_us)
         self.standing = self.standing or lies
         if self.standing:
             self.height_m = vehicle.position_enu_m[2]

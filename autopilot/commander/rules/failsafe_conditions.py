@@ -8,7 +8,8 @@ from colibri.autopilot.commander.rules.failsafe_parameters import Limits
 from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
-from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.estimate import Estimate, Health
+from colibri.autopilot.estimation.sensing.rejection import Source
 from colibri.autopilot.guidance.integrator_chain import Limits as Pace
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint
@@ -75,6 +76,10 @@ class Conditions:
         for condition, holds in HOLDS.items():
             if holds(inputs, limits):
                 found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
+        if inputs.estimate is not None and inputs.estimate.health.any_lost:
+            for condition, lost in SENSORS.items():
+                if lost(inputs.estimate.health):
+                    found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
         frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:
             found[Condition.ATTITUDE_LOST] = frozen_us
@@ -166,6 +171,15 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.DEADLINE_MISSED: lambda inputs, _: inputs.late,
 }
 """Conditions that begin with the first sample at which they hold."""
+
+
+SENSORS: Mapping[Condition, Callable[[Health], bool]] = {
+    Condition.GYROSCOPE_LOST: lambda health: not health.gyroscope,
+    Condition.ACCELEROMETER_LOST: lambda health: not health.accelerometer,
+    Condition.BAROMETER_LOST: lambda health: Source.BAROMETER in health.not_accepted,
+    Condition.MAGNETOMETER_LOST: lambda health: Source.MAGNETOMETER in health.not_accepted,
+}
+"""Sensors that have failed; GPS is silent instead."""
 
 
 def _sticks_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:

@@ -66,6 +66,7 @@ NUMBERS = (
     Number(
         "GF_PREDICT", 0, 0, 1, "", "Fence prediction", "Act where the vehicle would come to rest beyond the margin."
     ),
+    Number("COM_SENS_LOSS_T", 0.5, 0.0, 60.0, "s", "Sensor loss delay", "Of all but GPS."),
     Number("COM_GNSSLOSS_T", 1.0, 1.0, 300.0, "s", "GPS loss timeout"),
 )
 
@@ -83,6 +84,10 @@ _ACTIONS: Mapping[str, str] = {
     "COM_TEL_LOSS_ACT": "Telemetry loss action",
     "NAV_DLL_ACT": "Ground station loss action",
     "GF_ACTION": "Fence action",
+    "COM_GYR_LOSS_ACT": "Gyroscope loss action",
+    "COM_ACC_LOSS_ACT": "Accelerometer loss action",
+    "COM_BAR_LOSS_ACT": "Barometer loss action",
+    "COM_MAG_LOSS_ACT": "Magnetometer loss action",
     "COM_GNSSLOSS_ACT": "GPS loss action",
     "NAV_RCL_ACT": "Pilot loss action",
     "COM_OBL_RC_ACT": "Offboard loss action",

@@ -52,6 +52,10 @@ class Condition(StrEnum):
     TELEMETRY_MISSED = "telemetry missed"
     STATION_LOST = "ground station lost"
     FENCE_BREACHED = "geofence breached"
+    GYROSCOPE_LOST = "gyroscope lost"
+    ACCELEROMETER_LOST = "accelerometer lost"
+    BAROMETER_LOST = "barometer lost"
+    MAGNETOMETER_LOST = "magnetometer lost"
     GPS_LOST = "GPS lost"
     STICKS_LOST = "sticks lost"
     SETPOINTS_LOST = "setpoints lost"
@@ -97,11 +101,20 @@ def _battery(condition: Condition, holds: str, limits: tuple[str, ...], actions:
     )
 
 
+def _sensor(condition: Condition, holds: str, parameter: str, default: Action) -> Row:
+    choices = (_WARN, _LAND, _DESCEND, _TERMINATE)
+    number = next(number for number, action in choices if action is default)
+    return Row(
+        *(condition, f"on sensors: {holds}", (), "COM_SENS_LOSS_T", parameter, choices, number, "it is well again"),
+        grounded=True,
+    )
+
+
 TABLE: tuple[Row, ...] = (
     Row(
         Condition.ATTITUDE_LOST,
-        "on sensors: the gyroscope fails, or roll and pitch are known no better than to 10°; on states: they stay the "
-        "same to the last bit though their rates are not zero",
+        "on sensors: roll and pitch are known no better than to 10°; on states: they stay the same to the last bit "
+        "though their rates are not zero",
         (),
         "COM_ATT_LOSS_T",
         "COM_ATT_LOSS_ACT",
@@ -220,6 +233,30 @@ TABLE: tuple[Row, ...] = (
         ),
         2,
         "it is inside",
+    ),
+    _sensor(
+        Condition.GYROSCOPE_LOST,
+        "no values, frozen, impossible or noisy ones; magnetometer, GPS and the model of the rotors tell the attitude",
+        "COM_GYR_LOSS_ACT",
+        Action.LAND,
+    ),
+    _sensor(
+        Condition.ACCELEROMETER_LOST,
+        "the same, or GPS velocity and barometer both contradict it; the model of the rotors' thrust replaces it",
+        "COM_ACC_LOSS_ACT",
+        Action.LAND,
+    ),
+    _sensor(
+        Condition.BAROMETER_LOST,
+        "no pressure is accepted; GPS and accelerometer tell the height",
+        "COM_BAR_LOSS_ACT",
+        Action.WARN,
+    ),
+    _sensor(
+        Condition.MAGNETOMETER_LOST,
+        "no field is accepted; the gyroscope tells the heading",
+        "COM_MAG_LOSS_ACT",
+        Action.WARN,
     ),
     Row(
         Condition.GPS_LOST,
