@@ -13,6 +13,7 @@ from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
+from tests.support.failed_sensors import Fault, flown_on, matrix, singles
 from tests.support.flying import COMPONENT, DENIED, QUICK, SYSTEM, refused
 
 pytestmark = QUICK
@@ -86,3 +87,29 @@ def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
         assert resets == 2 or source.estimate.accel_bias_m_s2 == pytest.approx(bias, abs=0.3)
     assert sitl.mode is Mode.HOLD
     assert not sitl.said("lost")
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "says"),
+    [
+        ("accel", "stuck", "accelerometer lost: land"),
+        ("accel", "garbage", "accelerometer lost: land"),
+        ("gyro", "off", "gyroscope lost: land"),
+        ("gyro", "garbage", "gyroscope lost: land"),
+        ("baro", "off", "barometer lost"),
+    ],
+)
+@pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
+def test_without_a_sensor_it_lands_softly(sitl: Sitl, unit: str, kind: str, says: str) -> None:
+    sitl.takeoff(3.0)
+    outcome = flown_on(sitl, [Fault(unit, kind)], watched_s=2.0)
+    assert not outcome.bad
+    assert outcome.disarmed_s is not None
+    assert outcome.disarmed_s < 10.0
+    assert says in outcome.texts
+    assert not any("impact" in text for text in outcome.texts)
+
+
+@pytest.mark.long
+def test_no_failed_sensor_ends_in_an_impact() -> None:
+    assert not [name for name, outcome in matrix(singles()) if outcome.bad]
