@@ -31,18 +31,6 @@ from tools.harness.sitl_process import WAITING, Vehicle, vehicle
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 
 
-def test_what_only_the_autopilot_can_refuse(tmp_path: Path) -> None:
-    key = tmp_path / "key"
-    key.write_bytes(bytes(31))
-    command = [sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
-    options = ("--state", str(tmp_path / "state"), "--signing-key", str(key))
-    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr == (
-        f"colibri: error: signing key {key}: expected 32 bytes or 64 hexadecimal digits, found 31 bytes\n"
-    )
-
-
 def test_each_instance_has_its_own_port_for_sdks() -> None:
     asked = FleetSpec()
     assert asked.links(0) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14540"]
@@ -150,16 +138,6 @@ def test_a_fleet_stands_in_a_row() -> None:
     place = place_of(Member(5, 6.0, []), args)
     assert enu_of(place.origin, DEFAULT_HOME.origin) == pytest.approx((6.0, 0.0, 0.0), abs=1e-3)
     assert place[2:] == DEFAULT_HOME[2:]
-
-
-@pytest.mark.long
-def test_nothing_outlives_it(tmp_path: Path) -> None:
-    with standing(tmp_path) as (flown, children):
-        flown.process.kill()
-        flown.process.wait()
-        gone, alive = psutil.wait_procs(children, timeout=10.0)
-        assert len(gone) == 2
-        assert not alive
 
 
 def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:

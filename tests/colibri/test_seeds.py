@@ -27,21 +27,8 @@ MEASURED_HERE = kinds_of(_SENSORS)
 
 
 def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = (
-        "--profile",
-        "flight",
-        "--feedback",
-        "sensors",
-        "--seeds",
-        "1-2",
-        "--track",
-        "hover",
-        "--duration",
-        "22",
-        "--out",
-        str(tmp_path),
-    )
-    assert main(["compare", *options]) == 0
+    options = ["--profile", "flight", "--feedback", "sensors", "--seeds", "1-2", "--track", "hover", "--duration", "22"]
+    assert main(["compare", *options, "--out", str(tmp_path)]) == 0
     with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
         flights = list(csv.DictReader(file))
     assert [flight["seed"] for flight in flights] == ["1", "2"]
@@ -98,19 +85,8 @@ def test_what_is_there_is_not_flown_again(
 
 def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
     """The thesis's profile tips over on what is flown so briskly."""
-    options = (
-        "--seeds",
-        "1",
-        "--profile",
-        "thesis",
-        "--track",
-        "lemniscate",
-        "--duration",
-        "30",
-        "--out",
-        str(tmp_path),
-    )
-    assert main(["compare", "--quiet", *options]) == 1
+    options = ["--seeds", "1", "--profile", "thesis", "--track", "lemniscate", "--duration", "30", "--quiet"]
+    assert main(["compare", *options, "--out", str(tmp_path)]) == 1
     with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
         (flight,) = csv.DictReader(file)
     assert flight["verdict"] == "lost"

@@ -30,12 +30,7 @@ FLIES_S = 3.0
 
 
 class Case(NamedTuple):
-    """One way to end.
-
-    Attributes:
-        limits: Of the flight.
-        disturb: What is done to it once it flies.
-    """
+    """One way to end."""
 
     limits: FlightLimits
     disturb: Callable[["Bench"], None]

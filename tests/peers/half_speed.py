@@ -46,14 +46,7 @@ PATIENT = FlightLimits(max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0)
 
 @dataclass
 class Bench:
-    """A vehicle, its companion and its pilot.
-
-    Attributes:
-        process: PX4's.
-        link: The companion's.
-        pilot: The ground station's.
-        sent_us: When the last setpoint was sent, own time.
-    """
+    """A vehicle, its companion and its pilot."""
 
     process: Popen[bytes]
     link: GroundLink

@@ -55,23 +55,7 @@ def item(command: str, *params: float, place: Vector | None = None) -> MissionIt
 
 
 class Cockpit:
-    """The parts of the commander, and a vehicle that follows every reference exactly.
-
-    Attributes:
-        home: Of the vehicle.
-        lines: What is said.
-        fence: That holds it back.
-        missions: That it flies.
-        tasks: What each mode begins with.
-        pilot: Flies it.
-        commands: Obey.
-        unmet: The needs of modes that nothing meets.
-        engaged: Who requested a mode that is steered, and when.
-        state: The vehicle.
-        steered: What clients ask for.
-        guidance: The last.
-        now_us: Simulated time.
-    """
+    """The parts of the commander, and a vehicle that follows every reference exactly."""
 
     def __init__(
         self,

@@ -14,13 +14,7 @@ _HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
 
 
 class Block(NamedTuple):
-    """A fenced block.
-
-    Attributes:
-        page: Its page, relative to the repository.
-        language: As the fence says; may be empty.
-        text: What is in it.
-    """
+    """A fenced block."""
 
     page: str
     language: str

@@ -29,16 +29,7 @@ THRUST_N = 4.0
 
 
 class Px4:
-    """PX4's end of the conversation, without input or output.
-
-    Attributes:
-        time_us: Its clock.
-        sensors: How many HIL_SENSOR it has heard, each at a later time.
-        fixes: HIL_GPS that it has heard.
-        known: The truth, as last told.
-        armed: Whether it lets the motors turn.
-        target_ned_m: Where it wants to be.
-    """
+    """PX4's end of the conversation, without input or output."""
 
     def __init__(self, *, lockstep: bool = True, starting_frames: int = STARTING_FRAMES) -> None:
         self._codec = Codec(1, mav.MAV_COMP_ID_AUTOPILOT1)

@@ -128,8 +128,11 @@ def record(
     t: Array = np.arange(round(duration_s / dt), dtype=np.float64) * dt
     motion = motion_along(path, t)
     chances = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
-    force, accel_bias = _inertial(motion.force, sensors, dt, chances[0], faults.accel_bias_m_s2, gyro=False)
-    rate, gyro_bias = _inertial(motion.rate, sensors, dt, chances[1], faults.gyro_bias_rad_s, gyro=True)
+    a, g = sensors.accelerometer, sensors.gyroscope
+    of_force = (a.noise_density_m_s2_rthz, a.bias_walk_m_s3_rthz, a.turn_on_bias_m_s2, a.range_m_s2)
+    of_rate = (g.noise_density_rad_s_rthz, g.bias_walk_rad_s2_rthz, g.turn_on_bias_rad_s, g.range_rad_s)
+    force, accel_bias = _inertial(motion.force, of_force, dt, chances[0], faults.accel_bias_m_s2)
+    rate, gyro_bias = _inertial(motion.rate, of_rate, dt, chances[1], faults.gyro_bias_rad_s)
     fields = _fields(motion, sensors, chances[2], origin)
     pressures = _pressures(motion, sensors, dt, chances[3], origin)
     fixes = dict(_fixes(path, t, sensors, chances[4], faults, origin))
@@ -161,24 +164,9 @@ def _due(count: int, dt: float, rate_hz: float) -> NDArray[np.bool_]:
 
 
 def _inertial(
-    truth: Array, sensors: Sensors, dt: float, chance: np.random.Generator, bias: Vector | None, *, gyro: bool
+    truth: Array, part: tuple[float, float, float, float], dt: float, chance: np.random.Generator, bias: Vector | None
 ) -> tuple[Array, Array]:
-    if gyro:
-        g = sensors.gyroscope
-        density, walk, turn_on, maximum = (
-            g.noise_density_rad_s_rthz,
-            g.bias_walk_rad_s2_rthz,
-            g.turn_on_bias_rad_s,
-            g.range_rad_s,
-        )
-    else:
-        a = sensors.accelerometer
-        density, walk, turn_on, maximum = (
-            a.noise_density_m_s2_rthz,
-            a.bias_walk_m_s3_rthz,
-            a.turn_on_bias_m_s2,
-            a.range_m_s2,
-        )
+    density, walk, turn_on, maximum = part
     first = chance.normal(size=3) * turn_on if bias is None else np.array(bias)
     biases = first + np.cumsum(chance.normal(size=truth.shape) * walk * sqrt(dt), axis=0)
     return np.clip(truth + biases + chance.normal(size=truth.shape) * density / sqrt(dt), -maximum, maximum), biases

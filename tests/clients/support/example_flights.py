@@ -28,13 +28,7 @@ IRCHEL_LAST = (47.397825620791885, 8.5450092830163271)
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a judge looks at.
-
-    Attributes:
-        seen: The vehicle.
-        client: The script.
-        state: Folder of the vehicle's files.
-    """
+    """What a judge looks at."""
 
     seen: Observer
     client: Client

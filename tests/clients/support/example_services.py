@@ -1,54 +1,41 @@
 """What MAVSDK-Python's examples that do not fly must have brought about."""
 
 import re
+from collections.abc import Callable
+from typing import TypeAlias
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from tests.clients.support.example_flights import Evidence
 
-
-class PlanJudge:
-    """Demands plans of a number of items."""
-
-    def __init__(self, missions: int, rally: int, fence: int) -> None:
-        """Demand so many items of each plan."""
-        self._wanted = (missions, rally, fence)
-        self.__doc__ = "The vehicle has " + " and ".join(
-            f"{count} {name}"
-            for count, name in zip(self._wanted, ("mission items", "rally points", "fence items"), strict=True)
-            if count
-        )
-
-    def __call__(self, evidence: Evidence) -> None:
-        """Ask the vehicle."""
-        kinds = (mav.MAV_MISSION_TYPE_MISSION, mav.MAV_MISSION_TYPE_RALLY, mav.MAV_MISSION_TYPE_FENCE)
-        assert tuple(map(evidence.seen.plan_length, kinds)) == self._wanted
+Judge: TypeAlias = Callable[[Evidence], None]
 
 
-class PrintJudge:
-    """Demands that a script prints something, so often."""
+def plans(missions: int, rally: int, fence: int) -> Judge:
+    """Demand plans of so many items."""
+    kinds = (mav.MAV_MISSION_TYPE_MISSION, mav.MAV_MISSION_TYPE_RALLY, mav.MAV_MISSION_TYPE_FENCE)
+    wanted = {"mission items": missions, "rally points": rally, "fence items": fence}
 
-    def __init__(self, pattern: str, times: int, shows: str) -> None:
-        """Demand a regular expression."""
-        self._pattern, self._times = pattern, times
-        self.__doc__ = shows
+    def judge(evidence: Evidence) -> None:
+        assert list(map(evidence.seen.plan_length, kinds)) == list(wanted.values())
 
-    def __call__(self, evidence: Evidence) -> None:
-        """Wait for it."""
-        evidence.client.wait_printed(self._pattern, times=self._times)
+    judge.__doc__ = "The vehicle has " + " and ".join(f"{count} {name}" for name, count in wanted.items() if count)
+    return judge
 
 
-class HeardJudge:
-    """Demands that what a script sends is routed to the other ground station."""
+def prints(pattern: str, times: int, shows: str) -> Judge:
+    """Demand that a script prints something, so often."""
 
-    def __init__(self, name: str, times: int) -> None:
-        """Demand so many messages of that name."""
-        self._name, self._times = name, times
-        self.__doc__ = f"{times} × {name} reach the other ground station"
+    def judge(evidence: Evidence) -> None:
+        evidence.client.wait_printed(pattern, times=times)
 
-    def __call__(self, evidence: Evidence) -> None:
-        """Count them."""
-        assert evidence.seen.counts[self._name] >= self._times, evidence.seen.counts
+    judge.__doc__ = shows
+    return judge
+
+
+def airspeeds(evidence: Evidence) -> None:
+    """20 × AIRSPEED reach the other ground station."""
+    assert evidence.seen.counts["AIRSPEED"] >= 20, evidence.seen.counts
 
 
 def calibration(evidence: Evidence) -> None:

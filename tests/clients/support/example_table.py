@@ -5,13 +5,11 @@ want a device: ftp_list_dir and ftp_download_file (a serial port), rtk_base_ublo
 px4_ev_automation_keyboard (a keyboard).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from tests.clients.support import example_flights as flights
 from tests.clients.support import example_services as services
-from tests.clients.support.example_flights import Evidence
-from tests.clients.support.example_services import HeardJudge, PlanJudge, PrintJudge
+from tests.clients.support.example_services import Judge, plans, prints
 
 PARAMETERS = "some.params"
 URL = "udpin://0.0.0.0:14540"
@@ -34,7 +32,7 @@ class Example:
     """
 
     name: str
-    judge: Callable[[Evidence], None]
+    judge: Judge
     arguments: tuple[str, ...] = ()
     endless: bool = False
     within_s: float = 60.0
@@ -45,7 +43,7 @@ class Example:
 
 
 def _streams(name: str, pattern: str, times: int, shows: str) -> Example:
-    return Example(name, PrintJudge(pattern, times, shows), endless=True)
+    return Example(name, prints(pattern, times, shows), endless=True)
 
 
 EXAMPLES: tuple[Example, ...] = (
@@ -54,8 +52,8 @@ EXAMPLES: tuple[Example, ...] = (
     Example("goto", flights.goto, endless=True),
     Example("do_orbit", flights.do_orbit, within_s=120.0),
     Example("mission", flights.mission, within_s=180.0),
-    Example("mission_raw", PlanJudge(2, 0, 0)),
-    Example("mission_import", PlanJudge(5, 2, 0), files=("example-mission.plan",)),
+    Example("mission_raw", plans(2, 0, 0)),
+    Example("mission_import", plans(5, 2, 0), files=("example-mission.plan",)),
     Example("offboard_position_ned", flights.offboard_position_ned, within_s=90.0),
     Example("offboard_velocity_ned", flights.offboard_velocity_ned, within_s=90.0),
     Example("offboard_velocity_body", flights.offboard_velocity_body, within_s=90.0),
@@ -66,12 +64,12 @@ EXAMPLES: tuple[Example, ...] = (
     Example("failure_injection", flights.failure_injection, within_s=90.0, options=("--feedback", "sensors")),
     Example("calibration", services.calibration),
     Example("all_params", services.all_params),
-    Example("firmware_version", PrintJudge(r"flight_sw_major: \d+", 1, "A version is printed")),
-    Example("geofence", PlanJudge(0, 0, 5)),
+    Example("firmware_version", prints(r"flight_sw_major: \d+", 1, "A version is printed")),
+    Example("geofence", plans(0, 0, 5)),
     Example("logfile_download", services.logs, after="takeoff_and_land"),
     Example("tune", services.untouched),
     Example("send_status_message", services.untouched),  # its server is mostly ended before the line is sent
-    Example("mavlink_direct_send", HeardJudge("AIRSPEED", 20)),
+    Example("mavlink_direct_send", services.airspeeds),
     _streams("mavlink_direct_receive", "ATTITUDE from 1/1", 100, "100 × ATTITUDE"),
     _streams("highres_imu", r"Time \(us\)", 400, "400 × HIGHRES_IMU"),
     _streams("telemetry", r"Position: |In air: False|Battery: |GPS info: ", 100, "100 lines"),
@@ -86,6 +84,6 @@ EXAMPLES: tuple[Example, ...] = (
     ),
     Example("rtcm", services.untouched),
     _streams("transponder", "Waiting for transponder messages", 3, "Waits; nobody else flies here"),
-    Example("shell", PrintJudge("nsh> ", 1, "A prompt; it ends at once by itself")),
+    Example("shell", prints("nsh> ", 1, "A prompt; it ends at once by itself")),
     Example("show_debug_output", services.untouched),
 )

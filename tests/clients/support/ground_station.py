@@ -22,13 +22,7 @@ _HEARTBEAT_EVERY_S = 1.0
 
 
 class GroundStation:
-    """Waits on a port for vehicles that call, as QGroundControl does on 14550, and speaks to all that have called.
-
-    Attributes:
-        mav: Encodes and sends.
-        heard: All messages so far, the latest last.
-        peers: Who has called.
-    """
+    """Waits on a port for vehicles that call, as QGroundControl does on 14550, and speaks to all that have called."""
 
     def __init__(self, system_id: int = 255, component_id: int = 190, port: int = 0, *, announced: bool = True) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -22,11 +22,7 @@ def program() -> Path:
 
 
 class MavProxy:
-    """A running MAVProxy that has found its vehicle and fetched its parameters.
-
-    Attributes:
-        folder: Where it runs and keeps its files.
-    """
+    """A running MAVProxy that has found its vehicle and fetched its parameters."""
 
     def __init__(self, folder: Path, connection: str) -> None:
         """Start it, with `--master=connection`."""

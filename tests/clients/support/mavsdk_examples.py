@@ -27,13 +27,7 @@ SDK_LINK = "udpout:127.0.0.1:14540"
 
 
 class Result(NamedTuple):
-    """How an example went.
-
-    Attributes:
-        example: Which.
-        failure: Why it failed; empty if it passed.
-        seconds: How long it took, with the vehicle's start.
-    """
+    """How an example went."""
 
     example: Example
     failure: str

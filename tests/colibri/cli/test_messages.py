@@ -93,6 +93,8 @@ MESSAGES = [
         "udpin:0.0.0.0:0 reaches beyond this computer: give --signing-key FILE",
     ),
     ("fly spiral --gcs radio:1 --quiet --out out", "radio:1: expected udpin:HOST:PORT or udpout:HOST:PORT"),
+    ("plant --realtime --speed max", "--realtime follows the wall clock"),
+    ("plant --realtime --serve px4", "--realtime follows the wall clock"),
     ("plant --link udpin:127.0.0.1:0 --without air", 'argument --without: unknown value "air" (choose '),
     ("replay nowhere.ulg", "cannot read nowhere.ulg: No such file or directory"),
     ("sitl --plant-port 0 --home 47,8", "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),

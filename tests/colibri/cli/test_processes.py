@@ -135,15 +135,8 @@ def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> N
 def test_files_of_the_working_directory_shadow_no_module(tmp_path: Path, options: tuple[str, ...]) -> None:
     for name in ("plant", "autopilot", "mavlink", "numpy", "signal", "json"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('of the working directory')")
-    command = [
-        str(Path(sys.executable).parent / "colibri"),
-        *options,
-        "--profile",
-        "flight",
-        "--duration",
-        "0.1",
-        "--quiet",
-    ]
-    done = subprocess.run([*command, "--out", "out"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    colibri = str(Path(sys.executable).parent / "colibri")
+    command = [colibri, *options, *["--profile", "flight", "--duration", "0.1", "--quiet", "--out", "out"]]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert "of the working directory" not in done.stdout + done.stderr
     assert (done.returncode, done.stderr) == (0, "")

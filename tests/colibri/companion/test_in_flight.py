@@ -14,7 +14,6 @@ from colibri.companion.stacks.colibri import COLIBRI
 from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import Phase
 from colibri.mavlink.wire.dialect import Codec, Message, mav
-from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
@@ -23,7 +22,6 @@ from tests.colibri.companion.in_memory import Ride
 MOVES = frozenset({mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_COMPONENT_ARM_DISARM, mav.MAV_CMD_NAV_TAKEOFF})
 """Commands that move a vehicle."""
 SETPOINTS = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED")
-BAD_LINK = Trouble(delay_s=0.03, jitter_s=0.01, loss=0.05)
 HOVER = "hover:height=3"
 
 
@@ -69,15 +67,6 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
     setpoints = [at_us for at_us, frame in ride.sent if frame[7:10] == (82).to_bytes(3, "little")]
     gaps_us = {after - before for before, after in pairwise(setpoints)}
     assert gaps_us == {8_000}
-
-
-@pytest.mark.long
-def test_it_flies_a_fast_track_over_a_bad_link(flights: Flights) -> None:
-    sitl = flights.begin(feedback="sensors", turbulence="light", seed=2)
-    settings = CompanionSettings(may_arm=True, duration_s=4.0)
-    ride = Ride(sitl, "lemniscate:lap=8", settings, trouble=BAD_LINK, seed=2)
-    assert ride.to_the_end(60.0).in_order
-    assert ride.companion.errors.rmse_m() < 0.15
 
 
 def test_a_pilot_s_mode_is_obeyed_at_once_and_never_fought(flights: Flights) -> None:

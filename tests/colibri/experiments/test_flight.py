@@ -97,11 +97,6 @@ def test_a_change_is_checked_as_a_file_is(key: str, value: Any, said: str) -> No
     assert said in str(refused.value)
 
 
-def test_a_frame_interval_must_still_divide_the_control_interval() -> None:
-    with pytest.raises(colibri.Error, match="does not divide the control interval"):
-        colibri.load_profile("flight").replace("simulation.frame_interval_s", 0.003)
-
-
 def test_a_class_flies_without_an_entry_point(tmp_path: Path) -> None:
     profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 0.5})
     flight = colibri.fly("hover", profile=profile, controller=Hovers, **HOVER)

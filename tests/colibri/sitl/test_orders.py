@@ -8,13 +8,6 @@ from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.session import Flights
 
 
-def test_a_takeoff_is_done_when_it_is_there() -> None:
-    with Flights(Setting(), None) as flights:
-        sitl = flights.begin()
-        sitl.takeoff(5.0)
-        assert sitl.is_at((0.0, 0.0, 5.0))
-
-
 def test_a_takeoff_without_a_height_uses_the_parameter() -> None:
     with Flights(Setting(params={"MIS_TAKEOFF_ALT": 1.5}), None) as flights:
         sitl = flights.begin(start={"x": 2.0})

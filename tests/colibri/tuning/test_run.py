@@ -155,11 +155,6 @@ def test_a_trial_that_cannot_be_flown_counts_as_lost(tmp_path: Path) -> None:
     assert all(trial.values[0] > 5.0 * first.values[0] for trial in others)
 
 
-def test_a_profile_as_it_is_that_cannot_be_measured_is_said(tmp_path: Path) -> None:
-    with pytest.raises(colibri.Error, match="rmse_after_20s_m is not known of every flight: fly longer"):
-        tuned(tmp_path / "out", objectives={"rmse_after_20s_m": "mean"})
-
-
 def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
     profile = colibri.load_profile("flight").replace(f"{WEIGHTS}.velocity", 2.0)
     results = colibri.tune(

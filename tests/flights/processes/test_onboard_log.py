@@ -19,12 +19,7 @@ ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 
 
 class Flown:
-    """A flight of `colibri sitl`, over: what was downloaded of it, and what is on disk.
-
-    Attributes:
-        content: The log as it was downloaded.
-        lost: How many datagrams of the download were.
-    """
+    """A flight of `colibri sitl`, over: what was downloaded of it, and what is on disk."""
 
     def __init__(self, flown: Vehicle, out: Path) -> None:
         self.content, self.lost = downloaded(flown.port, seed=1)

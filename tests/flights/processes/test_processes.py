@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from colibri.mavlink.ulog.flight_topics import DECISION
 from tools.harness.processes import (
     THESIS_PLANT,
     Process,
@@ -14,7 +13,6 @@ from tools.harness.processes import (
     start_autopilot,
     start_plant,
     states,
-    topic_rows,
 )
 
 
@@ -77,27 +75,3 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
         second = start_autopilot(logs, url, "--profile", str(profile))
         with running(second):
             assert "another frame rate" in second.wait_for("refused")["text"]
-
-
-def test_sensor_feedback_of_a_vehicle_without_is_an_error(tmp_path: Path, logs: Path) -> None:
-    plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
-    autopilot = start_autopilot(logs, url, "--vehicle", "hummingbird", "--feedback", "sensors")
-    with running(plant, autopilot):
-        assert "has no sensors" in autopilot.wait_for("refused")["text"]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path, number: signal.Signals) -> None:
-    out = tmp_path / "flight"
-    plant, url = start_plant(logs, out)
-    autopilot = start_autopilot(logs, url, "--out", str(out))
-    with running(plant, autopilot):
-        plant.wait_for("progress")
-        for process in (plant, autopilot):
-            process.process.send_signal(number)
-        assert (plant.wait(), autopilot.wait()) == (130, 130)
-    ended = plant.wait_for("ended")
-    assert len(states(out)) == ended["frames"] + 1
-    decisions = topic_rows(out, DECISION)["t"]
-    assert len(decisions) in (ended["frames"], ended["frames"] + 1)
-    assert plant.errors() + autopilot.errors() == ""

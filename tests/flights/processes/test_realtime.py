@@ -75,11 +75,3 @@ def test_silence_is_reported_once_each_time(capsys: pytest.CaptureFixture[str]) 
     assert silence.lasts(1.2, "no command", 1_200_000, "")
     lines = ["no command at t = 0.500 s, waiting", "back", "no command at t = 1.200 s"]
     assert capsys.readouterr().err == "".join(f"plant: {line}\n" for line in lines)
-
-
-@pytest.mark.parametrize("options", [("--speed", "max"), ("--serve", "px4")])
-def test_what_does_not_go_with_the_wall_clock_is_refused(tmp_path: Path, options: tuple[str, ...]) -> None:
-    plant = Process(tmp_path, "plant", "--realtime", *options)
-    assert plant.wait() == 2
-    assert "--realtime follows the wall clock" in plant.errors()
-    assert plant.errors().count("\n") == 1

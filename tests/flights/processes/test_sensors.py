@@ -61,14 +61,6 @@ def test_two_processes_fly_the_same_flight_as_one(tmp_path: Path) -> None:
     assert names["ATTITUDE_QUATERNION"] == 0
 
 
-def test_seeds_are_flights(tmp_path: Path) -> None:
-    hashes = [
-        fly(tmp_path / name, *ON_SENSORS, "--link", "direct", "--seed", seed, "--duration", "5")["trajectory_sha256"]
-        for name, seed in (("one", "1"), ("other", "2"), ("again", "1"))
-    ]
-    assert hashes[0] == hashes[2] != hashes[1]
-
-
 def test_the_track_begins_once_the_estimate_is_aligned(tmp_path: Path) -> None:
     options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "30", "--seed", "1")
     figures = fly(tmp_path, *ON_SENSORS, *options)

@@ -12,7 +12,7 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import ACCEPTED, COMPONENT, DENIED, EVERY_KIND, QUICK, SYSTEM, in_mode, reached
+from tests.support.flying import ACCEPTED, EVERY_KIND, QUICK, in_mode, reached
 
 pytestmark = [QUICK, pytest.mark.sitl(airborne=3.0)]
 
@@ -32,20 +32,6 @@ def test_every_kind_of_item_from_ground_to_ground(sitl: Sitl) -> None:
     assert len({(x > 0.0, y > 0.0) for x, y in around}) == 4
     sitl.run(0.02)
     assert sitl.gcs.latest("MISSION_CURRENT").mission_state == mav.MISSION_STATE_COMPLETE
-
-
-def test_another_item_is_made_current_in_flight(sitl: Sitl) -> None:
-    sitl.upload_mission(items.waypoint(*place, 3.0) for place in ((30.0, 0.0), (0.0, 3.0), (-30.0, 0.0)))
-    sitl.select(Mode.MISSION)
-    sitl.run(0.5)
-    sitl.send("MISSION_SET_CURRENT", SYSTEM, COMPONENT, 1)
-    sitl.wait_until(lambda: reached(sitl) == [1], within=5.0)
-    assert sitl.position == pytest.approx((0.0, 3.0, 3.0), abs=0.5)
-    assert sitl.command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 0.0) == ACCEPTED
-    sitl.run(2.0)
-    assert sitl.velocity[0] > 2.0
-    for number in (3.0, nan, -2.0, 0.5, 1e9):
-        assert sitl.command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, number) == DENIED
 
 
 def test_a_mission_that_ends_on_a_circle_ends_at_rest(sitl: Sitl) -> None:

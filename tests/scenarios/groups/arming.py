@@ -2,8 +2,7 @@
 
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items
-from colibri.sitl.vehicle import Sitl
-from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, height, says
+from tests.scenarios.words.conditions import ARMED, DISARMED, Condition, above, every, height, says
 from tests.scenarios.words.scenario import Scenario
 from tests.scenarios.words.steps import (
     arm,
@@ -24,10 +23,6 @@ ARM_DISARM: int = mav.MAV_CMD_COMPONENT_ARM_DISARM
 WRONG_MAGIC = 2989.0
 
 
-def soon(sitl: Sitl) -> None:
-    assert sitl.time_s <= 5.0
-
-
 SCENARIOS = (
     Scenario(
         name="armable-soon-after-the-start",
@@ -40,7 +35,7 @@ SCENARIOS = (
         name="armable-on-sensors-soon-after-the-start",
         peer="PX4: healthy within 30 s, armable within 45 s",
         holds="armed within 5 s, the estimator's alignment included",
-        steps=(arm(), check(ARMED), soon),
+        steps=(arm(), check(every(ARMED, Condition("within 5 s", lambda sitl: sitl.time_s <= 5.0)))),
         calm="asks how soon",
         setting={"feedback": "sensors"},
     ),

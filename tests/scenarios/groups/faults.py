@@ -1,6 +1,6 @@
 """Faults of the plant, in sensors and rotors, and what the vehicle does then."""
 
-from math import hypot, sqrt
+from math import sqrt
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
@@ -10,6 +10,7 @@ from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import missions
 from tests.scenarios.words.conditions import (
     DISARMED,
+    away,
     every,
     mode,
     near,
@@ -73,11 +74,6 @@ def falls_like_a_stone(sitl: Sitl) -> None:
     sitl.wait_until(lambda: not sitl.armed, within=max_s, what="the end of the flight")
 
 
-def stays_away(sitl: Sitl) -> None:
-    """See that it does not fly to the origin of all coordinates."""
-    sitl.hold(lambda: hypot(*sitl.position[:2]) >= 5.0, for_=15.0, what="at least 5 m from the origin")
-
-
 def descends_less(max_m: float, seconds: float) -> Step:
     def step(sitl: Sitl) -> None:
         began_m = sitl.position[2]
@@ -121,7 +117,7 @@ SCENARIOS = (
         name="no-jump-to-the-origin",
         peer="AP PositionWhenGPSIsZero: stays 5 m away",
         holds="stays 5 m away for 15 s",
-        steps=(takeoff(5.0), goto((8.0, 0.0, 5.0)), inject("sensor_gps", "off"), stays_away),
+        steps=(takeoff(5.0), goto((8.0, 0.0, 5.0)), inject("sensor_gps", "off"), hold(away(5.0), for_=15.0)),
         setting=ON_SENSORS,
     ),
     Scenario(

@@ -9,12 +9,7 @@ from colibri.sitl.vehicle import Sitl
 
 
 class Condition(NamedTuple):
-    """Something that holds of a vehicle, or does not.
-
-    Attributes:
-        words: What.
-        holds: Whether it does.
-    """
+    """Something that holds of a vehicle, or does not."""
 
     words: str
     holds: Callable[[Sitl], bool]

@@ -40,16 +40,7 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetScenario:
-    """A scenario of several vehicles.
-
-    Attributes:
-        name: What it shows.
-        peer: What a peer's suite requires, and whose; or "ours".
-        holds: What is required here.
-        count: How many vehicles.
-        fly: Flies them.
-        setting: What each flight begins with.
-    """
+    """A scenario of several vehicles."""
 
     name: str
     peer: str

@@ -1,7 +1,7 @@
 """What is done in a scenario, and what must hold: the words that scenarios are written in."""
 
 from collections.abc import Callable, Sequence
-from math import dist, nan, radians
+from math import dist, inf, nan, radians
 from operator import methodcaller
 from typing import Any
 
@@ -127,13 +127,15 @@ def silence(*, still: bool = True) -> Step:
     return step
 
 
-def measured(words: str, of: Callable[[Columns], float], maximum: float, *, last_s: float | None = None) -> Step:
-    """See that a figure of what was flown, or of the last seconds of it, is at most so much."""
+def measured(
+    words: str, of: Callable[[Columns], float], maximum: float, *, minimum: float = -inf, last_s: float | None = None
+) -> Step:
+    """See that a figure of what was flown, or of the last seconds of it, is within bounds."""
 
     def step(sitl: Sitl) -> None:
         columns = sitl.flown(0.0 if last_s is None else sitl.time_s - last_s)
         figure = of(columns)
-        assert figure <= maximum, f"{words} is {figure:.4g}, more than {maximum:g}: {sitl}"
+        assert minimum <= figure <= maximum, f"{words} is {figure:.4g}, not {minimum:g} to {maximum:g}: {sitl}"
 
     return step
 
