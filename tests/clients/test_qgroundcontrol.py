@@ -1,6 +1,6 @@
 """What QGroundControl sends from its first heartbeat on, message by message, and what it needs to see of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import atan2, dist, hypot, nan, pi
 from pathlib import Path
@@ -167,38 +167,3 @@ def test_it_flies_a_plan_and_returns(tmp_path: Path) -> None:
         assert hypot(*landed.position_enu_m[:2]) < 0.3
         assert min(dist(sight.position_enu_m, (0.0, 12.0, 5.0)) for sight in flown.seen.sights) < 1.0
         assert flown.seen.modes() == [Mode.MISSION, Mode.RETURN]
-
-
-@pytest.mark.long
-def test_its_virtual_joystick(tmp_path: Path) -> None:
-    with connected(tmp_path) as (station, flown):
-        seen = flown.seen
-        take_off(station, flown, 4.0)
-        began = seen.now
-
-        def steer(forward: int) -> None:
-            station.mav.manual_control_send(1, forward, 0, 500, 0, 0)
-            station.pump(0.02)
-
-        steer(0)
-        set_mode_steering(station, steer)
-        while seen.now.position_enu_m[1] < began.position_enu_m[1] + 3.0:
-            steer(500)
-        while hypot(*seen.now.velocity_enu_m_s) > 0.05:
-            steer(0)
-        assert abs(seen.now.height_m - 4.0) < 0.2
-        assert abs(seen.now.position_enu_m[0] - began.position_enu_m[0]) < 0.2
-
-        # The joystick is let go of: the vehicle says so and holds.
-        station.until(seen, lambda s: s.mode is Mode.HOLD, "hold")
-        assert any("sticks lost" in text for text in seen.texts)
-        set_mode(station, Mode.RETURN)
-        station.until(seen, lambda s: not s.armed, "the end of the flight")
-
-
-def set_mode_steering(station: GroundStation, steer: Callable[[int], None]) -> None:
-    number = custom_mode(Mode.POSITION)
-    station.mav.set_mode_send(1, CUSTOM, number)
-    before = len(station.heard)
-    while not any(m.get_type() == "HEARTBEAT" and m.custom_mode == number for m in station.heard[before:]):
-        steer(0)

@@ -5,12 +5,11 @@ All times are the vehicle's. In a network namespace with loopback alone: PX4 bin
 
 import os
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from subprocess import STDOUT, Popen, run
+from subprocess import STDOUT, Popen
 from time import perf_counter
 
 from colibri.common.types import Address
@@ -22,7 +21,7 @@ from colibri.mavlink.client.parameters import SetParameter
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import mav
-from tests.peers.on_the_plant import px4_command, px4_settings
+from tests.peers.on_the_plant import plant, px4_command, px4_settings
 
 SPEED = 0.5
 WITHOUT_LOGGER = {"PX4_PARAM_SDLOG_BACKEND": "0"}
@@ -110,19 +109,10 @@ def own_physics(build: Path, folder: Path) -> Iterator[Bench]:
 
 @contextmanager
 def on_the_plant(build: Path, folder: Path, vehicle: str) -> Iterator[Bench]:
-    colibri, parameters = (sys.executable, "-m", "colibri"), folder / "parameters"
-    run([*colibri, "vehicle", vehicle, "--for", "px4", "--out", str(parameters)], check=True)
-    options = ("--serve", "px4", "--vehicle", vehicle, "--speed", str(SPEED), "--out", str(folder / "plant"))
-    settings = px4_settings(parameters, SPEED) | WITHOUT_LOGGER
-    with (
-        (folder / "plant.txt").open("wb") as said,
-        Popen([*colibri, "plant", *options], stdout=said, stderr=STDOUT) as plant,
-    ):
-        try:
-            with _started(px4_command(build), folder, settings) as bench:
-                yield bench
-        finally:
-            plant.terminate()
+    with plant("px4", folder, vehicle, SPEED) as parameters:
+        settings = px4_settings(parameters, SPEED) | WITHOUT_LOGGER
+        with _started(px4_command(build), folder, settings) as bench:
+            yield bench
 
 
 @contextmanager

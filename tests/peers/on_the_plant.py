@@ -35,9 +35,7 @@ _COLIBRI = (sys.executable, "-m", "colibri")
 
 
 def main(whom: str, program: str, folder: Path) -> None:
-    parameters = folder / "parameters"
-    run([*_COLIBRI, "vehicle", VEHICLES[whom], "--for", whom, "--out", str(parameters)], check=True)
-    with plant(whom, folder):
+    with plant(whom, folder, VEHICLES[whom], SPEED) as parameters:
         for number in (1, 2):
             start = px4 if whom == "px4" else arducopter
             with start(Path(program), parameters, folder / f"stack-{number}"):
@@ -45,15 +43,18 @@ def main(whom: str, program: str, folder: Path) -> None:
 
 
 @contextmanager
-def plant(whom: str, folder: Path) -> Iterator[None]:
+def plant(whom: str, folder: Path, vehicle: str, speed: float) -> Iterator[Path]:
+    """Start our plant; give the file of the vehicle's parameters."""
+    parameters = folder / "parameters"
+    run([*_COLIBRI, "vehicle", vehicle, "--for", whom, "--out", str(parameters)], check=True)
     served = "px4" if whom == "px4" else "ardupilot-json"
-    options = ("--serve", served, "--vehicle", VEHICLES[whom], "--speed", str(SPEED), "--out", str(folder / "plant"))
+    options = ("--serve", served, "--vehicle", vehicle, "--speed", str(speed), "--out", str(folder / "plant"))
     with (
         (folder / "plant.txt").open("wb") as said,
         Popen([*_COLIBRI, "plant", *options], stdout=said, stderr=STDOUT) as process,
     ):
         try:
-            yield
+            yield parameters
         finally:
             process.terminate()
 

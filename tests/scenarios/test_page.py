@@ -7,7 +7,6 @@ import pytest
 from tests.scenarios.groups import GROUPS
 from tests.scenarios.page import PAGE, page
 from tools.soak import scenarios as soak
-from tools.soak.scenarios import DiffersError, compare
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -19,16 +18,6 @@ def test_the_page_agrees_with_the_scenarios() -> None:
 def test_there_are_sixty_and_each_has_a_name_of_its_own() -> None:
     named = [scenario.name for scenarios in GROUPS.values() for scenario in scenarios]
     assert len(set(named)) == len(named) >= 60
-
-
-@pytest.mark.parametrize(
-    "again", [{"a": "passed 1"}, {"a": "failed 1", "b": "passed 2"}, {"a": "passed 3", "b": "passed 2"}]
-)
-def test_a_run_that_differs_is_named(again: dict[str, str]) -> None:
-    first = {"a": "passed 1", "b": "passed 2"}
-    compare(first, dict(first))
-    with pytest.raises(DiffersError, match=r"[ab]: "):
-        compare(first, again)
 
 
 def test_runs_that_were_kept_are_compared_and_not_run_again(

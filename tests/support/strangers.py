@@ -4,6 +4,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
 
 Point: TypeAlias = tuple[float, float, float]
@@ -34,7 +35,8 @@ class Known(NamedTuple):
 
 def hovering(airframe: Airframe, known: Known, target_ned_m: Point) -> Array:
     """Return the thrust of each motor, N, that flies the vehicle to a point, looking north."""
-    R = rotation(known.quaternion)
+    w, x, y, z = known.quaternion.tolist()
+    R = np.array(rotation_matrix((w, x, y, z)))
     wanted = np.clip(np.array(target_ned_m) - known.position_m, -1.0, 1.0) * 1.5 - known.velocity_m_s
     force = airframe.mass_kg * (2.0 * wanted - np.array([0.0, 0.0, 9.81]))
     thrust_n = max(0.0, float(-force @ R[:, 2]))
@@ -48,15 +50,3 @@ def hovering(airframe: Airframe, known: Known, target_ned_m: Point) -> Array:
     forward, starboard, turn = np.array(airframe.motors).T
     thrusts: Array = np.linalg.solve(np.array([np.ones(4), -starboard, forward, turn]), [thrust_n, *moment])
     return np.maximum(0.0, thrusts)
-
-
-def rotation(q: Array) -> Array:
-    """Return the matrix that turns FRD into NED."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

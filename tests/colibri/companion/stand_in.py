@@ -25,6 +25,7 @@ _PARTS = 4
 PX4_HOLD, PX4_TAKEOFF, PX4_OFFBOARD = (main << 16 | sub << 24 for main, sub in ((4, 3), (4, 2), (6, 0)))
 GUIDED, LOITER, STABILIZE = 4, 5, 0
 ACCEPTED, REJECTED, UNSUPPORTED, FAILED = 0, 1, 3, 4
+STREAMED = ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "EXTENDED_SYS_STATE", "SYS_STATUS", "GLOBAL_POSITION_INT")
 _NO_COVARIANCE = (nan,) + (0.0,) * 20
 
 
@@ -58,6 +59,8 @@ class StandIn:
     autopilot: int
     mode: int
     hold: int
+    offboard: int
+    streamed: tuple[str, ...]
     params: dict[str, float]
     numbers: Numbers = field(default_factory=Numbers)
     armed: bool = False
@@ -110,10 +113,6 @@ class StandIn:
         return self.time_us + BOOTED_US
 
     @property
-    def offboard(self) -> int:
-        raise NotImplementedError
-
-    @property
     def airborne(self) -> bool:
         return bool(self.position[2] > 0.05)
 
@@ -140,7 +139,7 @@ class StandIn:
 
     def _command(self, number: int, params: list[float]) -> int:
         if number == mav.MAV_CMD_SET_MESSAGE_INTERVAL:
-            name = next((n for n in self._streamed() if definition_of(n).id == int(params[0])), None)
+            name = next((n for n in self.streamed if definition_of(n).id == int(params[0])), None)
             if name is None:
                 return UNSUPPORTED
             self.streams[name] = int(params[1])
@@ -153,9 +152,6 @@ class StandIn:
         if number == mav.MAV_CMD_NAV_TAKEOFF:
             return self._take_off(params)
         return UNSUPPORTED
-
-    def _streamed(self) -> tuple[str, ...]:
-        raise NotImplementedError
 
     def _set_mode(self, params: list[float]) -> int:
         raise NotImplementedError
@@ -281,22 +277,11 @@ class Px4(StandIn):
     """
 
     def __init__(self, **more: Any) -> None:
-        params: dict[str, float] = {
-            "MPC_THR_HOVER": 0.45,
-            "THR_MDL_FAC": 0.3,
-            "COM_OF_LOSS_T": 1.0,
-            "COM_RC_OVERRIDE": 1,
-        }
-        super().__init__(autopilot=mav.MAV_AUTOPILOT_PX4, mode=PX4_HOLD, hold=PX4_HOLD, params=params, **more)
+        params = {"MPC_THR_HOVER": 0.45, "THR_MDL_FAC": 0.3, "COM_OF_LOSS_T": 1.0, "COM_RC_OVERRIDE": 1}
+        modes: dict[str, Any] = {"mode": PX4_HOLD, "hold": PX4_HOLD, "offboard": PX4_OFFBOARD}
+        streamed = ("ODOMETRY", "CURRENT_MODE", "ESTIMATOR_STATUS", *STREAMED)
+        super().__init__(autopilot=mav.MAV_AUTOPILOT_PX4, streamed=streamed, params=params, **modes, **more)
         self.streams |= {"HEARTBEAT": 1_000_000, "ODOMETRY": 33_000}
-
-    @property
-    def offboard(self) -> int:
-        return PX4_OFFBOARD
-
-    def _streamed(self) -> tuple[str, ...]:
-        own = ("ODOMETRY", "CURRENT_MODE", "ESTIMATOR_STATUS", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED")
-        return (*own, "EXTENDED_SYS_STATE", "SYS_STATUS", "GLOBAL_POSITION_INT")
 
     def _set_mode(self, params: list[float]) -> int:
         mode = int(params[1]) << 16 | int(params[2]) << 24
@@ -347,17 +332,10 @@ class ArduPilot(StandIn):
             "GUID_TIMEOUT": 1.0,
             "FENCE_ENABLE": 0,
         }
-        autopilot = mav.MAV_AUTOPILOT_ARDUPILOTMEGA
-        super().__init__(autopilot=autopilot, mode=STABILIZE, hold=LOITER, params=params, **more)
+        modes: dict[str, Any] = {"mode": STABILIZE, "hold": LOITER, "offboard": GUIDED}
+        streamed = ("HEARTBEAT", *STREAMED)
+        super().__init__(autopilot=mav.MAV_AUTOPILOT_ARDUPILOTMEGA, streamed=streamed, params=params, **modes, **more)
         self.streams |= {"HEARTBEAT": 1_000_000}
-
-    @property
-    def offboard(self) -> int:
-        return GUIDED
-
-    def _streamed(self) -> tuple[str, ...]:
-        own = ("HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED")
-        return (*own, "EXTENDED_SYS_STATE", "SYS_STATUS", "GLOBAL_POSITION_INT")
 
     def _set_mode(self, params: list[float]) -> int:
         self.choose(int(params[1]))

@@ -1,42 +1,58 @@
 """The log that a ground station downloads from `colibri sitl`: the ULog of the flight, byte for byte."""
 
+import socket
+from contextlib import closing, suppress
 from io import BytesIO
 from math import nan
-from pathlib import Path
+from time import monotonic
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from pyulog import ULog
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.mavlink.wire.dialect import mav
-from tests.support.log_client import downloaded
-from tools.harness.observer import Observer
-from tools.harness.sitl_process import Vehicle, vehicle
+from colibri.mavlink.client.client import Client
+from colibri.mavlink.client.conversation import Conversation
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
+from tests.support.log_conversations import DownloadLog, ListLogs
+from tools.harness.sitl_process import vehicle
 
-HEIGHT_M = 2.0
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 
 
-class Flown:
-    """A flight of `colibri sitl`, over: what was downloaded of it, and what is on disk."""
+class Flown(NamedTuple):
+    """A flight of `colibri sitl`, over: what was downloaded of it, what was said, and the logs on disk."""
 
-    def __init__(self, flown: Vehicle, out: Path) -> None:
-        self.content, self.lost = downloaded(flown.port, seed=1)
-        self.texts = flown.seen.texts
-        self.logs = flown.state / "0" / "logs"
-        self.log, self.out = ULog(BytesIO(self.content)), out / "0"
+    content: bytes
+    log: ULog
+    texts: list[str]
+    kept: bytes
+    beside: ULog
 
 
-def fly(seen: Observer) -> None:
-    for number, params in (
-        (mav.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, nan, nan, nan, HEIGHT_M)),
-        (mav.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,)),
-    ):
-        assert seen.command(number, *params) == ACCEPTED
-    seen.wait(lambda sight: sight.armed and sight.mode is Mode.HOLD, "the height")
-    assert seen.command(mav.MAV_CMD_NAV_LAND) == ACCEPTED
-    seen.wait_until_disarmed()
+def downloaded(port: int) -> bytes:
+    """Return the only log of the vehicle that waits on a port of this computer."""
+    client, target = Client(245, 190), (1, AUTOPILOT_COMPONENT)
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as sock:
+        sock.connect(("127.0.0.1", port))
+        sock.settimeout(0.02)
+
+        def carry(conversation: Conversation) -> None:
+            client.begin(conversation)
+            give_up_s = monotonic() + 60.0
+            while conversation.result is None:
+                assert monotonic() < give_up_s, "the log does not come"
+                for datagram in client.poll(round(monotonic() * 1e6)):
+                    sock.send(datagram)
+                with suppress(TimeoutError):
+                    client.receive(sock.recv(4096), round(monotonic() * 1e6))
+            assert conversation.accepted
+
+        carry(logs := ListLogs(target))
+        ((number, size),) = logs.sizes.items()
+        carry(log := DownloadLog(target, number, size))
+    return log.data
 
 
 @pytest.fixture(scope="module", params=["state", "sensors"])
@@ -46,20 +62,24 @@ def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     with vehicle(folder, "--out", str(out), "--feedback", request.param, speed=4.0) as flying:
         if request.param == "sensors":
             flying.seen.wait(lambda sight: sight.time_s > 8.0, "an estimate")
-        fly(flying.seen)
-        return Flown(flying, out)
+        seen = flying.seen
+        assert seen.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, 2.0) == ACCEPTED
+        assert seen.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+        seen.wait(lambda sight: sight.armed and sight.mode is Mode.HOLD, "the height")
+        assert seen.command(mav.MAV_CMD_NAV_LAND) == ACCEPTED
+        seen.wait_until_disarmed()
+        content = downloaded(flying.port)
+        (kept,) = (flying.state / "0" / "logs").glob("00001.ulg")
+        beside = ULog(str(out / "0" / "flight.ulg"))
+        return Flown(content, ULog(BytesIO(content)), seen.texts, kept.read_bytes(), beside)
 
 
-def test_a_download_over_a_lossy_link_is_the_file_on_disk(flown: Flown) -> None:
-    (log,) = flown.logs.iterdir()
-    assert log.name == "00001.ulg"
-    assert flown.content == log.read_bytes()
-    assert flown.lost > 50
+def test_a_download_is_the_file_on_disk(flown: Flown) -> None:
+    assert flown.content == flown.kept
     assert not flown.log.file_corruption
 
 
 def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None:
-    beside = ULog(str(flown.out / "flight.ulg"))
     for topic, names in {
         "vehicle_attitude": "q[0] q[1] q[2] q[3]",
         "vehicle_local_position": "x y z vx vy vz",
@@ -68,7 +88,7 @@ def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None
         "trajectory_setpoint": "position[2] velocity[2]",
         "mpc_status": "cost iterations solve_time_us qp_status",
     }.items():
-        few, all_of_them = flown.log.get_dataset(topic).data, beside.get_dataset(topic).data
+        few, all_of_them = flown.log.get_dataset(topic).data, flown.beside.get_dataset(topic).data
         assert set(np.diff(few["timestamp"])) == {40_000}
         at = np.searchsorted(all_of_them["timestamp"], few["timestamp"])
         for name in names.split():
@@ -79,7 +99,7 @@ def test_both_logs_have_the_status_texts(flown: Flown) -> None:
     said = [line.message for line in flown.log.logged_messages]
     assert "landed, rotors stopped" in said
     assert set(said) <= set(flown.texts)
-    beside = [line.message for line in ULog(str(flown.out / "flight.ulg")).logged_messages]
+    beside = [line.message for line in flown.beside.logged_messages]
     assert [text for text in beside if text in said] == said
     assert set(flown.texts) <= set(beside)
 

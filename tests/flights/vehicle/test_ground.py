@@ -34,17 +34,6 @@ def test_rotors_idle_when_armed_and_stop_when_disarmed(sitl: Sitl) -> None:
     assert sitl.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
-def test_missing_or_raised_sticks_refuse_arming(sitl: Sitl) -> None:
-    sitl.select(Mode.POSITION)  # on the ground it need not be met yet
-    refused(sitl, "no MANUAL_CONTROL is heard", sitl.arm)
-    with sitl.sticks_held(thrust=0.9):
-        sitl.run(0.03)
-        refused(sitl, "thrust stick is up", sitl.arm)
-    with sitl.sticks_held():
-        sitl.run(0.03)
-        sitl.arm()
-
-
 def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     def landed_state() -> int:
         return int(sitl.gcs.latest("EXTENDED_SYS_STATE").landed_state)

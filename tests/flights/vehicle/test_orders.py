@@ -94,14 +94,6 @@ def test_an_orbit_commanded_again_goes_on_where_it_is(sitl: Sitl) -> None:
     assert sitl.speed_m_s < 0.1
 
 
-def test_an_orbit_that_cannot_be_flown_is_denied(sitl: Sitl) -> None:
-    for params in ((0.5, 2.0), (inf, 2.0), (5.0, 0.0), (5.0, 99.0), (5.0, 2.0, 0.5), (5.0, 2.0, 9.0)):
-        assert orbit(sitl, *params) == DENIED
-    with pytest.raises(sitl.Refused):
-        sitl.select(Mode.ORBIT)  # no circle is known
-    assert sitl.mode is Mode.HOLD
-
-
 def test_headings_absolute_and_relative(sitl: Sitl) -> None:
     yaw = mav.MAV_CMD_CONDITION_YAW
     assert sitl.command(yaw, 90.0, 0.0, 0.0, 0.0) == ACCEPTED  # east

@@ -53,12 +53,6 @@ def test_a_jump_of_the_setpoint_is_flown_smoothly(sitl: Sitl) -> None:
     assert abs(sitl.euler[2]) < 0.05
 
 
-def test_a_velocity_and_a_yaw_rate_are_flown(sitl: Sitl) -> None:
-    fly_by(sitl, 3.0, velocity=(2.0, -1.0, 0.5), yaw_rate=0.5)
-    assert sitl.velocity == pytest.approx((2.0, -1.0, 0.5), abs=0.05)
-    assert sitl.rates[2] == pytest.approx(0.5, abs=0.05)
-
-
 @pytest.mark.sitl(params={"MPC_XY_VEL_MAX": 4.0})
 def test_velocity_and_acceleration_stay_within_limits(sitl: Sitl) -> None:
     fly_by(sitl, 3.0, velocity=(30.0, 30.0, 20.0))

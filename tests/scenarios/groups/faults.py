@@ -8,33 +8,9 @@ from colibri.sitl import mission_items
 from colibri.sitl.flight_record import Columns, tilt_deg
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import missions
-from tests.scenarios.words.conditions import (
-    DISARMED,
-    away,
-    every,
-    mode,
-    near,
-    over,
-    quiet_about,
-    says,
-)
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario, Step
-from tests.scenarios.words.steps import (
-    check,
-    command,
-    goto,
-    hold,
-    inject,
-    land,
-    measured,
-    moves_less,
-    put,
-    run,
-    start_mission,
-    takeoff,
-    until,
-    upload,
-)
 
 PLACE = (0.0, 0.0, 5.0)
 INJECT: int = mav.MAV_CMD_INJECT_FAILURE
@@ -49,7 +25,7 @@ def touches_down_slower(m_s: float) -> Step:
         low = (columns["z"] < 0.5) & (columns["z"] > 0.02)
         return float(-columns["vz"][low].min())
 
-    return measured("the speed at the ground", fastest, m_s)
+    return do.measured("the speed at the ground", fastest, m_s)
 
 
 def lands_on_three(number: int, *, tilt: float, within_s: float) -> Step:
@@ -58,9 +34,9 @@ def lands_on_three(number: int, *, tilt: float, within_s: float) -> Step:
     def step(sitl: Sitl) -> None:
         sitl.inject("system_motor", "off", number)
         upright_s = sitl.time_s + within_s
-        until(says(f"rotor {number} failed"), within=0.5)(sitl)
-        until(DISARMED, within=40.0)(sitl)
-        measured("the tilt", max_tilt_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
+        do.until(see.says(f"rotor {number} failed"), within=0.5)(sitl)
+        do.until(see.DISARMED, within=40.0)(sitl)
+        do.measured("the tilt", max_tilt_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
 
     return step
 
@@ -88,12 +64,12 @@ SCENARIOS = (
         peer="PX4: lands, disarmed within 30 s",
         holds="descends at once, disarmed within 30 s, at most 5 m away",
         steps=(
-            put("COM_GNSSLOSS_ACT", 4),
-            takeoff(5.0),
-            inject("sensor_gps", "off"),
-            until(mode(Mode.LAND), within=3.0),
-            until(DISARMED, within=27.0),
-            check(over(0.0, 0.0, 5.0)),
+            do.put("COM_GNSSLOSS_ACT", 4),
+            do.takeoff(5.0),
+            do.inject("sensor_gps", "off"),
+            do.until(see.mode(Mode.LAND), within=3.0),
+            do.until(see.DISARMED, within=27.0),
+            do.check(see.over(0.0, 0.0, 5.0)),
         ),
         setting=ON_SENSORS,
     ),
@@ -102,13 +78,13 @@ SCENARIOS = (
         peer="ours: 20 s without, at most 20 m",
         holds="at most 3 m, says so, and is back within 1 m 10 s after GPS is",
         steps=(
-            takeoff(5.0),
-            inject("sensor_gps", "off"),
-            moves_less(3.0, 20.0),
-            check(says("GPS lost")),
-            inject("sensor_gps", "ok"),
-            run(10.0),
-            check(every(over(0.0, 0.0, 1.5), says("GPS lost: cleared"))),
+            do.takeoff(5.0),
+            do.inject("sensor_gps", "off"),
+            do.moves_less(3.0, 20.0),
+            do.check(see.says("GPS lost")),
+            do.inject("sensor_gps", "ok"),
+            do.run(10.0),
+            do.check(see.every(see.over(0.0, 0.0, 1.5), see.says("GPS lost: cleared"))),
         ),
         setting=ON_SENSORS,
         seeds=(1, 2),
@@ -117,7 +93,12 @@ SCENARIOS = (
         name="no-jump-to-the-origin",
         peer="AP PositionWhenGPSIsZero: stays 5 m away",
         holds="stays 5 m away for 15 s",
-        steps=(takeoff(5.0), goto((8.0, 0.0, 5.0)), inject("sensor_gps", "off"), hold(away(5.0), for_=15.0)),
+        steps=(
+            do.takeoff(5.0),
+            do.goto((8.0, 0.0, 5.0)),
+            do.inject("sensor_gps", "off"),
+            do.hold(see.away(5.0), for_=15.0),
+        ),
         setting=ON_SENSORS,
     ),
     Scenario(
@@ -125,12 +106,12 @@ SCENARIOS = (
         peer="AP: at most 20 m in 30 s, tilt at most 2° for 20 s",
         holds="a jump of 40 m for 5 s: at most 2 m, tilt at most 2°",
         steps=(
-            takeoff(5.0),
-            run(2.0),
-            inject("sensor_gps", "wrong", 0, 40.0, 0.0, 0.0),
-            moves_less(2.0, 5.0, tilt=2.0),
-            inject("sensor_gps", "ok"),
-            moves_less(2.0, 15.0, tilt=2.0),
+            do.takeoff(5.0),
+            do.run(2.0),
+            do.inject("sensor_gps", "wrong", 0, 40.0, 0.0, 0.0),
+            do.moves_less(2.0, 5.0, tilt=2.0),
+            do.inject("sensor_gps", "ok"),
+            do.moves_less(2.0, 15.0, tilt=2.0),
         ),
         setting=ON_SENSORS,
     ),
@@ -138,7 +119,7 @@ SCENARIOS = (
         name="accelerometer-bias",
         peer="AP: 2 m/s², descends at most 2 m in 50 s",
         holds="at most 1.5 m in 50 s",
-        steps=(takeoff(10.0), inject("sensor_accel", "wrong", 0, 0.0, 0.0, 2.0), descends_less(1.5, 50.0)),
+        steps=(do.takeoff(10.0), do.inject("sensor_accel", "wrong", 0, 0.0, 0.0, 2.0), descends_less(1.5, 50.0)),
         setting=ON_SENSORS,
     ),
     Scenario(
@@ -146,10 +127,10 @@ SCENARIOS = (
         peer="ours: a bias is learned in flight",
         holds="0.1 rad/s: at most 1 m in 30 s, and says so",
         steps=(
-            takeoff(10.0),
-            inject("sensor_gyro", "wrong", 0, 0.1, 0.0, 0.0),
-            moves_less(1.0, 30.0),
-            check(says("gyroscope off: bias reset")),
+            do.takeoff(10.0),
+            do.inject("sensor_gyro", "wrong", 0, 0.1, 0.0, 0.0),
+            do.moves_less(1.0, 30.0),
+            do.check(see.says("gyroscope off: bias reset")),
         ),
         setting=ON_SENSORS,
     ),
@@ -158,12 +139,12 @@ SCENARIOS = (
         peer="PX4: a stuck sensor, the mission ends within 90 s",
         holds="ends, and lands within 3 m",
         steps=(
-            upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            start_mission,
-            run(10.0),
-            inject("sensor_baro", "stuck"),
-            until(DISARMED, within=80.0),
-            check(over(0.0, 0.0, 3.0)),
+            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
+            do.start_mission,
+            do.run(10.0),
+            do.inject("sensor_baro", "stuck"),
+            do.until(see.DISARMED, within=80.0),
+            do.check(see.over(0.0, 0.0, 3.0)),
         ),
         setting=ON_SENSORS,
     ),
@@ -172,12 +153,12 @@ SCENARIOS = (
         peer="PX4: a sensor off, the mission ends",
         holds="goes 10 m and back, lands within 2 m",
         steps=(
-            takeoff(5.0),
-            inject("sensor_mag", "off"),
-            goto((10.0, 0.0, 5.0)),
-            goto(PLACE),
-            land(),
-            check(over(0.0, 0.0, 2.0)),
+            do.takeoff(5.0),
+            do.inject("sensor_mag", "off"),
+            do.goto((10.0, 0.0, 5.0)),
+            do.goto(PLACE),
+            do.land(),
+            do.check(see.over(0.0, 0.0, 2.0)),
         ),
         setting=ON_SENSORS,
     ),
@@ -185,14 +166,23 @@ SCENARIOS = (
         name="gyroscope-off",
         peer="ours: attitude lost, the rotors stop",
         holds="within 2 s and the time of a fall, and says why",
-        steps=(takeoff(5.0), inject("sensor_gyro", "off"), falls_like_a_stone, check(says("attitude lost"))),
+        steps=(
+            do.takeoff(5.0),
+            do.inject("sensor_gyro", "off"),
+            falls_like_a_stone,
+            do.check(see.says("attitude lost")),
+        ),
         setting=ON_SENSORS,
     ),
     Scenario(
         name="a-weak-rotor",
         peer="AP StabilityPatch: 65 %, within 10 m and 5 m of height for 30 s",
         holds="within 0.3 m for 30 s",
-        steps=(inject("system_motor", "wrong", 1, 0.65), moves_less(0.3, 30.0), check(quiet_about("failed"))),
+        steps=(
+            do.inject("system_motor", "wrong", 1, 0.65),
+            do.moves_less(0.3, 30.0),
+            do.check(see.quiet_about("failed")),
+        ),
         setting={"airborne": 10.0},
     ),
     *(
@@ -201,10 +191,10 @@ SCENARIOS = (
             peer="PX4: terminated within 2 + √(2h/10) s; ours: upright to within 20°, lands within 5 m at 2 m/s",
             holds="lands on three, says so; at most 2 m/s at the ground, 5 m away, 20° from 2 s on",
             steps=(
-                run(1.0),
+                do.run(1.0),
                 lands_on_three(number, tilt=20.0, within_s=2.0),
                 touches_down_slower(2.0),
-                check(over(0.0, 0.0, 5.0)),
+                do.check(see.over(0.0, 0.0, 5.0)),
             ),
             setting={"airborne": 10.0},
         )
@@ -215,12 +205,12 @@ SCENARIOS = (
         peer="ours: upright to within 20°, lands within 5 m at 2 m/s",
         holds="the same",
         steps=(
-            takeoff(10.0),
-            run(1.0),
-            inject("system_motor", "off", 2),
-            until(DISARMED, within=40.0),
+            do.takeoff(10.0),
+            do.run(1.0),
+            do.inject("system_motor", "off", 2),
+            do.until(see.DISARMED, within=40.0),
             touches_down_slower(2.0),
-            check(over(0.0, 0.0, 5.0)),
+            do.check(see.over(0.0, 0.0, 5.0)),
         ),
         setting=ON_SENSORS,
         seeds=(1, 2),
@@ -230,12 +220,12 @@ SCENARIOS = (
         peer="PX4: refused where it is disabled",
         holds="DENIED while SYS_FAILURE_EN is 0, done when it is 1, UNSUPPORTED where nothing would fail",
         steps=(
-            command(INJECT, *MOTOR_OFF, result=mav.MAV_RESULT_DENIED),
-            hold(near(PLACE, 0.01), for_=1.0),
-            put("SYS_FAILURE_EN", 1),
-            command(INJECT, *GPS_OFF, result=mav.MAV_RESULT_UNSUPPORTED),
-            command(INJECT, *MOTOR_OFF, result=mav.MAV_RESULT_ACCEPTED),
-            until(says("rotor 1 failed"), within=0.5),
+            do.command(INJECT, *MOTOR_OFF, result=mav.MAV_RESULT_DENIED),
+            do.hold(see.near(PLACE, 0.01), for_=1.0),
+            do.put("SYS_FAILURE_EN", 1),
+            do.command(INJECT, *GPS_OFF, result=mav.MAV_RESULT_UNSUPPORTED),
+            do.command(INJECT, *MOTOR_OFF, result=mav.MAV_RESULT_ACCEPTED),
+            do.until(see.says("rotor 1 failed"), within=0.5),
         ),
         setting=IN_THE_AIR,
     ),

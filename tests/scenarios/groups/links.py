@@ -8,22 +8,9 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.groups import holding, missions, offboard, takeoff_land
-from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, mode, near, over, tilted_less
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
-from tests.scenarios.words.steps import (
-    check,
-    goto,
-    hold,
-    kill_autopilot,
-    max_distance_from,
-    measured,
-    put,
-    run,
-    start_mission,
-    trouble,
-    until,
-    upload,
-)
 
 PLACE = (0.0, 0.0, 5.0)
 ROUGH = {"loss": 0.3, "jitter_s": 0.05}
@@ -99,7 +86,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         name="spoiled-bits-are-dropped-and-counted",
         peer="ours: dropped by their checksum, counters rise",
         holds="10 % of the ground link: none is believed, the vehicle is where it was",
-        steps=(trouble("ground", corrupt=0.1), run(10.0), hears_spoiled, check(near(PLACE, 0.01))),
+        steps=(do.trouble("ground", corrupt=0.1), do.run(10.0), hears_spoiled, do.check(see.near(PLACE, 0.01))),
         setting={"airborne": 5.0},
     ),
     *(
@@ -108,7 +95,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
             name=f"{name}-over-a-rough-link",
             peer="ours: 30 % lost and 50 ms of jitter, each way",
             holds=f"as without: {COMMANDED[name].holds}",
-            steps=(trouble("ground", **ROUGH), *COMMANDED[name].steps),
+            steps=(do.trouble("ground", **ROUGH), *COMMANDED[name].steps),
         )
         for name in OVER_A_ROUGH_LINK
     ),
@@ -117,10 +104,10 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: at most 2 m lost, at most 45° more tilt than the limit",
         holds="at most 0.05 m, 5°, and it holds on",
         steps=(
-            run(2.0),
-            *(kill_autopilot, run(2.0)) * 2,
-            measured("the distance", max_distance_from(PLACE), 0.05),
-            check(every(ARMED, mode(Mode.HOLD), tilted_less(5.0))),
+            do.run(2.0),
+            *(do.kill_autopilot, do.run(2.0)) * 2,
+            do.measured("the distance", do.max_distance_from(PLACE), 0.05),
+            do.check(see.every(see.ARMED, see.mode(Mode.HOLD), see.tilted_less(5.0))),
         ),
         setting={"airborne": 5.0},
     ),
@@ -129,11 +116,11 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: the mission ends",
         holds="killed five times on the way: ends over its last item",
         steps=(
-            upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            start_mission,
+            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
+            do.start_mission,
             lands_after(5, 6.0),
-            measured("the distance from the square", missions.off_the_square, 1.2),
-            check(over(0.0, 0.0, 0.2)),
+            do.measured("the distance from the square", missions.off_the_square, 1.2),
+            do.check(see.over(0.0, 0.0, 0.2)),
         ),
     ),
     Scenario(
@@ -141,10 +128,10 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: the mission ends",
         holds="killed three times on the way: lands within 3 m of its last item",
         steps=(
-            upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
-            start_mission,
+            do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
+            do.start_mission,
             lands_after(3, 9.0),
-            check(every(DISARMED, over(0.0, 0.0, 3.0))),
+            do.check(see.every(see.DISARMED, see.over(0.0, 0.0, 3.0))),
         ),
         setting={"feedback": "sensors", "seed": 3},
     ),
@@ -159,7 +146,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         name="what-is-meant-for-another-moves-nothing",
         peer="ours",
         holds="stays within 0.01 m",
-        steps=(is_not_moved, hold(every(near(PLACE, 0.01), mode(Mode.HOLD)), for_=1.0)),
+        steps=(is_not_moved, do.hold(see.every(see.near(PLACE, 0.01), see.mode(Mode.HOLD)), for_=1.0)),
         setting={"airborne": 5.0},
     ),
     Scenario(
@@ -167,10 +154,10 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours: a declared time to solve delays the rotors",
         holds="7 ms of 8: a step of 3 m ends within 0.05 m after 8 s",
         steps=(
-            put("SIM_SOLVE_MS", 7.0),
-            goto((3.0, 0.0, 5.0), wait=False),
-            until(near((3.0, 0.0, 5.0), 0.05), within=8.0),
-            hold(every(near((3.0, 0.0, 5.0), 0.1), tilted_less(10.0)), for_=3.0),
+            do.put("SIM_SOLVE_MS", 7.0),
+            do.goto((3.0, 0.0, 5.0), wait=False),
+            do.until(see.near((3.0, 0.0, 5.0), 0.05), within=8.0),
+            do.hold(see.every(see.near((3.0, 0.0, 5.0), 0.1), see.tilted_less(10.0)), for_=3.0),
         ),
         setting={"airborne": 5.0},
     ),
@@ -179,10 +166,10 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="ours",
         holds="half a second each way: goes there and back",
         steps=(
-            trouble("ground", delay_s=0.5),
-            goto((3.0, 0.0, 5.0)),
-            goto((0.0, 0.0, 5.0)),
-            check(every(near(PLACE, 0.3), above(4.7))),
+            do.trouble("ground", delay_s=0.5),
+            do.goto((3.0, 0.0, 5.0)),
+            do.goto((0.0, 0.0, 5.0)),
+            do.check(see.every(see.near(PLACE, 0.3), see.above(4.7))),
         ),
         setting={"airborne": 5.0},
     ),

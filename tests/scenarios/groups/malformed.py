@@ -12,13 +12,13 @@ from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.sitl import mission_items
 from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.vehicle import Sitl
-from tests.scenarios.words.conditions import ARMED, DISARMED, every, height, mode, near
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario, Step
-from tests.scenarios.words.steps import arm, check, command, hold, measured, refused, upload, upload_fence
 from tools.fuzz.messages import Messages
 
 PLACE = (0.0, 0.0, 5.0)
-STAYS = hold(every(near(PLACE, 0.01), ARMED, mode(Mode.HOLD)), for_=1.0)
+STAYS = do.hold(see.every(see.near(PLACE, 0.01), see.ARMED, see.mode(Mode.HOLD)), for_=1.0)
 FRAME: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 WAYPOINT: int = mav.MAV_CMD_NAV_WAYPOINT
 TOO_MANY = 65535
@@ -96,7 +96,7 @@ SCENARIOS = (
         holds="not a number, infinite, beyond the poles: refused, and it stays",
         steps=(
             *(
-                command(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, *place, result=mav.MAV_RESULT_DENIED)
+                do.command(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, *place, result=mav.MAV_RESULT_DENIED)
                 for place in ((inf, 8.5, 500.0), (91.0, 8.5, 500.0), (47.4, 181.0, 500.0), (47.4, 8.5, inf))
             ),
             STAYS,
@@ -121,7 +121,7 @@ SCENARIOS = (
         holds="refused item by item, and no mission is left",
         steps=(
             *(
-                refused(upload([on_wire(**wrong)]), "mission")
+                do.refused(do.upload([on_wire(**wrong)]), "mission")
                 for wrong in (
                     {"x": 2_000_000_000},
                     {"z": nan},
@@ -132,7 +132,7 @@ SCENARIOS = (
                 )
             ),
             many_items_refused,
-            check(DISARMED),
+            do.check(see.DISARMED),
         ),
     ),
     Scenario(
@@ -140,11 +140,11 @@ SCENARIOS = (
         peer="AP: refused",
         holds="two corners, a negative and an infinite radius: refused, and it arms by the fence before: none",
         steps=(
-            refused(upload_fence(mission_items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
-            refused(upload_fence(mission_items.circle(-1.0)), "fence"),
-            refused(upload_fence(mission_items.circle(inf)), "fence"),
-            arm(),
-            check(ARMED),
+            do.refused(do.upload_fence(mission_items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
+            do.refused(do.upload_fence(mission_items.circle(-1.0)), "fence"),
+            do.refused(do.upload_fence(mission_items.circle(inf)), "fence"),
+            do.arm(),
+            do.check(see.ARMED),
         ),
     ),
     Scenario(
@@ -156,8 +156,8 @@ SCENARIOS = (
             lambda sitl: sitl.select(Mode.OFFBOARD),
             lambda sitl: sitl.run(1.0, lambda: sitl.setpoint(position=(1e12, 0.0, 5.0))),
             lambda sitl: sitl.run(1.0, lambda: sitl.setpoint(velocity=(1e9, 0.0, 0.0))),
-            measured("the speed", lambda columns: float(abs(columns["vx"]).max()), 12.5),
-            check(height(5.0, 0.3)),
+            do.measured("the speed", lambda columns: float(abs(columns["vx"]).max()), 12.5),
+            do.check(see.height(5.0, 0.3)),
         ),
         setting={"airborne": 5.0},
     ),

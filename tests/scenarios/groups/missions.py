@@ -4,23 +4,9 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl import mission_items
 from colibri.sitl.flight_record import Columns
 from colibri.sitl.vehicle import Sitl
-from tests.scenarios.words.conditions import DISARMED, away, every, mode, near, over, slower
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario, Step
-from tests.scenarios.words.steps import (
-    at_every,
-    check,
-    hold,
-    measured,
-    places,
-    refused,
-    run,
-    select,
-    start_mission,
-    trouble,
-    until,
-    upload,
-    upload_fence,
-)
 
 SQUARE = ((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0))
 CORRIDOR = [mission_items.waypoint(east, north, 10.0, within_m=1.0) for east, north in SQUARE]
@@ -31,7 +17,7 @@ FIELD = mission_items.polygon([(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10
 
 def off_the_square(columns: Columns) -> float:
     """Return the figure: how far it was from the sides of the square, once it had come to it."""
-    flown = places(columns)
+    flown = do.places(columns)
     x, y = flown[flown[:, 2] > 9.5][:, 0], flown[flown[:, 2] > 9.5][:, 1]
     inside = (x > 0.0) & (x < 20.0) & (y > 0.0) & (y < 20.0)
     sides = [abs(x), abs(x - 20.0), abs(y), abs(y - 20.0)]
@@ -45,7 +31,7 @@ def off_the_square(columns: Columns) -> float:
 def reads_back(count: int) -> Step:
     def step(sitl: Sitl) -> None:
         sitl.gcs.forget()
-        ask = at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
+        ask = do.at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
         sitl.wait_until(lambda: ask(sitl) or sitl.heard("MISSION_COUNT"), within=10.0, what="MISSION_COUNT")
         assert sitl.gcs.latest("MISSION_COUNT").count == count
 
@@ -53,12 +39,12 @@ def reads_back(count: int) -> Step:
 
 
 def changes_mode_while_it_uploads(sitl: Sitl) -> None:
-    upload = sitl.gcs.begin_upload([item.on_wire(sitl.origin) for item in LONG])
+    sent = sitl.gcs.begin_upload([item.on_wire(sitl.origin) for item in LONG])
     sitl.run(0.05)
-    assert upload.result is None
+    assert sent.result is None
     sitl.select(Mode.LAND)
-    sitl.wait_until(lambda: upload.result is not None, within=20.0, what="the upload")
-    assert upload.result == 0
+    sitl.wait_until(lambda: sent.result is not None, within=20.0, what="the upload")
+    assert sent.result == 0
     assert sitl.mode is Mode.LAND
 
 
@@ -68,11 +54,11 @@ SCENARIOS = (
         peer="PX4: 5 m to either side, 500 simulated seconds at most",
         holds="1.1 m to either side, 80 s",
         steps=(
-            upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
-            start_mission,
-            until(DISARMED, within=80.0),
-            measured("the distance from the square", off_the_square, 1.1),
-            check(over(0.0, 0.0, 0.1)),
+            do.upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
+            do.start_mission,
+            do.until(see.DISARMED, within=80.0),
+            do.measured("the distance from the square", off_the_square, 1.1),
+            do.check(see.over(0.0, 0.0, 0.1)),
         ),
     ),
     Scenario(
@@ -80,12 +66,12 @@ SCENARIOS = (
         peer="PX4: to 0.3 m within 10 s each, home within 2 m",
         holds="0.3 m within 7 s each, home within 0.05 m",
         steps=(
-            upload([mission_items.takeoff(5.0), *STEPS, mission_items.return_home()]),
-            start_mission,
-            until(near((0.0, 0.0, 5.0), 0.3), within=10.0),
-            *(until(near((5.0 * (n % 2), 0.0, 5.0), 0.3), within=7.0) for n in range(1, 4)),
-            until(DISARMED, within=90.0),
-            check(over(0.0, 0.0, 0.05)),
+            do.upload([mission_items.takeoff(5.0), *STEPS, mission_items.return_home()]),
+            do.start_mission,
+            do.until(see.near((0.0, 0.0, 5.0), 0.3), within=10.0),
+            *(do.until(see.near((5.0 * (n % 2), 0.0, 5.0), 0.3), within=7.0) for n in range(1, 4)),
+            do.until(see.DISARMED, within=90.0),
+            do.check(see.over(0.0, 0.0, 0.05)),
         ),
         setting={"params": {"RTL_RETURN_ALT": 6.0}},
     ),
@@ -93,35 +79,35 @@ SCENARIOS = (
         name="nothing-is-lost-on-the-way-up",
         peer="MAVSDK: 5 % loss, 20 items, up = down",
         holds="20 % loss each way, 20 items, the count is right",
-        steps=(trouble("ground", loss=0.2), upload(LONG), trouble("ground", loss=0.0), reads_back(20)),
+        steps=(do.trouble("ground", loss=0.2), do.upload(LONG), do.trouble("ground", loss=0.0), reads_back(20)),
     ),
     Scenario(
         name="pauses-and-goes-on",
         peer="ours",
         holds="stands within 4 s of the pause, then ends the mission",
         steps=(
-            upload(
+            do.upload(
                 [
                     mission_items.takeoff(5.0),
                     mission_items.waypoint(25.0, 0.0, 5.0),
                     mission_items.waypoint(25.0, 5.0, 5.0),
                 ]
             ),
-            start_mission,
-            until(away(8.0), within=20.0),
-            select(Mode.HOLD),
-            until(slower(0.05), within=4.0),
-            hold(every(mode(Mode.HOLD), slower(0.1)), for_=2.0),
-            select(Mode.MISSION),
-            until(near((25.0, 5.0, 5.0), 0.3), within=20.0),
-            until(mode(Mode.HOLD), within=3.0),
+            do.start_mission,
+            do.until(see.away(8.0), within=20.0),
+            do.select(Mode.HOLD),
+            do.until(see.slower(0.05), within=4.0),
+            do.hold(see.every(see.mode(Mode.HOLD), see.slower(0.1)), for_=2.0),
+            do.select(Mode.MISSION),
+            do.until(see.near((25.0, 5.0, 5.0), 0.3), within=20.0),
+            do.until(see.mode(Mode.HOLD), within=3.0),
         ),
     ),
     Scenario(
         name="mode-changes-while-it-uploads",
         peer="ours",
         holds="the upload ends well, and the mode is the one chosen",
-        steps=(changes_mode_while_it_uploads, until(DISARMED, within=20.0), reads_back(20)),
+        steps=(changes_mode_while_it_uploads, do.until(see.DISARMED, within=20.0), reads_back(20)),
         setting={"airborne": 5.0},
     ),
     Scenario(
@@ -129,25 +115,25 @@ SCENARIOS = (
         peer="AP: refused",
         holds="refused, and says which item",
         steps=(
-            upload_fence(FIELD),
-            upload([mission_items.takeoff(5.0), mission_items.waypoint(50.0, 0.0, 5.0)]),
-            run(0.3),
-            refused(start_mission, "outside the geofence"),
-            check(DISARMED),
+            do.upload_fence(FIELD),
+            do.upload([mission_items.takeoff(5.0), mission_items.waypoint(50.0, 0.0, 5.0)]),
+            do.run(0.3),
+            do.refused(do.start_mission, "outside the geofence"),
+            do.check(see.DISARMED),
         ),
     ),
     Scenario(
         name="without-a-mission-there-is-none-to-fly",
         peer="ours",
         holds="refused, and says why",
-        steps=(refused(start_mission, "there is no mission"), check(DISARMED)),
+        steps=(do.refused(do.start_mission, "there is no mission"), do.check(see.DISARMED)),
     ),
     Scenario(
         name="jumps-back-so-often",
         peer="ours",
         holds="two rounds of two items, then the last",
         steps=(
-            upload(
+            do.upload(
                 [
                     mission_items.takeoff(5.0),
                     mission_items.waypoint(4.0, 0.0, 5.0),
@@ -156,12 +142,12 @@ SCENARIOS = (
                     mission_items.waypoint(0.0, 3.0, 5.0),
                 ]
             ),
-            start_mission,
-            until(near((4.0, 0.0, 5.0), 0.3), within=20.0),
-            until(near((0.0, 0.0, 5.0), 0.3), within=10.0),
-            until(near((4.0, 0.0, 5.0), 0.3), within=10.0),
-            until(near((0.0, 3.0, 5.0), 0.3), within=15.0),
-            until(mode(Mode.HOLD), within=3.0),
+            do.start_mission,
+            do.until(see.near((4.0, 0.0, 5.0), 0.3), within=20.0),
+            do.until(see.near((0.0, 0.0, 5.0), 0.3), within=10.0),
+            do.until(see.near((4.0, 0.0, 5.0), 0.3), within=10.0),
+            do.until(see.near((0.0, 3.0, 5.0), 0.3), within=15.0),
+            do.until(see.mode(Mode.HOLD), within=3.0),
         ),
     ),
     Scenario(
@@ -169,11 +155,11 @@ SCENARIOS = (
         peer="PX4: 5 m to either side of the corridor",
         holds="2.5 m to either side, lands within 2 m",
         steps=(
-            upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
-            start_mission,
-            until(DISARMED, within=90.0),
-            measured("the distance from the square", off_the_square, 2.5),
-            check(over(0.0, 0.0, 2.0)),
+            do.upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
+            do.start_mission,
+            do.until(see.DISARMED, within=90.0),
+            do.measured("the distance from the square", off_the_square, 2.5),
+            do.check(see.over(0.0, 0.0, 2.0)),
         ),
         setting={"feedback": "sensors", "wind": "5@270", "turbulence": "light", "seed": 4},
     ),
@@ -182,7 +168,7 @@ SCENARIOS = (
         peer="ours",
         holds="8 m/s on the leg after the item that says so, 5 m/s before",
         steps=(
-            upload(
+            do.upload(
                 [
                     mission_items.takeoff(5.0),
                     mission_items.waypoint(25.0, 0.0, 5.0, within_m=1.0),
@@ -190,11 +176,11 @@ SCENARIOS = (
                     mission_items.waypoint(25.0, 50.0, 5.0),
                 ]
             ),
-            start_mission,
-            until(near((25.0, 0.0, 5.0), 1.0), within=25.0),
-            measured("the speed", lambda columns: float(abs(columns["vx"]).max()), 5.05),
-            until(near((25.0, 50.0, 5.0), 0.3), within=20.0),
-            measured("the speed", lambda columns: float(abs(columns["vy"]).max()), 8.1, minimum=7.9),
+            do.start_mission,
+            do.until(see.near((25.0, 0.0, 5.0), 1.0), within=25.0),
+            do.measured("the speed", lambda columns: float(abs(columns["vx"]).max()), 5.05),
+            do.until(see.near((25.0, 50.0, 5.0), 0.3), within=20.0),
+            do.measured("the speed", lambda columns: float(abs(columns["vy"]).max()), 8.1, minimum=7.9),
         ),
     ),
 )

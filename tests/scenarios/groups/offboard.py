@@ -5,9 +5,9 @@ from math import inf, nan
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
-from tests.scenarios.words.conditions import ARMED, climbs, every, ground_speed, mode, near, says, slower
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario
-from tests.scenarios.words.steps import check, command, hold, refused, select, setpoint, takeoff, until
 
 PLACE = (0.0, 0.0, 5.0)
 THERE = (3.0, 2.0, 6.0)
@@ -17,15 +17,15 @@ CAMERA_TRIGGER: int = mav.MAV_CMD_DO_SET_CAM_TRIGG_DIST
 def lost_at_its_time(sitl: Sitl) -> None:
     """Stop sending setpoints, and see when it notices: COM_OF_LOSS_T after the last, to a control sample."""
     timeout_s = float(sitl.get_param("COM_OF_LOSS_T"))
-    setpoint(position=PLACE)(sitl)
-    sitl.run(0.02, lambda: setpoint(position=PLACE)(sitl))
+    do.setpoint(position=PLACE)(sitl)
+    sitl.run(0.02, lambda: do.setpoint(position=PLACE)(sitl))
     began_s = sitl.time_s
     sitl.wait_until(lambda: sitl.mode is not Mode.OFFBOARD, within=timeout_s + 1.0, what="the loss to be noticed")
     assert abs(sitl.time_s - began_s - timeout_s) <= 0.02 + 0.008
 
 
 def begin_offboard(sitl: Sitl) -> None:
-    sitl.run(0.2, lambda: setpoint(position=PLACE)(sitl))
+    sitl.run(0.2, lambda: do.setpoint(position=PLACE)(sitl))
     sitl.select(Mode.OFFBOARD)
 
 
@@ -36,8 +36,10 @@ SCENARIOS = (
         holds="to 0.02 m within 5 s",
         steps=(
             begin_offboard,
-            until(every(near(THERE, 0.02), slower(0.1)), within=5.0, meanwhile=setpoint(position=THERE)),
-            hold(near(THERE, 0.02), for_=2.0, meanwhile=setpoint(position=THERE)),
+            do.until(
+                see.every(see.near(THERE, 0.02), see.slower(0.1)), within=5.0, meanwhile=do.setpoint(position=THERE)
+            ),
+            do.hold(see.near(THERE, 0.02), for_=2.0, meanwhile=do.setpoint(position=THERE)),
         ),
         setting={"airborne": 5.0},
     ),
@@ -47,11 +49,11 @@ SCENARIOS = (
         holds="3 m/s ± 0.02 m/s from 2 s on",
         steps=(
             begin_offboard,
-            lambda sitl: sitl.run(2.0, lambda: setpoint(velocity=(3.0, 0.0, 0.0))(sitl)),
-            hold(
-                every(ground_speed(3.0, 0.02), climbs(0.0, 0.02)),
+            lambda sitl: sitl.run(2.0, lambda: do.setpoint(velocity=(3.0, 0.0, 0.0))(sitl)),
+            do.hold(
+                see.every(see.ground_speed(3.0, 0.02), see.climbs(0.0, 0.02)),
                 for_=3.0,
-                meanwhile=setpoint(velocity=(3.0, 0.0, 0.0)),
+                meanwhile=do.setpoint(velocity=(3.0, 0.0, 0.0)),
             ),
         ),
         setting={"airborne": 5.0},
@@ -60,7 +62,7 @@ SCENARIOS = (
         name="no-setpoints-no-mode",
         peer="PX4: refused",
         holds="refused, and says what to do",
-        steps=(refused(select(Mode.OFFBOARD), "send them before the mode"), check(mode(Mode.HOLD))),
+        steps=(do.refused(do.select(Mode.OFFBOARD), "send them before the mode"), do.check(see.mode(Mode.HOLD))),
         setting={"airborne": 5.0},
     ),
     Scenario(
@@ -70,7 +72,7 @@ SCENARIOS = (
         steps=(
             begin_offboard,
             *(
-                hold(near(PLACE, 0.05), for_=0.6, meanwhile=setpoint(velocity=bad))
+                do.hold(see.near(PLACE, 0.05), for_=0.6, meanwhile=do.setpoint(velocity=bad))
                 for bad in ((nan, 0.0, 0.0), (0.0, inf, 0.0), (0.0, 0.0, -inf), (nan, nan, nan))
             ),
         ),
@@ -83,8 +85,8 @@ SCENARIOS = (
         steps=(
             begin_offboard,
             lost_at_its_time,
-            hold(every(mode(Mode.HOLD), near(PLACE, 0.1), ARMED), for_=2.0),
-            check(says("setpoints lost")),
+            do.hold(see.every(see.mode(Mode.HOLD), see.near(PLACE, 0.1), see.ARMED), for_=2.0),
+            do.check(see.says("setpoints lost")),
         ),
         setting={"airborne": 5.0},
     ),
@@ -93,9 +95,11 @@ SCENARIOS = (
         peer="PX4: 5 m to 0.3 m within 10 s",
         holds="to 1 m of the truth within 8 s, in wind",
         steps=(
-            takeoff(5.0),
+            do.takeoff(5.0),
             begin_offboard,
-            until(every(near(THERE, 1.0), slower(0.5)), within=8.0, meanwhile=setpoint(position=THERE)),
+            do.until(
+                see.every(see.near(THERE, 1.0), see.slower(0.5)), within=8.0, meanwhile=do.setpoint(position=THERE)
+            ),
         ),
         setting={"feedback": "sensors", "wind": "4@90", "turbulence": "light", "seed": 2},
     ),
@@ -104,8 +108,8 @@ SCENARIOS = (
         peer="PX4: unsupported parameters are INVALID_PARAM or DENIED",
         holds="an unknown command is UNSUPPORTED, at once, and nothing else happens",
         steps=(
-            command(CAMERA_TRIGGER, 5.0, result=mav.MAV_RESULT_UNSUPPORTED),
-            hold(near(PLACE, 0.02), for_=1.0),
+            do.command(CAMERA_TRIGGER, 5.0, result=mav.MAV_RESULT_UNSUPPORTED),
+            do.hold(see.near(PLACE, 0.02), for_=1.0),
         ),
         setting={"airborne": 5.0},
     ),
@@ -115,8 +119,10 @@ SCENARIOS = (
         holds="the mode that is chosen wins over setpoints that still come",
         steps=(
             begin_offboard,
-            select(Mode.HOLD),
-            hold(every(mode(Mode.HOLD), near(PLACE, 0.05)), for_=2.0, meanwhile=setpoint(position=THERE)),
+            do.select(Mode.HOLD),
+            do.hold(
+                see.every(see.mode(Mode.HOLD), see.near(PLACE, 0.05)), for_=2.0, meanwhile=do.setpoint(position=THERE)
+            ),
         ),
         setting={"airborne": 5.0},
     ),

@@ -11,9 +11,9 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.flight_record import Columns
 from colibri.sitl.vehicle import Sitl
-from tests.scenarios.words.conditions import ARMED, above, every, tilted_less
+from tests.scenarios.words import conditions as see
+from tests.scenarios.words import steps as do
 from tests.scenarios.words.scenario import Scenario, Step
-from tests.scenarios.words.steps import command, hold, measured, places, run
 
 
 def off_track(name: str, since_s: float) -> Callable[[Columns], float]:
@@ -21,14 +21,14 @@ def off_track(name: str, since_s: float) -> Callable[[Columns], float]:
 
     def figure(columns: Columns) -> float:
         late = columns["t"] >= since_s
-        error = places(columns)[late] - position(track(name), columns["t"][late])
+        error = do.places(columns)[late] - position(track(name), columns["t"][late])
         return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
 
     return figure
 
 
 def on_track(name: str, *, rms_m: float, seconds: float, since_s: float = 5.0) -> tuple[Step, ...]:
-    return run(seconds), measured("the RMS error", off_track(name, since_s), rms_m)
+    return do.run(seconds), do.measured("the RMS error", off_track(name, since_s), rms_m)
 
 
 def begins(name: str, **more: object) -> dict[str, object]:
@@ -94,7 +94,7 @@ SCENARIOS = (
         name="circle-keeps-its-speed",
         peer="AP CircleSpeed: ± 0.1 m/s for 10 s",
         holds="± 0.01 m/s for 10 s",
-        steps=(run(15.0), circles_at(4.0, 0.01)),
+        steps=(do.run(15.0), circles_at(4.0, 0.01)),
         setting=begins(CIRCLE),
     ),
     Scenario(
@@ -116,8 +116,8 @@ SCENARIOS = (
         peer="ours: saturates, never diverges",
         holds="a figure of eight at 20 m/s: never more than 6 m off, never below 1 m, tilt at most 75°",
         steps=(
-            hold(every(ARMED, above(1.0), tilted_less(75.0)), for_=20.0),
-            measured("the RMS error", off_track(FAST, 5.0), 6.0),
+            do.hold(see.every(see.ARMED, see.above(1.0), see.tilted_less(75.0)), for_=20.0),
+            do.measured("the RMS error", off_track(FAST, 5.0), 6.0),
         ),
         setting=begins(FAST),
     ),
@@ -126,8 +126,8 @@ SCENARIOS = (
         peer="ours: bounded near 90°",
         holds="pitched up by 89°: upright again within 2 s, at most 3 m lost",
         steps=(
-            hold(above(17.0), for_=2.0),
-            hold(every(above(17.0), tilted_less(20.0)), for_=3.0),
+            do.hold(see.above(17.0), for_=2.0),
+            do.hold(see.every(see.above(17.0), see.tilted_less(20.0)), for_=3.0),
         ),
         setting={"airborne": 20.0, "start": {"theta": -89.0}},
     ),
@@ -137,9 +137,9 @@ SCENARIOS = (
         holds="by its own estimate at most 0.02 m; from the truth 1.2 m",
         steps=(
             lambda sitl: sitl.fly_track("spiral"),
-            run(28.0),
-            *(command(INTERVAL, float(number), 8_000.0, result=mav.MAV_RESULT_ACCEPTED) for number in (32, 85)),
-            run(2.0),
+            do.run(28.0),
+            *(do.command(INTERVAL, float(number), 8_000.0, result=mav.MAV_RESULT_ACCEPTED) for number in (32, 85)),
+            do.run(2.0),
             lambda sitl: follows_by_its_estimate(sitl, 0.05),
         ),
         setting={"feedback": "sensors"},
