@@ -21,7 +21,6 @@ SPEED = 4.0
 
 
 def snippets(beginning: str) -> list[str]:
-    """Return the fenced blocks behind the heading that begins so, before the next one."""
     _, _, behind = f"\n{PAGE.read_text(encoding='utf-8')}".partition(f"\n{beginning}")
     assert behind, f"the page has no line that begins with {beginning}"
     behind = behind.partition("\n## ")[0]
@@ -49,7 +48,6 @@ def assert_landed(flown: Vehicle) -> None:
 
 
 def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
-    """What QGroundControl does then is in test_qgroundcontrol.py."""
     assert snippets("# Connect")[0] == ".venv/bin/colibri sitl\n"
 
 

@@ -144,7 +144,6 @@ def test_a_mission_a_fence_and_rally_points(tmp_path: Path) -> None:
 
 
 def items(path: Path) -> list[list[float]]:
-    """Return the rows of a file of items, without the number of the current one."""
     rows = path.read_text(encoding="utf-8").splitlines()[1:]
     return [[float(value) for column, value in enumerate(row.split()) if column != 1] for row in rows]
 

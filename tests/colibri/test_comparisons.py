@@ -21,7 +21,7 @@ from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 from tests.support.campaigns import Here, Hovers
-from tests.support.commands import Refused
+from tests.support.commands import Ran, Refused
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
 
@@ -73,9 +73,9 @@ def test_only_what_is_asked_for_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_controllers_side_by_side(tmp_path: Path, ran: Ran) -> None:
     contenders = ["--profile", "thesis", "--profile", "thesis:global-lpv-mpc"]
-    assert main(["compare", *contenders, "--track", "line", "--track", "spiral", "--out", str(tmp_path)]) == 1
+    said = ran("compare", *contenders, "--track", "line", "--track", "spiral", "--out", tmp_path, code=1).out
     lines = (tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ",".join(COLUMNS)
     assert [line.split(",")[:2] for line in lines[1:]] == [
@@ -90,7 +90,6 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert len(table) == 6
     assert table[2].startswith("| thesis | line | 0.05783 | ")
     assert [line.split(",")[7] != "" for line in lines[1:]] == [False, False, True, True], "the times of the lost ones"
-    said = capsys.readouterr().out
     assert "thesis:global-lpv-mpc, spiral: lost at t = " in said
 
 
@@ -119,7 +118,7 @@ def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
     }
 
 
-def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, ran: Ran) -> None:
     """By options of `colibri fly` that change neither the table nor its columns; again only what has changed."""
     copy, out = written(tmp_path / "p", "t2.toml"), tmp_path / "out"
     options = ["--track", "hover", "--duration", "0.5", "--wind", "2@270", "--without", "drag", "--start", "z=3"]
@@ -133,9 +132,7 @@ def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, capsys: py
     assert tuple(row) == COLUMNS
     assert (row["controller"], row["RMS (m)"], row["why"]) == ("t2", "-", "")
     flown = (folder / "flight.csv").stat().st_mtime_ns
-    capsys.readouterr()
-    assert main([*command, "--resume"]) == 0
-    said = capsys.readouterr().out
+    said = ran(*command, "--resume").out
     assert said.startswith("--resume: 1 of 1 flights were flown already, by the same contents\n")
     assert max(map(len, said.splitlines()[2:])) <= 80, "as wide as a terminal"
     assert (folder / "flight.csv").stat().st_mtime_ns == flown
@@ -153,24 +150,22 @@ class Raises(Hovers):
 
 
 def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran
 ) -> None:
     monkeypatch.setattr(Pool, "each", Here().each)
     laws = {"geometric-se3": Raises, "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]
-    assert main(["compare", *options, "--out", str(tmp_path)]) == 1
+    said = ran("compare", *options, "--out", tmp_path, code=1).out
     lost, fine = csv.DictReader((tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines())
     why = "controller geometric-se3 raised at t = 0.200 s: KeyError: 'gain'; its traceback is in "
     assert lost["why"].startswith(why)
     assert "in step" in Path(lost["why"].removeprefix(why)).read_text(encoding="utf-8")
     assert fine["why"] == ""
-    assert f"flight:geometric-se3, hover: lost at t = 0.20 s: {why}" in capsys.readouterr().out
+    assert f"flight:geometric-se3, hover: lost at t = 0.20 s: {why}" in said
 
 
-def test_a_flight_that_kills_its_process_is_lost(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_flight_that_kills_its_process_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran) -> None:
     def kills(_pool: Pool, work: Any, common: Any, jobs: Iterable[Point]) -> Iterator[tuple[Point, Any]]:
         for job in jobs:
             yield job, Killed() if job.settings["profile"] == "se3" else work(common, job)
@@ -183,9 +178,8 @@ def test_a_flight_that_kills_its_process_is_lost(
     assert lost[8] == "the process that flew it was killed, and again when it flew this alone"
     assert fine[7:] == ["", ""]
     monkeypatch.setattr(Pool, "each", Here().each)
-    capsys.readouterr()
-    assert main([*command, "--out", str(tmp_path), "--resume"]) == 0
-    assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
+    said = ran(*command, "--out", tmp_path, "--resume").out
+    assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in said
 
 
 def test_a_law_that_cannot_be_built_is_found_first(

@@ -152,7 +152,6 @@ def test_rotor_limits(short: Flight, vehicle: str) -> None:
 
 @pytest.mark.parametrize("size", [1e-7, 1e-3, 0.02, 1.0, 500.0, 1e5])
 def test_no_label_of_an_axis_reaches_those_of_its_ticks(short: Flight, size: float) -> None:
-    """Of numbers of whatever size."""
     t = short.series["t"]
     values = {"t": t, "x": size * np.sin(t)}
     panel = Panel("error (m)", (Curve("x", "flown"),))

@@ -65,7 +65,6 @@ def test_it_ends_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
 
 
 def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
-    """It reaches the whole group; the plant and the autopilot are loading."""
     command = [sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
     errors = tmp_path / "errors"
     with errors.open("wb") as said:

@@ -11,7 +11,6 @@ from pyulog import ULog
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
-from colibri.cli.main import main
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import COMMAND
@@ -19,7 +18,7 @@ from colibri.mavlink.ulog.inputs import Kind, encode_input
 from colibri.mavlink.ulog.reader import FlightFile
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode
-from tests.support.commands import Refused
+from tests.support.commands import Ran, Refused
 from tools.harness.observer import Observer
 from tools.harness.processes import Process, fly, running
 
@@ -41,14 +40,13 @@ def copy(flight: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(flight, tmp_path / "flight"))
 
 
-def test_a_flight_is_replayed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_flight_is_replayed(flight: Path, ran: Ran) -> None:
     for named in (flight / "flight.ulg", flight):
-        assert main(["replay", str(named)]) == 0
-        assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
+        assert ran("replay", named).out == "500 commands up to t = 1.996 s, all identical\n"
 
 
 def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran
 ) -> None:
     """Profile, vehicle and waypoints are relative, and are others by then."""
     monkeypatch.chdir(tmp_path)
@@ -61,23 +59,18 @@ def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
     Path("my-flight.toml").write_text("", encoding="utf-8")
     Path("my-hummingbird.toml").unlink()
     identical = "250 commands up to t = 0.996 s, all identical\n"
-    flight = str(tmp_path / "out" / "flight.ulg")
+    flight = tmp_path / "out" / "flight.ulg"
     monkeypatch.chdir("/")
-    assert main(["replay", flight]) == 0
-    assert capsys.readouterr().out == identical
+    assert ran("replay", flight).out == identical
     monkeypatch.chdir(tmp_path)
     shutil.copy(ROOT / "autopilot/profiles/se3.toml", "my-flight.toml")
-    assert main(["replay", flight]) == 0
-    assert capsys.readouterr().out == f"{identical}profile my-flight.toml is another by now: replayed as it flew\n"
+    assert ran("replay", flight).out == f"{identical}profile my-flight.toml is another by now: replayed as it flew\n"
 
 
-def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, ran: Ran) -> None:
     log = copy / "flight.ulg"
     log.write_bytes(log.read_bytes()[:80_000])
-    with pytest.raises(SystemExit) as end:
-        main(["replay", str(log)])
-    assert end.value.code == 1
-    said = capsys.readouterr()
+    said = ran("replay", log, code=1)
     assert said.out.endswith(" s, all identical\n")
     assert said.err.endswith(" s, and the flight went on to t = 2.000 s: it was cut off\n")
 
@@ -98,13 +91,10 @@ def change(log: Path, time_us: int, more: float) -> None:
     log.write_bytes(content)
 
 
-def test_the_first_command_that_differs_is_named(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_first_command_that_differs_is_named(copy: Path, ran: Ran) -> None:
     """By the least that the wire can carry."""
     change(copy / "flight.ulg", CHANGED_US, 2e-7)
-    with pytest.raises(SystemExit) as end:
-        main(["replay", str(copy)])
-    assert end.value.code == 1
-    said = capsys.readouterr()
+    said = ran("replay", copy, code=1)
     assert said.out.startswith("first difference at t = 1.000 s, in mode track\n")
     assert "m/s, roll" in said.out
     assert said.err.endswith("flight.ulg: the autopilot does not answer as it did, after 250 commands\n")

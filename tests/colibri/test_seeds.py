@@ -20,15 +20,16 @@ from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
 from colibri.studies.seeds import METRICS
 from tests.support.campaigns import Here
+from tests.support.commands import FLIGHT, Ran, Refused
 
 _SENSORS = load_vehicle("hummingbird").sensors
 assert _SENSORS is not None
 MEASURED_HERE = kinds_of(_SENSORS)
 
 
-def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, ran: Ran) -> None:
     options = ["--profile", "flight", "--feedback", "sensors", "--seeds", "1-2", "--track", "hover", "--duration", "22"]
-    assert main(["compare", *options, "--out", str(tmp_path)]) == 0
+    assert "hover" in ran("compare", *options, "--out", tmp_path).out
     with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
         flights = list(csv.DictReader(file))
     assert [flight["seed"] for flight in flights] == ["1", "2"]
@@ -43,7 +44,6 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: py
     table = (tmp_path / "seeds.md").read_text(encoding="utf-8")
     assert "| flight | hover | 2 | 0 |" in table
     assert (tmp_path / "seeds.png").stat().st_size > 10_000
-    assert "hover" in capsys.readouterr().out
 
 
 def test_a_vehicle_has_some_of_the_kinds_in_their_order() -> None:
@@ -52,7 +52,7 @@ def test_a_vehicle_has_some_of_the_kinds_in_their_order() -> None:
 
 
 def test_what_is_there_is_not_flown_again(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, ran: Ran, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     command = ["compare", "--profile", "flight", "--track", "hover", "--duration", "0.5", "--out", str(tmp_path)]
 
@@ -66,21 +66,14 @@ def test_what_is_there_is_not_flown_again(
     journal = (tmp_path / "seeds-journal.jsonl").read_bytes()
     (tmp_path / "seeds-journal.jsonl").write_bytes(journal[:-1])  # killed while it wrote
     options = [*command, "--seeds", "1-2", "--resume"]
-    assert main(options) == 0
-    assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
+    assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in ran(*options).out
     monkeypatch.setattr(Pool, "each", fly_none)
-    assert main(options) == 0
-    assert "--resume: 2 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
+    assert "--resume: 2 of 2 flights were flown already, by the same contents\n" in ran(*options).out
     assert (tmp_path / "seeds-flights.csv").read_text(encoding="utf-8") == flown
     assert main([*command, "--seeds", "2-2", "--resume"]) == 0
     assert (tmp_path / "seeds.csv").read_text(encoding="utf-8").splitlines()[1].startswith("flight,hover,1,0,")
-    with pytest.raises(SystemExit) as end:
-        main([*options, "--wind", "5@270"])
-    assert end.value.code == 2
-    line = (
-        r"colibri: error: --resume: .* has flights by other settings \([a-z_]+=[^ ]+, now [^ ]+\): give another --out\n"
-    )
-    assert re.fullmatch(line, capsys.readouterr().err)
+    line = r"--resume: .* has flights by other settings \([a-z_]+=[^ ]+, now [^ ]+\): give another --out"
+    assert re.fullmatch(line, refused(*options, "--wind", "5@270"))
 
 
 def test_a_lost_vehicle_is_counted_and_exits_with_1(tmp_path: Path) -> None:
@@ -116,31 +109,29 @@ def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pyte
     assert [text.get_text() for text in figure.axes[0].texts] == ["2 lost"]
 
 
-def test_what_changed_since_is_flown_again(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_changed_since_is_flown_again(tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     """A profile's contents count, not its name; the options are the same."""
     monkeypatch.setattr(Pool, "each", Here().each)
     profile, out = tmp_path / "mine.toml", tmp_path / "out"
-    assert main(["show", "profile", "flight"]) == 0
-    text = capsys.readouterr().out
+    text = FLIGHT.read_text(encoding="utf-8")
     profile.write_text(text, encoding="utf-8")
-    command = ["compare", "--profile", str(profile), "--track", "hover", "--seeds", "1-2", "--duration", "0.5"]
+    command = ["compare", "--profile", profile, "--track", "hover", "--seeds", "1-2", "--duration", "0.5"]
 
-    def hashes(*options: str) -> list[str]:
-        assert main([*command, "--out", str(out), *options]) == 0
+    def flown(*options: str) -> tuple[str, list[str]]:
+        said = ran(*command, "--out", out, *options).out
         with (out / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         assert {row["contender"] for row in rows} == {"mine"}
-        return [row["trajectory_sha256"] for row in rows]
+        return said, [row["trajectory_sha256"] for row in rows]
 
-    first = hashes()
-    assert hashes("--resume") == first
-    said = capsys.readouterr().out
+    _, first = flown()
+    said, again = flown("--resume")
+    assert again == first
     assert "--resume: 2 of 2 flights were flown already" in said
     assert "control" in said
     assert "NEES" not in said, "nothing is estimated"
     assert max(map(len, said.splitlines()[2:])) <= 80
     profile.write_text("# a remark\n" + text.replace("poles = [-5.0, -6.0]", "poles = [-4.0, -6.0]"), encoding="utf-8")
-    assert set(hashes("--resume")).isdisjoint(first)
-    assert "--resume: 0 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
+    said, anew = flown("--resume")
+    assert set(anew).isdisjoint(first)
+    assert "--resume: 0 of 2 flights were flown already, by the same contents\n" in said

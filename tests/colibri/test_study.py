@@ -19,9 +19,10 @@ from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Settings, Study, campaign, table, write
 from colibri.studies.study_flights import Flown, fly
 from tests.support.campaigns import Here
+from tests.support.commands import Ran
 
 SHORT: Settings = {"track": "hover:height=20", "start": {"z": 20.0, "phi": 170.0}, "duration": 0.8}
-NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]
+NAMES = [study.name for study in STUDIES]
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +54,6 @@ def moved(flown: Flown, *, to_t_s: float, by_m: float) -> Flown:
 def of_name(name: str) -> Study:
     (found,) = [study for study in STUDIES if study.name == name]
     return found
-
-
-def test_the_studies() -> None:
-    assert [study.name for study in STUDIES] == NAMES
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -176,15 +173,13 @@ _LEVEL: Settings = {
 
 
 @pytest.mark.long
-def test_a_study_from_the_command_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_study_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran) -> None:
     flown = {"6": {"track": "lemniscate:lap=6", "duration": 0.4}, "level": _LEVEL}
     cases = tuple(Case((name, ""), "", flight) for name, flight in flown.items())
     brief = of_name("recovery")._replace(cases=cases)
     monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief,))
-    assert main(["study", "recovery", "--out", str(tmp_path)]) == 0
-    assert "recovery: recovery.md, recovery.csv, recovery.png" in " ".join(capsys.readouterr().out.split())
+    said = ran("study", "recovery", "--out", tmp_path).out
+    assert "recovery: recovery.md, recovery.csv, recovery.png" in " ".join(said.split())
     assert (tmp_path / "recovery-6.svg").exists()
     level = (tmp_path / "recovery-level.svg").read_text(encoding="utf-8")
     assert "<!-- 20.000 -->" in level

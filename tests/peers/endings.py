@@ -26,12 +26,9 @@ RETURN = (1.0, 4.0, 5.0)
 """The mode that the pilot chooses; PX4 leaves those that need sticks at once where it has none."""
 GIVE_UP_S = 90.0
 FLIES_S = 3.0
-"""So long it flies before it is disturbed."""
 
 
 class Case(NamedTuple):
-    """One way to end."""
-
     limits: FlightLimits
     disturb: Callable[["Bench"], None]
 

@@ -45,8 +45,6 @@ PATIENT = FlightLimits(max_state_age_s=0.6, min_pace=0.01, max_gap_s=1.0)
 
 @dataclass
 class Bench:
-    """A vehicle, its companion and its pilot."""
-
     process: Popen[bytes]
     link: GroundLink
     pilot: GroundLink

@@ -44,7 +44,6 @@ def main(whom: str, program: str, folder: Path) -> None:
 
 @contextmanager
 def plant(whom: str, folder: Path, vehicle: str, speed: float) -> Iterator[Path]:
-    """Start our plant; give the file of the vehicle's parameters."""
     parameters = folder / "parameters"
     run([*_COLIBRI, "vehicle", vehicle, "--for", whom, "--out", str(parameters)], check=True)
     served = "px4" if whom == "px4" else "ardupilot-json"

@@ -21,7 +21,6 @@ HUMMINGBIRD = Airframe(
 
 
 def request(count: int, pulses: tuple[int, ...] = (1000,) * 4, rate_hz: int = 400, channels: int = 16) -> bytes:
-    """Return the datagram that asks for one step."""
     magic = MAGIC if channels == 16 else MAGIC_32
     return pack(f"<HHI{channels}H", magic, rate_hz, count, *pulses, *[0] * (channels - len(pulses)))
 

@@ -22,8 +22,6 @@ DRAWN = {MASS: {"uniform": [0.68, 0.74]}}
 
 
 class Here:
-    """Does one job after the other, in this process."""
-
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:
@@ -51,8 +49,6 @@ def tables_in(folder: Path) -> tuple[str, str]:
 
 
 class Hovers:
-    """A law that does nothing but carry the vehicle, `part` of it."""
-
     control_interval_us = 10_000
     preview = colibri.Preview(interval_us=10_000, samples=1)
 

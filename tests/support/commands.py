@@ -2,13 +2,22 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from colibri.cli.main import main
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
 FLIGHT = PROFILE.with_name("flight.toml")
+
+
+class Said(NamedTuple):
+    out: str
+    err: str
+
+
+Ran: TypeAlias = Callable[..., Said]
+"""(words of a command, code=exit code) -> what it says."""
 Refused: TypeAlias = Callable[..., str]
 """(words of a command that is refused, code=exit code) -> the one line that it says, without `colibri: error: `."""
 

@@ -50,7 +50,6 @@ def degrees_e7(sitl: Sitl, east_m: float, north_m: float) -> tuple[int, int]:
 def orbit(
     sitl: Sitl, radius_m: float, speed_m_s: float, *more: float, center: tuple[float, float] | None = None
 ) -> int:
-    """Order an orbit, around where the vehicle is unless there is a center; return the MAV_RESULT."""
     params = (radius_m, speed_m_s, *more, *(nan,) * (2 - len(more)))
     x, y = (NOT_GIVEN, NOT_GIVEN) if center is None else degrees_e7(sitl, *center)
     return sitl.gcs.order_int(mav.MAV_CMD_DO_ORBIT, *params, frame=RELATIVE, x=x, y=y, z=nan)

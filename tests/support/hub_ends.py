@@ -45,7 +45,6 @@ class CountedShell(Shell):
 
 
 def typed(text: bytes) -> tuple[object, ...]:
-    """Return the fields of a SERIAL_CONTROL of who types `text` into a shell, and waits for its answer."""
     device, flags = dialect.mav.SERIAL_CONTROL_DEV_SHELL, dialect.mav.SERIAL_CONTROL_FLAG_RESPOND
     return device, flags, 0, 0, len(text[:DATA_BYTES]), text[:DATA_BYTES].ljust(DATA_BYTES, b"\0")
 

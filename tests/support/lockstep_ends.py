@@ -28,7 +28,6 @@ def call(autopilot: AutopilotEnd, plant: PlantEnd) -> None:
 
 
 def offered(plant: PlantEnd, frame: Frame, plant_status: PlantStatus = NOTHING) -> bytes:
-    """Return the datagram by which the plant offers a frame."""
     plant.offer(frame, 0.0, plant_status)
     (outgoing,) = plant.take_outbox()
     return outgoing.datagram

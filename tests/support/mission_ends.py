@@ -25,7 +25,6 @@ VALID = Rules(lambda _: ACCEPTED, lambda _: ACCEPTED)
 
 
 def some_item(number: int = 0, **changes: Any) -> MissionItem:
-    """Return an item that differs from those of other numbers."""
     values = (3, 16, 1, 0.5 * number, 1.0, float("nan"), -0.25, 473977420 + number, 85455940 - number, 2.5 + number)
     return MissionItem(*values)._replace(**changes)
 

@@ -27,7 +27,6 @@ HOME = (2.0, -3.0, 0.5)
 def item(
     command: str, place: Vector | None = None, p1: float = nan, p2: float = nan, p3: float = nan, p4: float = nan
 ) -> MissionItem:
-    """Return an item; a place is from home, up relative to it."""
     number = getattr(mav, f"MAV_CMD_{command}")
     if place is None:
         return MissionItem(2, number, 1, p1, p2, p3, p4, 0, 0, 0.0)

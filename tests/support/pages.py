@@ -14,8 +14,6 @@ _HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
 
 
 class Block(NamedTuple):
-    """A fenced block."""
-
     page: str
     language: str
     text: str
@@ -29,7 +27,6 @@ def blocks(*languages: str) -> Iterator[Block]:
 
 
 def prose(path: Path) -> str:
-    """Return a page without its fenced blocks."""
     return _FENCE.sub("", path.read_text(encoding="utf-8"))
 
 

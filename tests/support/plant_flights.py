@@ -34,7 +34,6 @@ def hover(vehicle: Vehicle, share_of_weight: float = 1.0) -> ActuatorCommand:
 
 
 def rpm(vehicle: Vehicle, speed: float) -> float:
-    """Return a rotor speed in turns per minute."""
     return speed / vehicle.speed_from_rpm(1.0)
 
 

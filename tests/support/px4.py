@@ -83,7 +83,6 @@ class Px4:
 
 
 def serve(px4: Px4, link: GroundLink, until: Callable[[], bool], what: str) -> None:
-    """Hear what comes over a link, and answer it, until something has happened."""
     give_up_s = monotonic() + GIVE_UP_AFTER_S
     while not until():
         assert monotonic() < give_up_s, f"waited in vain for {what}"

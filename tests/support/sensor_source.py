@@ -42,13 +42,11 @@ def circle(t: Array) -> Array:
 
 
 def hover(t: Array) -> Array:
-    """Climb to 5 m and stay, swaying by centimetres."""
     up = smooth_step(t, REST_S, 5.0)
     return np.column_stack([0.05 * up * np.sin(0.9 * t), 0.04 * up * np.sin(1.3 * t), 5.0 * up, 0.02 * up * np.sin(t)])
 
 
 def climb(t: Array) -> Array:
-    """Climb to 20 m, no turning."""
     up = smooth_step(t, REST_S, 10.0)
     return np.column_stack([0.0 * t, 0.0 * t, 20.0 * up, 0.0 * t])
 

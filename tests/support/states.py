@@ -19,13 +19,11 @@ def turned(
 
 
 def state_of(world: World) -> VehicleState:
-    """Return the state of a plant's vehicle."""
     frame = state_frame(world)
     euler = euler_from_quaternion(frame.attitude)
     return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
 
 
 def staying(samples: int) -> Horizon:
-    """Return references that stay at the origin, looking east."""
     nowhere, east = np.zeros((samples, 3)), np.zeros(samples)
     return Horizon(nowhere, nowhere, nowhere, nowhere, nowhere, east, east, east)

@@ -86,7 +86,6 @@ class Link:
                     self._put(self._down, number, frame)
 
     def _put(self, way: list[tuple[int, int, bytes]], number: int, frame: bytes) -> None:
-        """Send a datagram on its way: it arrives never, once or twice, and perhaps late."""
         self.datagrams += 1
         if self._chance.random() < self._loss:
             return

@@ -31,8 +31,6 @@ def law(vehicle: Vehicle = VEHICLE) -> WholeLpvMpc:
 
 
 class Flight:
-    """The law over the plant, a control sample at a time."""
-
     def __init__(self, start: Start, vehicle: Vehicle = VEHICLE, plant: Vehicle = VEHICLE) -> None:
         self.law, self.physics = law(vehicle), Physics(plant, "rk4")
         self.world: World = starting_world(start, plant)

@@ -16,8 +16,6 @@ _SECONDS_PER_HOUR = 3600.0
 
 
 class Client:
-    """A client that runs, or has run."""
-
     def __init__(self, command: Sequence[str], folder: Path, environment: Mapping[str, str] | None = None) -> None:
         """Start `command` in `folder`, with more in its environment; what it prints is kept in the folder, too."""
         self.folder = folder

@@ -28,15 +28,12 @@ IRCHEL_LAST = (47.397825620791885, 8.5450092830163271)
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a judge looks at."""
-
     seen: Observer
     client: Client
     state: Path
 
 
 def lands(evidence: Evidence, where: Vector | None = None) -> None:
-    """Demand that it comes down, at `where`, and that its rotors stop."""
     landed = evidence.seen.wait(lambda sight: not sight.flying and not sight.armed, "a landing", 120.0)
     assert any(sight.flying for sight in evidence.seen.sights), "it never flew"
     if where is not None:

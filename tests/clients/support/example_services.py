@@ -12,7 +12,6 @@ Judge: TypeAlias = Callable[[Evidence], None]
 
 
 def plans(missions: int, rally: int, fence: int) -> Judge:
-    """Demand plans of so many items."""
     kinds = (mav.MAV_MISSION_TYPE_MISSION, mav.MAV_MISSION_TYPE_RALLY, mav.MAV_MISSION_TYPE_FENCE)
     wanted = {"mission items": missions, "rally points": rally, "fence items": fence}
 
@@ -24,8 +23,6 @@ def plans(missions: int, rally: int, fence: int) -> Judge:
 
 
 def prints(pattern: str, times: int, shows: str) -> Judge:
-    """Demand that a script prints something, so often."""
-
     def judge(evidence: Evidence) -> None:
         evidence.client.wait_printed(pattern, times=times)
 

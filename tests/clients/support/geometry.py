@@ -35,7 +35,6 @@ def swept_rad(sights: Sequence[Sight], center: Vector) -> float:
 
 
 def heading_deg(sight: Sight) -> float:
-    """Return the compass heading, -180..180."""
     return turned_rad(0.5 * pi - sight.euler_rad[2]) * 180.0 / pi
 
 

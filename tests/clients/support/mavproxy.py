@@ -25,7 +25,6 @@ class MavProxy:
     """A running MAVProxy that has found its vehicle and fetched its parameters."""
 
     def __init__(self, folder: Path, connection: str) -> None:
-        """Start it, with `--master=connection`."""
         self.folder = folder
         # It reads its settings from the home folder, and `python` stands beside it
         command = ["env", f"HOME={folder}", str(program()), f"--master={connection}", f"--state-basedir={folder}"]

@@ -27,8 +27,6 @@ SDK_LINK = "udpout:127.0.0.1:14540"
 
 
 class Result(NamedTuple):
-    """How an example went."""
-
     example: Example
     failure: str
     seconds: float

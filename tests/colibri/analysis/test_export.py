@@ -35,7 +35,6 @@ def log(folder: Path) -> ULog:
 
 
 def flat(value: Any, name: str) -> dict[str, Any]:
-    """Return a message by the names that a ULog has for its fields."""
     if isinstance(value, dict):
         inner = [flat(part, f"{name}.{key}" if name else key) for key, part in value.items()]
     elif isinstance(value, list):
@@ -46,7 +45,6 @@ def flat(value: Any, name: str) -> dict[str, Any]:
 
 
 def known(number: float) -> float | None:
-    """Return what JSON has of a number: none of what is no number."""
     return number if number == number else None
 
 

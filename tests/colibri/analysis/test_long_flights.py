@@ -78,7 +78,6 @@ def test_instants_are_the_same_to_the_microsecond() -> None:
 
 
 def test_the_report_is_that_of_the_whole_table(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same numbers, not almost."""
     recording = read_recording(plan)
     in_blocks(monkeypatch, SOME_ROWS)
     report, _ = kept(plan)
@@ -144,7 +143,6 @@ def test_figures_do_not_depend_on_blocks(plan: FlightPlan, monkeypatch: pytest.M
 
 
 def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
-    """Return the plan of a flight that repeats another again and again, its logs written in `out`."""
     lasts_s = plan.spec.duration
     longer = FlightPlan.of(FlightSpec.of("lemniscate", profile="path", duration=rounds * lasts_s, out=out))
     out.mkdir()
@@ -161,7 +159,6 @@ def lengthened(plan: FlightPlan, out: Path, rounds: int) -> FlightPlan:
 
 
 def peak_bytes(plan: FlightPlan) -> int:
-    """Return how much memory it takes to keep a flight and all that is drawn of it, at most."""
     tracemalloc.start()
     try:
         flown = FigureSeries(plan)

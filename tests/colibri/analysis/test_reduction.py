@@ -67,7 +67,6 @@ def test_no_extreme_is_lost(count: int, part: int) -> None:
 
 
 def picture(figure: Figure) -> NDArray[np.uint8]:
-    """Return red, green, blue and opacity of every pixel, (n, 4)."""
     with BytesIO() as pixels:
         figure.savefig(pixels, format="rgba")
         return np.frombuffer(pixels.getvalue(), dtype=np.uint8).reshape(-1, 4)

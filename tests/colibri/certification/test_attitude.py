@@ -75,7 +75,6 @@ def test_what_the_plant_does_in_an_interval_lies_within_the_loop(law: AttitudeLa
 def somewhere(
     law: AttitudeLaw, numbers: AttitudeNumbers, rng: np.random.Generator, flights: int
 ) -> tuple[Array, Interval]:
-    """Return states whose rates stay within their ranges, and intervals whose attitudes do."""
     rates = np.array(numbers.rates_rad_s)
     held = np.zeros((flights, 2))
     z = np.zeros((flights, 12))

@@ -55,7 +55,6 @@ def test_the_certificate_is_confirmed_in_exact_arithmetic(name: str) -> None:
 
 
 def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
-    """Return the proof with one entry of P multiplied."""
     P = proof.P.copy()
     P[i, j] *= factor
     return proof._replace(P=P)
@@ -78,16 +77,11 @@ def test_a_certificate_that_was_tampered_with_is_not_confirmed(
     assert certificates.margins_of(FLIGHT, "invariant", numbers, spoil(proof))[what] <= 0.0
 
 
-def test_a_certificate_of_a_weaker_gain_is_not_confirmed(certified: Certificate) -> None:
+@pytest.mark.parametrize(("name", "factor"), [("commanded", 0.8), ("unsure", 4.0)])
+def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(certified: Certificate, name: str, factor: float) -> None:
     _, numbers, proof, _ = certified.invariant
-    weaker = numbers._replace(commanded=(0.8 * np.array(numbers.commanded)).tolist())
-    assert certificates.margins_of(FLIGHT, "invariant", weaker, proof)["decrease"] == 0.0
-
-
-def test_a_certificate_with_a_lower_bound_is_not_confirmed(certified: Certificate) -> None:
-    _, numbers, proof, _ = certified.invariant
-    unsure = numbers._replace(unsure=(4.0 * np.array(numbers.unsure)).tolist())
-    assert certificates.margins_of(FLIGHT, "invariant", unsure, proof)["decrease"] == 0.0
+    other = numbers._replace(**{name: (factor * np.array(getattr(numbers, name))).tolist()})
+    assert certificates.margins_of(FLIGHT, "invariant", other, proof)["decrease"] == 0.0
 
 
 @pytest.mark.long
@@ -135,7 +129,6 @@ def directions(rng: np.random.Generator, count: int) -> Array:
 
 
 def beyond(z: Array, rng: np.random.Generator, entry: Entry) -> Array:
-    """Return what is commanded beyond the gain, N m, (3,)."""
     phi, theta = rng.uniform(-1.0, 1.0, 2) * FLIGHT.held(entry)
     (commanded, _), _ = FLIGHT.decide(z, (phi, theta, 0.0), rng.uniform(*FLIGHT.thrusts_n(entry.scale)), None)
     more: Array = commanded - FLIGHT.commanded[0] @ z

@@ -161,7 +161,6 @@ def values(
 
 
 def largest_value(case: Case, controller: AttitudeController[Any], flights: int) -> float:
-    """Return the largest V after the start of flights from the set's border."""
     rng, largest, entry = np.random.default_rng(4), 0.0, invariant(case)
     for i, start in enumerate(fly(case.certified, entry, Plan(flights, 0.0, seed=4)).states[0]):
         began, *later = values(case, entry, controller, start, disturbances(entry, i % 4, rng))
@@ -180,10 +179,6 @@ def test_flights_of_the_whole_plant_stay_in_the_set(flights: int, monkeypatch: p
 
 
 @FLIGHTS
-def test_so_do_those_of_lpv_mpc_as_it_flies(flights: int) -> None:
-    assert largest_value(LQR, LpvMpc(table("lpv-mpc"), VEHICLE, lambda: 0.0), flights) <= 1.0
-
-
-@FLIGHTS
-def test_so_do_those_of_whole_lpv_mpc_as_it_flies(flights: int) -> None:
-    assert largest_value(WHOLE, WholeLpvMpc(table("whole-lpv-mpc"), VEHICLE, lambda: 0.0), flights) <= 1.0
+@pytest.mark.parametrize(("case", "law"), [(LQR, LpvMpc), (WHOLE, WholeLpvMpc)], ids=["lpv-mpc", "whole-lpv-mpc"])
+def test_so_do_those_of_a_law_as_it_flies(case: Case, law: type[LpvMpc | WholeLpvMpc], flights: int) -> None:
+    assert largest_value(case, law(table(case.name), VEHICLE, lambda: 0.0), flights) <= 1.0

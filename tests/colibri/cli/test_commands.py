@@ -19,7 +19,7 @@ from colibri.cli.main import main
 from colibri.cli.shared.commands import COMMANDS, PROCESSES
 from colibri.cli.shared.parser import parser_of, subcommand
 from colibri.flights.provenance import plan_of
-from tests.support.commands import FLIGHT, VEHICLE, edited, exit_code
+from tests.support.commands import FLIGHT, VEHICLE, Ran, Refused, edited, exit_code
 
 FIGURES = ("trajectory", "position", "attitude", "inputs", "rotors", "error")
 MAX_HELP_S = 0.2
@@ -58,20 +58,18 @@ def test_every_example_of_the_help_is_a_command(command: str) -> None:
     assert callable(subcommand(command).run)
 
 
-def test_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_fits_a_narrow_terminal(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     for command in COMMANDS:
-        assert exit_code([command, "--help"]) == 0
-        said = capsys.readouterr().out
+        said = ran(command, "--help").out
         assert said.startswith(f"usage: colibri {command} ")
         assert "\nexamples:\n  colibri " in said
         assert max(map(len, said.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_shells_complete_commands_and_their_options(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["completion", shell]) == 0
-    script = capsys.readouterr().out
+def test_shells_complete_commands_and_their_options(shell: str, ran: Ran) -> None:
+    script = ran("completion", shell).out
     assert "check-controller" in script
     assert "turbulence" in script
 
@@ -83,7 +81,6 @@ COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMP_LINE="$*" COMP_POINT=${#COMP_LINE}
 _shtab_colibri colibri "${COMP_WORDS[-1]}" "${COMP_WORDS[-2]}"
 printf '%s\n' "${COMPREPLY[@]}"
 """
-"""What bash does when somebody presses tab behind some words."""
 
 
 @pytest.fixture(scope="module")
@@ -131,30 +128,22 @@ def test_help_says_what_a_stranger_needs(package: str) -> None:
     assert "14560" in done.stdout
 
 
-def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["--version"]) == 0
-    assert capsys.readouterr().out == f"colibri {version('colibri-sitl')}\n"
+def test_the_version_is_printed(ran: Ran) -> None:
+    assert ran("--version").out == f"colibri {version('colibri-sitl')}\n"
 
 
 @pytest.mark.parametrize(("what", "file"), [("profile", FLIGHT), ("vehicle", VEHICLE)])
-def test_a_file_of_colibris_own_is_shown_to_be_copied(
-    what: str, file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert exit_code(["show", what, file.stem]) == 0
-    assert capsys.readouterr().out == file.read_text(encoding="utf-8")
+def test_a_file_of_colibris_own_is_shown_to_be_copied(what: str, file: Path, ran: Ran) -> None:
+    assert ran("show", what, file.stem).out == file.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("whom", ["px4", "ardupilot"])
-def test_a_vehicle_is_written_as_parameters_of_another_autopilot(
-    whom: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert exit_code(["vehicle", "hummingbird", "--for", whom]) == 0
-    printed = capsys.readouterr().out
+def test_a_vehicle_is_written_as_parameters_of_another_autopilot(whom: str, tmp_path: Path, ran: Ran) -> None:
+    printed = ran("vehicle", "hummingbird", "--for", whom).out
     assert printed.startswith(f"# AscTec Hummingbird, by colibri vehicle hummingbird --for {whom}\n")
     out = tmp_path / "new" / "vehicle.params"
     heavier = edited(VEHICLE, "mass_kg = 0.698", "mass_kg = 0.8")(tmp_path)
-    assert exit_code(["vehicle", heavier, "--for", whom, "--out", str(out)]) == 0
-    assert capsys.readouterr().out == ""
+    assert ran("vehicle", heavier, "--for", whom, "--out", out).out == ""
     written = out.read_text(encoding="utf-8")
     assert written.splitlines()[0].endswith(f" --for {whom}")
     pairs = zip(printed.splitlines()[1:], written.splitlines()[1:], strict=True)
@@ -162,41 +151,38 @@ def test_a_vehicle_is_written_as_parameters_of_another_autopilot(
     assert "_HOVER" in changed
 
 
-def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, ran: Ran, refused: Refused) -> None:
     """By what is in its folder alone: neither its profile nor its waypoints are there any more."""
     profile, points = edited(FLIGHT, 'name = "flight"', 'name = "mine"')(tmp_path), tmp_path / "points.csv"
     points.write_text("x,y,z\n0,0,1\n2,0,2\n", encoding="utf-8")
     out = tmp_path / "out"
     options = ("--profile", profile, "--link", "memory", "--duration", "0.5", "--wind", "2@270", "--no-figures")
-    assert exit_code(["fly", f"waypoints:{points}", *options, "--quiet", "--out", str(out)]) == 0
+    ran("fly", f"waypoints:{points}", *options, "--quiet", "--out", out)
     Path(profile).unlink()
     points.unlink()
     (out / "report.json").unlink()
-    assert exit_code(["plot", str(out)]) == 0
-    drawn = capsys.readouterr().out.split()
+    drawn = ran("plot", out).out.split()
     assert drawn == [str(out / f"{name}.png") for name in FIGURES]
     assert all(Path(path).stat().st_size > 10_000 for path in drawn)
-    assert exit_code(["plot", str(tmp_path)]) == 2
-    assert "provenance.json is missing" in capsys.readouterr().err
+    assert "provenance.json is missing" in refused("plot", tmp_path)
 
 
 @pytest.mark.long
 def test_figures_that_find_no_room_are_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran, refused: Refused
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(ENOSPC, os.strerror(ENOSPC))
 
-    assert exit_code(["fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--out", str(tmp_path)]) == 0
+    ran("fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--out", tmp_path)
     monkeypatch.setattr("colibri.analysis.figures.draw_flight", full)
-    assert exit_code(["plot", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"colibri: error: {tmp_path}: No space left on device\n"
+    assert refused("plot", tmp_path) == f"{tmp_path}: No space left on device"
 
 
-def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ("--link", "memory", "--duration", "0.1", "--no-figures", "--out", str(tmp_path))
-    assert exit_code(["fly", "hover", "--controller", "geometric-se3", *options]) == 0
-    assert capsys.readouterr().out.startswith("hover, profile flight, controller geometric-se3")
+def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, ran: Ran) -> None:
+    options = ("--link", "memory", "--duration", "0.1", "--no-figures", "--out", tmp_path)
+    said = ran("fly", "hover", "--controller", "geometric-se3", *options).out
+    assert said.startswith("hover, profile flight, controller geometric-se3")
     assert plan_of(tmp_path).flown_by == "profile flight, controller geometric-se3"
 
 

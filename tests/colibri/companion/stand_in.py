@@ -54,8 +54,6 @@ class Numbers:
 
 @dataclass(kw_only=True)
 class StandIn:
-    """A vehicle without Colibri in it."""
-
     autopilot: int
     mode: int
     hold: int
@@ -81,8 +79,6 @@ class StandIn:
         self._inbox: list[bytes] = []
         self._outbox: list[bytes] = []
         self._due: dict[str, int] = {}
-
-    # What Ride needs.
 
     @property
     def time_s(self) -> float:
@@ -119,8 +115,6 @@ class StandIn:
     def choose(self, mode: int) -> None:
         self.mode = mode
         self.modes.append((self.time_us, mode))
-
-    # What it is asked.
 
     def _receive(self, message: Message) -> None:
         fields = message.fields
@@ -164,8 +158,6 @@ class StandIn:
 
     def _rules(self) -> None:
         """Act on silence."""
-
-    # How it moves.
 
     def _signal(self, thrust: float) -> float:
         raise NotImplementedError
@@ -227,8 +219,6 @@ class StandIn:
 
     def _arrived(self) -> None:
         """Act on the end of a take-off."""
-
-    # What it says.
 
     def _send(self, name: str) -> None:
         fields = getattr(self, f"_{name.lower()}")()

@@ -20,7 +20,6 @@ from colibri.sitl.vehicle import Sitl
 from tests.colibri.companion.in_memory import Ride
 
 MOVES = frozenset({mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_COMPONENT_ARM_DISARM, mav.MAV_CMD_NAV_TAKEOFF})
-"""Commands that move a vehicle."""
 SETPOINTS = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED")
 HOVER = "hover:height=3"
 
@@ -152,9 +151,6 @@ def test_an_identification_finds_the_vehicles_response(flights: Flights) -> None
     assert response.latency_s == pytest.approx(COLIBRI.response.latency_s, abs=0.005)
     assert found.explained.min() > 0.9
     assert "time_constant_s" in text
-
-
-# Each end that it must come to.
 
 
 def _say(ride: Ride[Sitl], name: str, *fields: Any) -> Callable[[], None]:

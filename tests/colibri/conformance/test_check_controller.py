@@ -15,12 +15,11 @@ from colibri.conformance.rows import Result
 from colibri.conformance.step_records import FlownStep
 from colibri.plant.vehicle.description import Vehicle
 from tests.colibri.conformance import laws
-from tests.support.commands import exit_code
+from tests.support.commands import Ran
 
 SHORT_S = 2.0
 WITHOUT_FLIGHTS = [area for area in CHECKS if area != "flights"]
 FAILS = "global-lpv-mpc"
-"""As the thesis says."""
 BAD: dict[type[laws.Good], tuple[str, set[str]]] = {
     laws.Stateful: ("memory", {"the same step twice", "two flights in turn by one law", "stepped again from an old"}),
     laws.Remembering: ("memory", {"stepped again from an old memory"}),
@@ -126,7 +125,6 @@ def test_memory_that_cannot_be_kept_is_no_failure_of_a_restart() -> None:
 
 
 def shown(code: str, law: type[laws.Good], capsys: pytest.CaptureFixture[str]) -> str:
-    """Run what a row says, and return what it prints or raises."""
     try:
         exec(code, {law.__name__: law, "colibri": colibri})
     except Exception as error:
@@ -135,7 +133,6 @@ def shown(code: str, law: type[laws.Good], capsys: pytest.CaptureFixture[str]) -
 
 
 def differing(printed: str) -> bool:
-    """Whether two sets of rotor speeds, next to each other, are not the same."""
     first, second, *_ = map(str, re.findall(r"\[[^\]\[]*\]", printed))
     return first != second
 
@@ -175,11 +172,8 @@ def test_flown_steps_are_taken_again_bit_for_bit() -> None:
         assert step.again(law, step.memory)[1].rotor_speeds.tobytes() == step.rotor_speeds.tobytes()
 
 
-def test_the_command_prints_the_table_and_the_failures(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert exit_code(["check-controller", "geometric-se3", "--only", "memory"]) == 0
-    assert "the same step twice" in capsys.readouterr().out
+def test_the_command_prints_the_table_and_the_failures(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "the same step twice" in ran("check-controller", "geometric-se3", "--only", "memory").out
     made = colibri.load_controller("geometric-se3")
 
     def stiff(table: Any, vehicle: Vehicle, clock: Any) -> Any:
@@ -188,8 +182,7 @@ def test_the_command_prints_the_table_and_the_failures(
         return law
 
     monkeypatch.setattr("colibri.conformance.subject.load_controller", lambda _name: stiff)
-    assert exit_code(["check-controller", "geometric-se3", "--only", "interface", "--quiet"]) == 1
-    failed, see = capsys.readouterr().out.splitlines()
+    failed, see = ran("check-controller", "geometric-se3", "--only", "interface", "--quiet", code=1).out.splitlines()
     assert failed == (
         "FAILED  interface: control_interval_us, preview: preview is tuple, not Preview(interval_us, samples)"
     )

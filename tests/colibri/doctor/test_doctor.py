@@ -54,30 +54,16 @@ def test_what_failed_is_shown_with_what_to_do_and_ends_with_1(
     assert main(["doctor"]) == 0
 
 
-def test_a_package_that_is_missing_or_too_old_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    has = packages.version_of
-    others = {"daqp": None, "numpy": "1.20.0"}
-    monkeypatch.setattr(packages, "version_of", lambda name: others.get(name, "") if name in others else has(name))
-    found = packages.packages()
-    assert found.verdict is Verdict.FAILED
-    assert found.found == "daqp is missing, numpy is 1.20.0, not >=2.0"
-
-
-def test_what_differs_from_the_lock_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    has = packages.version_of
-    monkeypatch.setattr(packages, "version_of", lambda name: "0.0.1" if name == "rich" else has(name))
-    found = packages.lock()
-    assert found is not None
-    assert found.verdict is Verdict.NOTE
-    assert "rich is 0.0.1, not ==" in found.found
-
-
-def test_without_an_extra_its_command_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    has = packages.version_of
-    monkeypatch.setattr(packages, "version_of", lambda name: None if name == "optuna" else has(name))
+def test_packages_that_are_missing_too_old_or_others_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    has, others = packages.version_of, {"daqp": None, "numpy": "1.20.0", "rich": "0.0.1", "optuna": None}
+    monkeypatch.setattr(packages, "version_of", lambda name: others[name] if name in others else has(name))
+    needed, locked = packages.packages(), packages.lock()
+    assert (needed.verdict, needed.found[:45]) == (Verdict.FAILED, "daqp is missing, numpy is 1.20.0, not >=2.0, ")
+    assert locked is not None
+    assert locked.verdict is Verdict.NOTE
+    assert "rich is 0.0.1, not ==" in locked.found
     (tune,) = [finding for finding in packages.extras() if finding.checked == "extra tune"]
-    assert tune.verdict is Verdict.NOTE
-    assert tune.advice == "if you need it: pip install 'colibri-sitl[tune]'"
+    assert (tune.verdict, tune.advice) == (Verdict.NOTE, "if you need it: pip install 'colibri-sitl[tune]'")
 
 
 def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, taken: int) -> None:

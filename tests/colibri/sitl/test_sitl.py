@@ -254,7 +254,6 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path, link: str) ->
 @pytest.mark.long
 @pytest.mark.parametrize("command", [(str(Path(sys.executable).parent / "pytest"),), (sys.executable, "-m", "pytest")])
 def test_a_stranger_who_has_packages_of_the_same_names_flies(tmp_path: Path, command: tuple[str, ...]) -> None:
-    """Nothing of what a stranger may call `tools`, `plant`, `mavlink` or `autopilot` is in the way."""
     for package in ("tools", "mavlink", "autopilot"):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("MINE = 1\n")

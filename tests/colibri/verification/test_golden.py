@@ -1,7 +1,7 @@
 """`colibri verify --golden`: what differs is named, what does not fit the set is refused, and hashes are renewed."""
 
 import json
-from collections.abc import Callable
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from colibri.cli.computer.verify import GOLDEN_HASHES
 from colibri.sitl.vehicle import Sitl
 from colibri.verification import golden, golden_flights
 from colibri.verification.cases import Case, SitlCase
-from tests.support.commands import exit_code
+from tests.support.commands import Ran
 
 SHORT = Case("short", {"track": "line", "profile": "se3", "duration": 0.4})
 CORNER = Case("corner", {"track": "waypoints", "profile": "se3", "duration": 0.4}, golden_flights.WAYPOINTS)
@@ -27,8 +27,6 @@ def hop(sitl: Sitl) -> None:
 HOP = SitlCase(name="hop", orders=hop, setting={"airborne": 2.0})
 WRONG = "0" * 64
 
-Verify = Callable[..., int]
-
 
 @pytest.fixture
 def hashes(tmp_path: Path) -> Path:
@@ -36,58 +34,42 @@ def hashes(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def verify(tmp_path: Path, hashes: Path, monkeypatch: pytest.MonkeyPatch) -> Verify:
+def verify(tmp_path: Path, hashes: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran) -> Ran:
     monkeypatch.setattr(golden, "FLIGHTS", (SHORT, CORNER, HOP))
-
-    def run(*options: str) -> int:
-        command = ["verify", "--golden", str(hashes), "--link", "memory", "--out", str(tmp_path / "out")]
-        return int(exit_code([*command, *options]) or 0)
-
-    return run
+    return partial(ran, "verify", "--golden", hashes, "--link", "memory", "--out", tmp_path / "out")
 
 
-def test_what_was_renewed_is_the_same_and_says_what_changed(
-    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    assert verify("--renew") == 0
-    assert "3 of 3 changed" in " ".join(capsys.readouterr().out.split())
+def test_what_was_renewed_is_the_same_and_says_what_changed(verify: Ran, hashes: Path, tmp_path: Path) -> None:
+    assert "3 of 3 changed" in " ".join(verify("--renew").out.split())
     known = json.loads(hashes.read_text(encoding="utf-8"))
     assert list(known) == ["short", "corner", "hop"]
-    assert verify() == 0
-    table = capsys.readouterr().out
+    table = verify().out
     assert table.count("the same") == 3
     assert known["hop"][:16] in table
     found = json.loads((tmp_path / "out" / golden.FOUND).read_text(encoding="utf-8"))
     assert {name: outcome["sha256"] for name, outcome in found.items()} == known
     assert all(outcome["wall_time_s"] > 0.0 for outcome in found.values())
-    assert verify("--renew") == 0
-    assert "nothing changed" in capsys.readouterr().out
+    assert "nothing changed" in verify("--renew").out
 
 
-def test_what_differs_is_named_with_both_hashes(
-    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_differs_is_named_with_both_hashes(verify: Ran, hashes: Path) -> None:
     verify("--renew", "--quiet")
     known = json.loads(hashes.read_text(encoding="utf-8"))
     hashes.write_text(json.dumps(known | {"corner": WRONG}), encoding="utf-8")
-    assert verify() == 1
-    said = capsys.readouterr()
+    said = verify(code=1)
     assert f"not as in {hashes}: corner; the logs are in" in said.err
     (line,) = (line for line in said.out.splitlines() if "corner" in line)
     assert WRONG[:16] in line
     assert known["corner"][:16] in line
-    assert verify("--only", "short", "--only", "hop", "--quiet") == 0
+    verify("--only", "short", "--only", "hop", "--quiet")
 
 
-def test_one_flight_is_renewed_and_non_flights_are_dropped(
-    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_flight_is_renewed_and_non_flights_are_dropped(verify: Ran, hashes: Path) -> None:
     verify("--renew", "--quiet")
     known = json.loads(hashes.read_text(encoding="utf-8"))
     hashes.write_text(json.dumps({"gone": WRONG, "hop": WRONG, "short": WRONG}), encoding="utf-8")
-    assert verify("--renew", "--only", "short") == 0
+    table = " ".join(verify("--renew", "--only", "short").out.split())
     assert json.loads(hashes.read_text(encoding="utf-8")) == {"short": known["short"], "hop": WRONG}
-    table = " ".join(capsys.readouterr().out.split())
     assert "2 of 2 changed" in table
     assert "gone" in table
     assert "hop" not in table
@@ -98,17 +80,15 @@ def hop_to_the_moon(sitl: Sitl) -> None:
 
 
 def test_a_flight_that_does_not_end_differs_and_is_not_renewed(
-    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    verify: Ran, hashes: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     verify("--renew", "--quiet")
     before = hashes.read_bytes()
     monkeypatch.setattr(golden, "FLIGHTS", (SHORT, CORNER, SitlCase(name="hop", orders=hop_to_the_moon)))
-    assert verify() == 1
-    said = capsys.readouterr()
+    said = verify(code=1)
     assert "the hop took longer" in " ".join(said.out.split())
     assert f"not as in {hashes}: hop;" in said.err
-    assert verify("--renew") == 1
-    assert "hop did not end" in capsys.readouterr().err
+    assert "hop did not end" in verify("--renew", code=1).err
     assert hashes.read_bytes() == before
 
 
@@ -124,13 +104,12 @@ def test_a_flight_that_does_not_end_differs_and_is_not_renewed(
     ],
 )
 def test_a_file_that_does_not_fit_the_set_is_refused_in_one_line(
-    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], content: str | None, words: str
+    verify: Ran, hashes: Path, content: str | None, words: str
 ) -> None:
     hashes.parent.mkdir()
     if content is not None:
         hashes.write_text(content, encoding="utf-8")
-    assert verify() == 2
-    said = capsys.readouterr()
+    said = verify(code=2)
     assert words in said.err
     assert str(hashes) in said.err
     assert said.err.count("\n") == 1

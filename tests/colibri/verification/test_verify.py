@@ -5,24 +5,19 @@ from typing import Any
 
 import pytest
 
-from colibri.cli.main import main
 from colibri.verification import verify
 from colibri.verification.cases import Case
+from tests.support.commands import Ran
 
 
-def test_every_flight_is_the_same_twice(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_flight_is_the_same_twice(tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verify, "CASES", verify.CASES[::2])
-    assert main(["verify", "--link", "memory", "--duration", "1.6", "--out", str(tmp_path)]) == 0
-    table = capsys.readouterr().out
+    table = ran("verify", "--link", "memory", "--duration", "1.6", "--out", tmp_path).out
     assert table.count(" yes ") == len(verify.CASES)
     assert all((tmp_path / case.name / "first" / "flight.ulg").exists() for case in verify.CASES)
 
 
-def test_what_is_not_the_same_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_not_the_same_is_named(tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verify, "CASES", verify.CASES[1:2])
     fly = Case.fly
     seeds = iter((1, 2, 3))
@@ -31,9 +26,6 @@ def test_what_is_not_the_same_is_named(
         return f"{next(seeds)}{fly(case, out, link, **more)}"
 
     monkeypatch.setattr(Case, "fly", another_each_time)
-    with pytest.raises(SystemExit) as end:
-        main(["verify", "--link", "memory", "--duration", "1", "--out", str(tmp_path)])
-    assert end.value.code == 1
-    said = capsys.readouterr()
+    said = ran("verify", "--link", "memory", "--duration", "1", "--out", tmp_path, code=1)
     assert "NO" in said.out
     assert "not the same twice: spiral; the logs are in" in said.err

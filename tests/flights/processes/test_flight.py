@@ -158,7 +158,6 @@ def test_what_no_vehicle_can_follow_takes_it_to_its_limits(tmp_path: Path, lap_s
 
 
 def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
-    """From rest on the ground straight up, and no sinking before."""
     fly(tmp_path, "hover:height=1.5", "--link", "memory", "--duration", "8", "--start", "x=0,y=0,z=0,rotors=0")
     flown = rows(tmp_path / "flight.csv")
     assert flown["z"].min() > -0.003

@@ -32,7 +32,6 @@ class Flown(NamedTuple):
 
 
 def downloaded(port: int) -> bytes:
-    """Return the only log of the vehicle that waits on a port of this computer."""
     client, target = Client(245, 190), (1, AUTOPILOT_COMPONENT)
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as sock:
         sock.connect(("127.0.0.1", port))

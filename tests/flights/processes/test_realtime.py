@@ -25,7 +25,6 @@ def autopilot_for(logs: Path, url: str) -> Process:
 
 
 def flown_on(plant: Process, seconds: float) -> Callable[[], bool]:
-    """Return what tells whether it has been answered without a break for so long, simulated."""
     since: dict[int, float] = {}
 
     def has() -> bool:

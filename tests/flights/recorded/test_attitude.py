@@ -37,7 +37,6 @@ T, PHI, THETA, PSI, Z, FALLBACK = range(6)
 
 
 def received(world: World, codec: Codec) -> StateFrame:
-    """Return a frame as the autopilot gets it: in single precision."""
     attitude, position = codec.decode(b"".join(encode_state(codec, state_frame(world))))
     frame = decode_state(attitude, position)
     assert frame is not None

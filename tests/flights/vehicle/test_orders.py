@@ -151,17 +151,6 @@ def test_the_origin_is_set_on_the_ground_to_the_digit(sitl: Sitl) -> None:
     assert pilot.home.position_enu_m == pytest.approx((5.0, 5.0, 2.0), abs=0.02)
 
 
-def test_nothing_is_flown_to_outside_the_geofence(sitl: Sitl) -> None:
-    sitl.upload_fence(items.polygon([(-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)]))
-    refused(sitl, "reposition refused: outside the geofence", sitl.goto, 9.0, 0.0, 5.0)
-    assert orbit(sitl, 9.0, 2.0) == DENIED  # its centre alone is inside
-    assert sitl.said("orbit refused: outside the geofence")
-    assert orbit(sitl, 7.0, 2.0) == ACCEPTED
-    x, y = degrees_e7(sitl, 20.0, 0.0)
-    home = mav.MAV_CMD_DO_SET_HOME
-    assert sitl.gcs.order_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=x, y=y, z=488.0) == DENIED
-
-
 @pytest.mark.sitl(airborne=None)
 def test_no_takeoff_outside_the_geofence(sitl: Sitl) -> None:
     sitl.upload_fence(items.polygon([(20.0, 20.0), (30.0, 20.0), (30.0, 30.0)]))

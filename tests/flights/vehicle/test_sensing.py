@@ -12,7 +12,7 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import QUICK, latest, refused, restart
+from tests.support.flying import QUICK, latest, restart
 from tools.chaos.places import Thrower
 
 pytestmark = QUICK
@@ -26,9 +26,6 @@ def off_m(sitl: Sitl) -> float:
     estimate = sitl.inside.copter.parts.state_source.estimate
     assert estimate is not None
     return dist(estimate.frame.position_enu_m, sitl.position)
-
-
-# Sensors.
 
 
 @pytest.mark.seed(1)
@@ -52,17 +49,6 @@ def test_a_flight_on_sensors_from_arming_to_landing(sitl: Sitl) -> None:
     sitl.land()
     assert abs(sitl.position[2]) < 0.01
     assert sitl.inside.copter.pilot.ground.standing
-
-
-@pytest.mark.feedback("sensors")
-@pytest.mark.seed(1)
-def test_without_a_position_it_does_not_arm(sitl: Sitl) -> None:
-    sitl.inject("gps", "off")
-    sitl.run(5.0)
-    refused(sitl, "position not known", sitl.arm)
-
-
-# A rangefinder that looks down: height above the ground is known to centimetres.
 
 
 @pytest.mark.feedback("sensors")

@@ -38,9 +38,6 @@ def steer(sitl: Sitl, seconds: float, mode: Mode | None = None, **axes: float) -
         sitl.run(seconds)
 
 
-# Offboard.
-
-
 def test_a_jump_of_the_setpoint_is_flown_smoothly(sitl: Sitl) -> None:
     fly_by(sitl, 0.5, position=HERE, yaw=0.5 * pi)  # it is there, to the last bit
     speeds = []
@@ -63,13 +60,6 @@ def test_velocity_and_acceleration_stay_within_limits(sitl: Sitl) -> None:
     east, _, up = pilot.context().velocity
     assert -4.01 <= east < -3.5
     assert -1.51 <= up < -1.2
-
-
-def test_offboard_acceleration(sitl: Sitl) -> None:
-    fly_by(sitl, 1.0, acceleration=(1.0, 0.0, 0.0))
-    before = sitl.velocity[0]
-    stream(sitl, 1.0, lambda: sitl.setpoint(acceleration=(1.0, 0.0, 0.0)))
-    assert sitl.velocity[0] - before == pytest.approx(1.0, abs=0.1)
 
 
 def test_offboard_velocity_along_the_body_turns_with_it(sitl: Sitl) -> None:
@@ -121,9 +111,6 @@ def test_attitude_without_thrust_lifts_nothing(sitl: Sitl) -> None:
     assert sitl.position[2] > 0.2
 
 
-# Modes that need a stream.
-
-
 @pytest.mark.parametrize("mode", [Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED])
 def test_a_mode_needs_its_stream_and_begins_with_it(sitl: Sitl, mode: Mode) -> None:
     """Clients do not wait between the first message and the mode: both may come between two control samples."""
@@ -136,9 +123,6 @@ def test_a_mode_needs_its_stream_and_begins_with_it(sitl: Sitl, mode: Mode) -> N
     number = custom_mode(mode)
     assert sitl.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24 & 0xFF) == ACCEPTED
     assert sitl.mode is mode
-
-
-# Sticks.
 
 
 def test_position_by_hand(sitl: Sitl) -> None:
@@ -161,11 +145,6 @@ def test_from_rest_a_full_stick_is_flown_smoothly(sitl: Sitl) -> None:
     with sitl.sticks_held(pitch=1.0, roll=1.0):
         sitl.run(1.0, lambda: steepest.append(max(map(abs, sitl.euler[:2]))))
     assert degrees(max(steepest)) < 25.0  # 3 m/s² lean by 17 degrees
-
-
-def test_sticks_held_when_the_mode_begins_are_flown(sitl: Sitl) -> None:
-    steer(sitl, 2.5, Mode.POSITION, roll=-1.0)
-    assert sitl.velocity == pytest.approx((-5.0, 0.0, 0.0), abs=0.2)
 
 
 @pytest.mark.sitl(params=REDUCED_TILT)
@@ -214,9 +193,6 @@ def test_takeoff_and_landing_by_hand(sitl: Sitl, mode: Mode) -> None:
     with sitl.sticks_held(thrust=0.2):
         sitl.wait_until(lambda: not sitl.armed, within=8.0)
     assert sitl.said("landing detected")
-
-
-# Follow.
 
 
 def target(sitl: Sitl, place: Vector, velocity: Vector = STILL) -> None:

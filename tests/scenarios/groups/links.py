@@ -14,7 +14,6 @@ from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
 
 PLACE = (0.0, 0.0, 5.0)
 ROUGH = {"loss": 0.3, "jitter_s": 0.05}
-"""Of the ground link."""
 COMMANDED = {
     scenario.name: scenario
     for group in (takeoff_land, holding, missions, offboard)
@@ -57,7 +56,6 @@ def many_listen(sitl: Sitl) -> None:
 
 
 def is_not_moved(sitl: Sitl) -> None:
-    """See that what is meant for somebody else, or comes from nobody that may command, moves nothing."""
     sitl.send("COMMAND_LONG", 77, 1, mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
     sitl.send("SET_MODE", 77, 1, 0)
     sitl.run(1.0)

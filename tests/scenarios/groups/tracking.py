@@ -39,7 +39,6 @@ def begins(name: str, **more: object) -> dict[str, object]:
 
 
 def follows_by_its_estimate(sitl: Sitl, max_m: float) -> None:
-    """See how far what it believes is from where it wants to be, as it says itself."""
     where, wanted = sitl.heard("LOCAL_POSITION_NED"), sitl.heard("POSITION_TARGET_LOCAL_NED")
     targets = {message.time_boot_ms: message for message in wanted}
     both = [(message, targets[message.time_boot_ms]) for message in where if message.time_boot_ms in targets]

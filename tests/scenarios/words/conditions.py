@@ -9,8 +9,6 @@ from colibri.sitl.vehicle import Sitl
 
 
 class Condition(NamedTuple):
-    """Something that holds of a vehicle, or does not."""
-
     words: str
     holds: Callable[[Sitl], bool]
 

@@ -40,8 +40,6 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetScenario:
-    """A scenario of several vehicles."""
-
     name: str
     peer: str
     holds: str
