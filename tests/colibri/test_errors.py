@@ -2,8 +2,6 @@
 
 import ast
 import builtins
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -93,14 +91,6 @@ def test_errors_in_flight_and_of_tests_have_a_second_base() -> None:
     assert issubclass(DecisionError, InFlightError)
     assert issubclass(IntegrationError, InFlightError)
     assert issubclass(NotInTimeError, AssertionError)
-
-
-def test_a_process_that_cannot_begin_exits_with_2() -> None:
-    command = [sys.executable, "-m", "colibri", "autopilot", "--profile", "fast"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.startswith('colibri: error: unknown profile "fast" (choose ')
-    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(

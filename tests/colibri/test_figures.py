@@ -116,6 +116,8 @@ def test_a_reference_is_wider_than_what_covers_it(short: Flight) -> None:
         below, above = axes.lines
         assert (below.get_label(), above.get_label()) == ("reference", "flown")
         assert below.get_linewidth() >= 3.0 * above.get_linewidth()
+        held = axes in short.figures["attitude"].axes
+        assert (below.get_drawstyle(), above.get_drawstyle()) == ("steps-pre" if held else "default", "default")
 
 
 @pytest.mark.parametrize(
@@ -131,12 +133,6 @@ def test_an_input_is_held_up_to_its_row(short: Flight, name: str, quantity: str,
     held = axes.lines[-1]
     assert np.array_equal(drawn(held)[1], short.recording[column])
     assert held.get_drawstyle() == "steps-pre"
-
-
-def test_an_attitude_reference_is_held_up_to_its_row(short: Flight) -> None:
-    for axes in short.figures["attitude"].axes:
-        assert line(axes, "reference").get_drawstyle() == "steps-pre"
-        assert line(axes, "flown").get_drawstyle() == "default"
 
 
 @pytest.mark.parametrize("vehicle", ["hummingbird-thesis", "hummingbird"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.limits import KEYS, Limit, exceeded
-from colibri.analysis.lost import ground_contact_s, lost
+from colibri.analysis.lost import Lost, ground_contact_s, lost
 from colibri.analysis.recording import COLUMNS, Samples
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.flights.plan import FlightPlan
@@ -40,6 +40,12 @@ def flown(until_s: float = 30.0, **columns: Any) -> FlightSeries:
     return series
 
 
+def loss(plan: FlightPlan, flight: FlightSeries) -> Lost:
+    found = lost(plan, flight)
+    assert found is not None
+    return found
+
+
 def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:
     assert lost(plan, flown()) is None
     assert ground_contact_s(plan.plant_vehicle, flown()) == 0.0
@@ -47,8 +53,7 @@ def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:
 
 def test_one_that_comes_down_is_lost_when_it_does(plan: FlightPlan) -> None:
     flight = flown(z=lambda t: np.maximum(0.0, 2.0 - 0.2 * np.maximum(0.0, t - 5.0)))
-    found = lost(plan, flight)
-    assert found is not None
+    found = loss(plan, flight)
     assert found.at_s == pytest.approx(15.0, abs=0.02)
     assert found.why == "on the ground, 2.0 m off its track, tilted 0°; later up to 2.0 m off"
     assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(15.0, abs=0.02)
@@ -65,23 +70,19 @@ def test_one_that_shall_land_may_touch_the_ground(plan: FlightPlan) -> None:
 
 
 def test_one_that_never_takes_off_is_lost_from_the_start(plan: FlightPlan) -> None:
-    found = lost(plan, flown(z=0.0))
-    assert found is not None
-    assert found.at_s == 0.0
+    assert loss(plan, flown(z=0.0)).at_s == 0.0
     assert ground_contact_s(plan.plant_vehicle, flown(z=0.0)) == 0.0
 
 
 def test_ending_upside_down_is_a_loss_if_ever_upright(plan: FlightPlan) -> None:
-    found = lost(plan, flown(phi=lambda t: np.where(t < 7.0, 0.0, pi)))
-    assert found is not None
+    found = loss(plan, flown(phi=lambda t: np.where(t < 7.0, 0.0, pi)))
     assert found.at_s == pytest.approx(7.0)
     assert "in the air, 0.0 m off its track, tilted 180°" in found.why
     assert lost(plan, flown(0.3, phi=pi)) is None
 
 
 def test_one_that_drifts_away_is_lost_since_it_is_too_far(plan: FlightPlan) -> None:
-    found = lost(plan, flown(x=lambda t: 0.4 * t))
-    assert found is not None
+    found = loss(plan, flown(x=lambda t: 0.4 * t))
     assert found.at_s == pytest.approx(12.5, abs=0.02)
     assert "later up to 12.0 m off" in found.why
 

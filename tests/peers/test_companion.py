@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,16 +108,12 @@ def px4(folder: Path, options: str) -> dict[str, Any]:
     )
 
 
-def test_arducopter_flies_the_spiral_twice_as_well(tmp_path: Path) -> None:
-    report = arducopter(tmp_path, "spiral --arm --duration 60")
-    assert report["stack"] == "ardupilot"
-    assert report["in_order"]
-    assert report["control_rmse_m"] <= 0.045 / 2.0
-
-
-def test_arducopter_on_the_plant_is_flown_twice_as_well(tmp_path: Path) -> None:
-    report = arducopter_on_the_plant(tmp_path, "spiral --arm --duration 40")
-    assert report["in_order"]
+@pytest.mark.parametrize(("on", "seconds"), [(arducopter, 60), (arducopter_on_the_plant, 40)])
+def test_arducopter_is_flown_twice_as_well(
+    on: Callable[[Path, str], dict[str, Any]], seconds: int, tmp_path: Path
+) -> None:
+    report = on(tmp_path, f"spiral --arm --duration {seconds}")
+    assert (report["stack"], report["in_order"]) == ("ardupilot", True)
     assert report["control_rmse_m"] <= 0.045 / 2.0
 
 

@@ -34,17 +34,12 @@ def endings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     return found
 
 
-def test_the_pilots_mode_is_obeyed_within_100_ms(endings: dict[str, dict[str, Any]]) -> None:
-    ended = endings["pilot"]
-    assert ended["in_order"]
-    assert ended["sent_after_disturbed_s"] <= OBEYED_WITHIN_S
-    assert ended["mode"] == RETURN
-
-
-def test_interrupted_it_leaves_the_vehicle_in_hold(endings: dict[str, dict[str, Any]]) -> None:
-    ended = endings["interrupted"]
-    assert ended["in_order"]
-    assert ended["mode"] == HOLD.custom
+def test_a_pilot_is_obeyed_within_100_ms_and_who_interrupts_leaves_it_in_hold(
+    endings: dict[str, dict[str, Any]],
+) -> None:
+    for name, mode in (("pilot", RETURN), ("interrupted", HOLD.custom)):
+        assert (endings[name]["in_order"], endings[name]["mode"]) == (True, mode)
+    assert endings["pilot"]["sent_after_disturbed_s"] <= OBEYED_WITHIN_S
 
 
 @pytest.mark.parametrize("name", LIMITS)

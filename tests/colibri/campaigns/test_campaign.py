@@ -7,7 +7,6 @@ import psutil
 import pytest
 
 import colibri
-from colibri.campaigns.definition import CampaignTables, tables_of
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.flights import Flown
 from colibri.campaigns.run import fly_campaign
@@ -86,8 +85,3 @@ def test_logs_are_kept_and_a_killed_flight_is_a_row(tmp_path: Path) -> None:
     assert not (tmp_path / "out/flights/000001").exists()
     last = tables_in(tmp_path / "out")[0].splitlines()[-1]
     assert ',killed,"the process that flew it was killed, and again when it flew this alone",' in last
-
-
-def test_unknown_keywords_are_refused() -> None:
-    with pytest.raises(colibri.Error, match='unknown option "grids"'):
-        tables_of(CampaignTables, None, {"grids": {}})

@@ -95,7 +95,7 @@ def test_samples_have_each_object() -> None:
     assert [point.factors["profile"].name for point in points] == ["flight", "thesis", "se3"]
 
 
-@pytest.mark.parametrize("given", [{"logs": "lots"}, {"root_seed": "1"}, {"paired": 1}, {"grid": None}])
+@pytest.mark.parametrize("given", [{"logs": "lots"}, {"root_seed": "1"}, {"paired": 1}, {"grid": None}, {"grids": {}}])
 def test_keywords_are_as_strict_as_a_file(given: dict[str, Any]) -> None:
     with pytest.raises(colibri.Error, match=next(iter(given))) as refused:
         tables_of(CampaignTables, None, given)

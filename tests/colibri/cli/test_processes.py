@@ -36,14 +36,12 @@ waiting.set()
 """
 
 
-def fly_slowly(out: Path) -> "subprocess.Popen[str]":
+def flying(out: Path) -> tuple["subprocess.Popen[str]", list[psutil.Process]]:
     command = [sys.executable, "-m", "colibri", "fly", "spiral", "--speed", "10", "--no-figures", "--out", str(out)]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
-
-
-def has_flown(out: Path) -> bool:
-    log = out / "flight.ulg"
-    return log.exists() and log.stat().st_size > 30_000
+    pipe, log = subprocess.PIPE, out / "flight.ulg"
+    flight = subprocess.Popen(command, stderr=pipe, stdout=pipe, text=True, start_new_session=True)
+    wait_for(lambda: log.exists() and log.stat().st_size > 30_000, "the flight to begin")
+    return flight, psutil.Process(flight.pid).children(recursive=True)
 
 
 def alive(process: psutil.Process) -> bool:
@@ -53,9 +51,7 @@ def alive(process: psutil.Process) -> bool:
 @pytest.mark.parametrize("whom", ["group", pytest.param("parent", marks=pytest.mark.long)])
 def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
     """A terminal interrupts the whole group; `kill` ends only the command itself."""
-    flight = fly_slowly(tmp_path)
-    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
-    children = psutil.Process(flight.pid).children(recursive=True)
+    flight, children = flying(tmp_path)
     assert len(children) == 2
     if whom == "group":
         os.killpg(flight.pid, signal.SIGINT)
@@ -73,9 +69,7 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) ->
 
 @pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
 def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str) -> None:
-    flight = fly_slowly(tmp_path)
-    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
-    children = psutil.Process(flight.pid).children(recursive=True)
+    flight, children = flying(tmp_path)
     (victim,) = (child for child in children if child.name() == name)
     victim.send_signal(signal.SIGKILL)
     _, said = flight.communicate(timeout=60.0)
@@ -86,9 +80,7 @@ def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str)
 
 
 def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
-    flight = fly_slowly(tmp_path)
-    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
-    children = psutil.Process(flight.pid).children(recursive=True)
+    flight, children = flying(tmp_path)
     flight.kill()
     flight.communicate()
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")

@@ -77,25 +77,6 @@ def test_a_run_ends_with_its_sum_which_is_the_same_again(pytester: pytest.Pytest
     assert not (pytester.path / "sitl-failures").exists()
 
 
-@pytest.mark.long
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
-def test_as_many_workers_as_cores_have_a_core_each(pytester: pytest.Pytester) -> None:
-    cores = sorted(os.sched_getaffinity(0))
-    text = """
-        import os
-
-        import pytest
-
-        @pytest.mark.sitl(airborne=3.0)
-        @pytest.mark.parametrize("number", range(4))
-        def test_one(sitl, number, worker_id):
-            core = {cores}[int(worker_id[2:])]
-            assert all(os.sched_getaffinity(each) == {{core}} for each in (0, *sitl.processes.values()))
-    """
-    flown = run(pytester, text.format(cores=cores), "--sitl-link", "udp", "-n", str(len(cores)))
-    flown.assert_outcomes(passed=4)
-
-
 def test_a_flight_is_gone_when_its_test_is_over(pytester: pytest.Pytester) -> None:
     text = """
         import gc

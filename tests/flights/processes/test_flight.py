@@ -151,12 +151,6 @@ def test_an_impossible_track_is_followed_upright(lap_s: float, count: int, lasts
     assert max(it.z_m.max() for it in flown) < 4.5
 
 
-@pytest.mark.parametrize("lap_s", [pytest.param(4.0, marks=pytest.mark.long), 1.0])
-def test_what_no_vehicle_can_follow_takes_it_to_its_limits(tmp_path: Path, lap_s: float) -> None:
-    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "10")
-    assert figures["constrained_samples"]["rotors"] + figures["constrained_samples"]["rates"] > 0
-
-
 def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
     fly(tmp_path, "hover:height=1.5", "--link", "memory", "--duration", "8", "--start", "x=0,y=0,z=0,rotors=0")
     flown = rows(tmp_path / "flight.csv")

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
-from tools.harness.stations import ACCEPTED, HOLD, Ack, Station
+from tools.harness.stations import ACCEPTED, Station
 
 DURATION = ("--duration", "6")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
@@ -67,15 +66,3 @@ def test_a_watched_flight_is_paced_to_the_wall_clock(tmp_path: Path) -> None:
         report = fly(tmp_path, "hover", "--gcs", port.url, "--duration", "1.5")
     assert station.counts["HEARTBEAT"] >= 1
     assert report["wall_time_s"] > 1.4
-
-
-@pytest.mark.long
-def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
-    """A track is a mode like any other: another one can be chosen."""
-    station = Station(255, orders=[HOLD])
-    with OnPort(station) as port:
-        report = fly(tmp_path, "lemniscate", "--gcs", port.url, "--speed", "max", "--duration", "6")
-    assert station.acks[Ack(mav.MAV_CMD_DO_SET_MODE, ACCEPTED, station.identity)] == 1
-    flown = states(tmp_path)
-    assert report["max_error_m"] > 1.0
-    assert abs(flown[-1, 1:4]).max() < 1e-3  # it holds still

@@ -1,28 +1,15 @@
 """Flights on sensors: the same over every link, another with every seed, and on the track."""
 
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from colibri.common.process.lifecycle import nudge_m
-from colibri.mavlink.wire.dialect import Codec
 from tools.harness.processes import Process, fly, running, start_autopilot, start_plant, states, topic_rows
 from tools.harness.relay import BadLink
 
 ON_SENSORS = ("spiral", "--feedback", "sensors")
-STAMP_BYTES = 8
-
-
-def frames_of(tlog: Path) -> Counter[str]:
-    """Count the messages of a telemetry log; one that was sent again, as on a busy machine, counts once."""
-    data, at, codec, frames = tlog.read_bytes(), 0, Codec(1, 1), set[bytes]()
-    while at < len(data):
-        start = at + STAMP_BYTES
-        at = start + 12 + data[start + 1]
-        frames.add(data[start:at])
-    return Counter(message.name for frame in frames for message in codec.decode(frame))
 
 
 @pytest.mark.long
@@ -44,21 +31,6 @@ def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
     assert ended["resent"] > 100
     assert (states(tmp_path / "bad") == states(tmp_path / "good")).all()
     assert plant.errors() + autopilot.errors() == ""
-
-
-@pytest.mark.long
-def test_two_processes_fly_the_same_flight_as_one(tmp_path: Path) -> None:
-    figures = [
-        fly(tmp_path / link, *ON_SENSORS, "--tlog", "--link", link, "--seed", "1", "--duration", "8")
-        for link in ("udp", "memory")
-    ]
-    assert figures[0]["trajectory_sha256"] == figures[1]["trajectory_sha256"]
-    assert {flown["feedback"] for flown in figures} == {"sensors"}
-    names = frames_of(tmp_path / "udp" / "flight.tlog")
-    assert names == frames_of(tmp_path / "memory" / "flight.tlog")
-    assert names["HIL_SENSOR"] == names["HIL_ACTUATOR_CONTROLS"] == 2000
-    assert names["HIL_GPS"] == 79
-    assert names["ATTITUDE_QUATERNION"] == 0
 
 
 def test_the_track_begins_once_the_estimate_is_aligned(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from tests.support.paths import DIPS
 from tools.harness.processes import fly, rows
 
 
-def written(folder: Path, text: str) -> str:
-    path = folder / "points.csv"
+def written(folder: Path, text: str, name: str = "points.csv") -> str:
+    path = folder / name
     path.write_text(text, encoding="utf-8")
     return f"waypoints:{path}"
 
@@ -33,12 +33,14 @@ def test_what_was_changed_is_said_before_the_flight(tmp_path: Path, capsys: pyte
 
 @pytest.mark.long
 def test_a_floor_reaches_the_autopilot_and_its_replay(tmp_path: Path) -> None:
-    name, options = written(tmp_path, DIPS), ("--floor", "1", "--duration", "8", "--quiet", "--no-figures")
+    """With every figure drawn: a name may hold what matplotlib and rich would take for markup."""
+    name, options = written(tmp_path, DIPS, "points $x$ [red].csv"), ("--floor", "1", "--duration", "8", "--quiet")
     for link in ("udp", "memory"):
         assert main(["fly", name, *options, "--link", link, "--out", str(tmp_path / link)]) == 0
     same = [(tmp_path / link / "flight.csv").read_bytes() for link in ("udp", "memory")]
     assert same[0] == same[1]
     assert rows(tmp_path / "udp" / "flight.csv")["z_ref"].min() >= 1.0
+    assert (tmp_path / "udp" / "trajectory.png").exists()
     assert main(["replay", str(tmp_path / "memory"), "--quiet"]) == 0
 
 

@@ -44,14 +44,6 @@ def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: 
     assert same[0] == same[1]
 
 
-def test_the_reference_columns_are_of_the_same_instant(tmp_path: Path) -> None:
-    fly_thesis(tmp_path, "line", "--link", "direct")
-    flown = rows(tmp_path / "flight.csv")
-    assert flown["x_ref"] == pytest.approx(flown["t"] / 10 + 1)
-    assert flown["y_ref"] == pytest.approx(flown["t"] / 10 - 2)
-    assert flown["z_ref"] == pytest.approx(2 + 0.03 * flown["t"])
-
-
 def test_the_tlog_opens_in_mavlogdump(tmp_path: Path) -> None:
     fly_thesis(tmp_path, "spiral", "--link", "memory", "--tlog", "--duration", "2")
     mavlogdump = shutil.which("mavlogdump.py", path=str(Path(sys.executable).parent))

@@ -18,7 +18,6 @@ from colibri.autopilot.control.qp import IN_SOLVERS_EXTRA
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
-from colibri.cli.main import main
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array
 from tools.harness.processes import fly, fly_thesis, max_difference, rows
@@ -129,16 +128,3 @@ def test_what_has_no_end_goes_on_beyond_100_s(tmp_path: Path) -> None:
     wanted = position(track("circle:radius=3,speed=1"), flown["t"])
     assert np.stack([flown["x_ref"], flown["y_ref"], flown["z_ref"]], axis=1) == pytest.approx(wanted)
     assert flown["t"][-1] == pytest.approx(105.0)
-
-
-@pytest.mark.long
-def test_options_and_a_file_reach_the_autopilot_over_udp(tmp_path: Path) -> None:
-    """With every figure drawn: a name may hold what matplotlib and rich would take for markup."""
-    path = tmp_path / "points $x$ [red].csv"
-    path.write_text("x,y,z\n0,0,1\n3,0,2\n3,4,2\n", encoding="utf-8")
-    name, options = f"waypoints:file={path},speed=3", ("--profile", "se3", "--duration", "2", "--quiet")
-    assert main(["fly", name, *options, "--out", str(tmp_path / "udp")]) == 0
-    fly(tmp_path / "memory", name, *options, "--link", "memory")
-    same = [(tmp_path / link / "flight.csv").read_bytes() for link in ("udp", "memory")]
-    assert same[0] == same[1]
-    assert (tmp_path / "udp" / "trajectory.png").exists()

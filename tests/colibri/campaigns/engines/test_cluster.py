@@ -67,15 +67,11 @@ def test_it_is_the_same_table_though_a_worker_is_killed(tmp_path: Path, cluster:
     assert tables_in(out) == tables_in(tmp_path / "here")
 
 
-def test_a_scheduler_that_nobody_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://there"])
+def test_a_scheduler_that_nobody_runs_is_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("colibri.campaigns.engines.cluster.CONNECT_S", 0.2)
-    with pytest.raises(CampaignError, match=r"--dask tcp://127.0.0.1:1: no scheduler answers there: "):
-        Cluster("tcp://127.0.0.1:1")
-
-
-def test_an_address_that_is_none_is_refused() -> None:
-    with pytest.raises(CampaignError, match="--dask nonsense://there: no scheduler answers there: "):
-        Cluster("nonsense://there")
+    with pytest.raises(CampaignError, match=f"--dask {address}: no scheduler answers there: "):
+        Cluster(address)
 
 
 def test_workers_with_another_version_are_refused() -> None:
