@@ -24,10 +24,7 @@ SPEED = 4.0
 
 @contextmanager
 def connected(folder: Path, *options: str) -> Iterator[tuple[MavProxy, Vehicle]]:
-    with (
-        vehicle(folder, *options, speed=SPEED) as flown,
-        MavProxy(folder, f"udpout:127.0.0.1:{flown.port}") as proxy,
-    ):
+    with vehicle(folder, *options, speed=SPEED) as flown, MavProxy(folder, f"udpout:127.0.0.1:{flown.port}") as proxy:
         yield proxy, flown
 
 

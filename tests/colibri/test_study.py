@@ -164,11 +164,7 @@ def test_what_is_lost_says_so(short: Flown) -> None:
     assert {cell for row in rows for cell in row[1:]} == {"lost"}
 
 
-_LEVEL: Settings = {
-    "track": "hover:height=20",
-    "start": {"x": 0.0, "y": 0.0, "z": 20.0, "r": 10.0},
-    "duration": 0.4,
-}
+_LEVEL: Settings = {"track": "hover:height=20", "start": {"x": 0.0, "y": 0.0, "z": 20.0, "r": 10.0}, "duration": 0.4}
 """Its height changes by a hundredth of a millimetre."""
 
 

@@ -4,13 +4,7 @@ from collections.abc import Iterable
 from struct import pack
 from typing import Any
 
-from colibri.mavlink.mission.items import (
-    ACCEPTED,
-    MISSION,
-    PLAN_TYPES,
-    MissionItem,
-    Plan,
-)
+from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, Plan
 from colibri.mavlink.mission.service import MissionService, Progress, Vehicle
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Peer, Send

@@ -4,13 +4,7 @@ from math import atan2, cos, dist, nan, sin, tau
 
 from hypothesis import strategies as st
 
-from colibri.autopilot.guidance.mission.executor import (
-    ACTIVE,
-    COMPLETE,
-    MissionExecutor,
-    Reached,
-    SetHome,
-)
+from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, MissionExecutor, Reached, SetHome
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff

@@ -128,10 +128,7 @@ def test_what_is_no_seed_is_refused(given: Any) -> None:
         ({"metrics": ["rmse_m", "rmse_m"]}, "rmse_m: the table would have two columns of that name: choose another"),
         ({"metrics": {"seed": len}}, "seed: the table would have two columns"),
         ({"grid": {"track": ["hover"], "rmse_m": {"one": {}}}}, "rmse_m: the table would have two columns"),
-        (
-            {"draw": DRAWN | {MASS.replace("-", "_"): {"choice": [0.7]}}},
-            f"{MASS} is said twice, by two of its names",
-        ),
+        ({"draw": DRAWN | {MASS.replace("-", "_"): {"choice": [0.7]}}}, f"{MASS} is said twice, by two of its names"),
         ({"root_seed": -1}, "root_seed: must not be below zero, not -1"),
     ],
 )

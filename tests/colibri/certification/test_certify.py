@@ -93,8 +93,7 @@ def test_every_part_of_it_is_confirmed(name: str, part: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "flights"),
-    [("lpv-mpc", 1000), pytest.param("whole-lpv-mpc", 1000, marks=pytest.mark.long)],
+    ("name", "flights"), [("lpv-mpc", 1000), pytest.param("whole-lpv-mpc", 1000, marks=pytest.mark.long)]
 )
 def test_of_flights_from_its_border_none_leaves_it(name: str, flights: int) -> None:
     flown = fly(LAWS[name], CERTIFICATES[name].invariant, Plan(flights, 1.0, seed=1))

@@ -40,10 +40,7 @@ BAD_OPTIONS = [
         "spiral --feedback sensors --vehicle hummingbird-thesis",
         "--feedback sensors: vehicle hummingbird-thesis has no table sensors",
     ),
-    (
-        "spiral --feedback sensors --without ground",
-        "--feedback sensors: vehicle hummingbird has no ground to stand on",
-    ),
+    ("spiral --feedback sensors --without ground", "--feedback sensors: vehicle hummingbird has no ground to stand on"),
     ("spiral --seed -1", "--seed: must be a whole number of at least 0, not -1"),
     ("spiral --speed 0", "--speed: must be a number above 0, or max, not 0"),
     ("spiral --link carrier-pigeon", '--link: unknown value "carrier-pigeon" '),
@@ -133,12 +130,7 @@ def is_slow(line: str) -> bool:
     ],
 )
 def test_bad_input_gets_one_line_and_exit_code_2(
-    tmp_path: Path,
-    refused: Refused,
-    words: str,
-    write: Callable[[Path], str] | None,
-    line: str,
-    link: str,
+    tmp_path: Path, refused: Refused, words: str, write: Callable[[Path], str] | None, line: str, link: str
 ) -> None:
     given = [*words.split(), *([write(tmp_path)] if write else [])]
     assert line in refused("fly", f"--link={link}", "--out", tmp_path / "out", *given)

@@ -189,13 +189,7 @@ def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, ran: Ran) ->
 def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
     assert main(["fly", "crown", "--duration", "21", "--seed", "7", "--quiet", "--out", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
-    assert {
-        "track": "crown",
-        "profile": "flight",
-        "link": "udp",
-        "seed": 7,
-        "solver": "daqp",
-    }.items() <= report.items()
+    assert {"track": "crown", "profile": "flight", "link": "udp", "seed": 7, "solver": "daqp"}.items() <= report.items()
     assert set(report["solve_time_us"]) == set(report["control_step_us"]) == {"p50", "p99", "max"}
     assert report["sim_time_s"] == 21.0
     assert report["real_time_factor"] == pytest.approx(21.0 / report["wall_time_s"])

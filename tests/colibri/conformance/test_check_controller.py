@@ -28,10 +28,7 @@ BAD: dict[type[laws.Good], tuple[str, set[str]]] = {
     laws.Scribbling: ("memory", {"references left as they are"}),
     laws.NoUpsideDown: ("limits", {"upside down", "tumbling"}),
     laws.NotFinite: ("limits", {"near the ground, sinking", "standing on the ground"}),
-    laws.TooFast: (
-        "limits",
-        {"fast, in any direction", "far from the reference", "references that jump"},
-    ),
+    laws.TooFast: ("limits", {"fast, in any direction", "far from the reference", "references that jump"}),
     laws.Half: ("interface", {"optional members in whole groups"}),
     laws.Forgetful: ("optional", {"charge_ah: charge taken from the battery"}),
     laws.Tilted: ("optional", {"step_attitude: an attitude and a thrust in place of a place"}),

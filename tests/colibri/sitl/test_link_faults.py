@@ -86,10 +86,7 @@ def test_each_worker_keeps_to_one_core() -> None:
 
 
 def test_another_process_cannot_be_seen_inside(forked: Launcher) -> None:
-    with (
-        Flights(Setting(airborne=3.0), forked) as flights,
-        pytest.raises(SitlError, match="--sitl-link memory"),
-    ):
+    with Flights(Setting(airborne=3.0), forked) as flights, pytest.raises(SitlError, match="--sitl-link memory"):
         assert flights.begin().inside
 
 

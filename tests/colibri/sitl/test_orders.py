@@ -62,10 +62,7 @@ def test_what_there_is_not_is_refused_with_what_there_is() -> None:
 @pytest.mark.parametrize(
     ("mark", "line"),
     [
-        (
-            {"airborne": 5, "feedback": "sensors"},
-            'airborne requires feedback="state":',
-        ),
+        ({"airborne": 5, "feedback": "sensors"}, 'airborne requires feedback="state":'),
         ({"airborne": "five"}, "airborne: must be a number m, not five"),
         ({"vehicle": 3}, "vehicle: must be a name or a Vehicle, not int"),
         ({"params": 3}, "params: must be a Mapping, not int"),

@@ -22,13 +22,6 @@ CODEC = Codec(255, 190)
 HEARTBEAT = CODEC.encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
 
 
-@pytest.fixture
-def logs(tmp_path: Path) -> Path:
-    folder = tmp_path / "logs"
-    folder.mkdir()
-    return folder
-
-
 @contextmanager
 def hovering(logs: Path, *links: str) -> Iterator[tuple[Process, Process, Observer, str]]:
     plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", "--speed", repr(SPEED), *HIGH)

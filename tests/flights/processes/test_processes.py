@@ -5,22 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.harness.processes import (
-    THESIS_PLANT,
-    Process,
-    fly_thesis,
-    running,
-    start_autopilot,
-    start_plant,
-    states,
-)
-
-
-@pytest.fixture
-def logs(tmp_path: Path) -> Path:
-    folder = tmp_path / "logs"
-    folder.mkdir()
-    return folder
+from tools.harness.processes import THESIS_PLANT, Process, fly_thesis, running, start_autopilot, start_plant, states
 
 
 @pytest.mark.long

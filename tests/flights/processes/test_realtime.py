@@ -34,9 +34,8 @@ def flown_on(plant: Process, seconds: float) -> Callable[[], bool]:
     return has
 
 
-def test_rotors_stop_with_a_dead_autopilot_until_the_next(tmp_path: Path) -> None:
-    logs, out = tmp_path / "logs", tmp_path / "flight"
-    logs.mkdir()
+def test_rotors_stop_with_a_dead_autopilot_until_the_next(tmp_path: Path, logs: Path) -> None:
+    out = tmp_path / "flight"
     plant, url = start(logs, out, "--cut-after", "0.3")
     first = autopilot_for(logs, url)
     with running(plant, first):

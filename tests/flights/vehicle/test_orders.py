@@ -10,16 +10,7 @@ from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
-from tests.support.flying import (
-    ACCEPTED,
-    DENIED,
-    QUICK,
-    RELATIVE,
-    SYSTEM,
-    degrees_e7,
-    orbit,
-    refused,
-)
+from tests.support.flying import ACCEPTED, DENIED, QUICK, RELATIVE, SYSTEM, degrees_e7, orbit, refused
 
 pytestmark = [QUICK, pytest.mark.sitl(airborne=5.0)]
 

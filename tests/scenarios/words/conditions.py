@@ -48,8 +48,7 @@ def slower(m_s: float) -> Condition:
 
 def ground_speed(m_s: float, within_m_s: float) -> Condition:
     return Condition(
-        f"{m_s:g} ± {within_m_s:g} m/s over ground",
-        lambda sitl: abs(hypot(*sitl.velocity[:2]) - m_s) <= within_m_s,
+        f"{m_s:g} ± {within_m_s:g} m/s over ground", lambda sitl: abs(hypot(*sitl.velocity[:2]) - m_s) <= within_m_s
     )
 
 
