@@ -121,6 +121,8 @@ class InMemory:
             if not step.faults:
                 command = command_as_received(step.command)
                 assert command is not None, "a control law's command is one that rotors can follow"
+                self.plant_end.skip()
+                self.autopilot_end.skip()
                 return Answered(step, command, (), datagram)
             self.plant_end.offer(frame, NEVER_LATE_S)
             self.plant_end.take_outbox()

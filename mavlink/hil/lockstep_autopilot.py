@@ -96,6 +96,10 @@ class AutopilotEnd:
         """Go on from the frame of a time that was answered without a datagram."""
         self._time_us = time_us
 
+    def skip(self) -> None:
+        """Count an answer that was not encoded, so that later ones are numbered as if it had been."""
+        self._codec.skip(1)
+
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         answer = encode_actuators(self._codec, command)
         for fault in faults:

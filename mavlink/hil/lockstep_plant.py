@@ -29,6 +29,7 @@ from colibri.mavlink.hil.plant_status import (
 )
 from colibri.mavlink.hil.sensors import Frame, encode_sensors
 from colibri.mavlink.hil.state import (
+    STATE_MESSAGES,
     ActuatorCommand,
     StateFrame,
     decode_actuators,
@@ -144,6 +145,10 @@ class PlantEnd:
         for message in asked:
             self._receive_fault(message, answered=command is not None)
         return command
+
+    def skip(self) -> None:
+        """Count a state frame that was not encoded, so that later ones are numbered as if it had been."""
+        self._codec.skip(STATE_MESSAGES)
 
     def take_faults(self) -> list[Fault | WorldChange]:
         """Return the unchecked faults and changes of the world in the last answer."""

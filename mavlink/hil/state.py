@@ -19,6 +19,7 @@ LOCKSTEP_FLAG = 1
 _UNIT_NORM_TOLERANCE = 1e-3
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
+STATE_MESSAGES = 2
 STATE_BYTES = _ATTITUDE.size + _POSITION.size
 """Size of a state frame's datagram."""
 """Size of a datagram that is nothing but a frame of state feedback."""

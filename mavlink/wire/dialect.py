@@ -141,6 +141,10 @@ class Codec:
         self._sequence = (sequence + 1) % 256
         return sequence
 
+    def skip(self, frames: int) -> None:
+        """Leave out the sequence numbers of frames."""
+        self._sequence = (self._sequence + frames) % 256
+
     def decode(self, datagram: bytes) -> list[Message]:
         messages = _whole_messages(datagram)
         return self._parsed(datagram) if messages is None else messages

@@ -69,8 +69,9 @@ def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         seen.wait_until_disarmed()
         content = downloaded(flying.port)
         (kept,) = (flying.state / "0" / "logs").glob("00001.ulg")
-        beside = ULog(str(out / "0" / "flight.ulg"))
-        return Flown(content, ULog(BytesIO(content)), seen.texts, kept.read_bytes(), beside)
+        kept_bytes, texts = kept.read_bytes(), seen.texts
+    beside = ULog(str(out / "0" / "flight.ulg"))  # whole once the process has ended
+    return Flown(content, ULog(BytesIO(content)), texts, kept_bytes, beside)
 
 
 def test_a_download_is_the_file_on_disk(flown: Flown) -> None:
