@@ -22,6 +22,7 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _MIN_FORCE = 0.05  # least demanded force in parts of the weight: a smaller one has no useful direction
+_MIN_LIFT = 0.5  # near the ground: least lift in parts of the weight, at which the target is level
 
 
 class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -96,9 +97,18 @@ class GeometricController:
         floor = _MIN_FORCE * self._gravity_m_s2
         if norm(force) < floor:
             force = floor * R[:, 2]
+        if not state.airborne:
+            force = self._upright(force)
         lifted = dot(force, R[:, 2]) * R[:, 2] - gravity
         jerk = -self._k_position * velocity_error - self._k_velocity * (lifted - wanted) + references.jerk_enu_m_s3[0]
         return force, jerk
+
+    def _upright(self, force: Array) -> Array:
+        """Return the force for a vehicle near the ground: the less lift, the less tilt, so that it cannot tip over."""
+        floor = _MIN_LIFT * self._gravity_m_s2
+        lift = max(float(force[2]), floor)
+        share = min((lift - floor) / max(norm(force[:2]), floor), 1.0)
+        return np.array([share * force[0], share * force[1], lift])
 
     def _moment(self, R: Array, rate: Array, target: Target) -> Array:
         """Return the moment, N m, [16], without the target's angular acceleration."""

@@ -1,5 +1,6 @@
 """From the ground and back: arming, take-off, landing, return."""
 
+from collections.abc import Callable
 from math import hypot, nan
 
 import pytest
@@ -167,3 +168,13 @@ def test_the_battery_is_counted_across_flights(sitl: Sitl) -> None:
     consumed_mah = sitl.gcs.latest("BATTERY_STATUS").current_consumed
     assert consumed_mah == pytest.approx(1e3 * sitl.inside.world.charge_used_ah, abs=1.0)
     assert consumed_mah > 15
+
+
+@pytest.mark.parametrize("wind", ["2@0", "7@90", "12@215"])
+@pytest.mark.sitl(controller="geometric-se3", airborne=1.0)
+def test_geometric_law_lands_upright_in_wind(sitl_fleet: Callable[..., list[Sitl]], wind: str) -> None:
+    (sitl,) = sitl_fleet(1, wind=wind)
+    sitl.run(1.0)
+    sitl.land()
+    sitl.run(1.0)
+    assert sitl.tilt_deg < 1.0
