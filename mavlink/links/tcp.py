@@ -1,5 +1,10 @@
-"""Non-blocking TCP endpoints, server and client, for whole frames. A slow reader loses frames, as over UDP."""
+"""Non-blocking TCP endpoints, server and client, for whole frames. A slow reader loses frames, as over UDP.
 
+Any web page can have the browser post bytes to a port of this computer, or send what it likes after a TLS handshake.
+So nothing is read from a stream that begins like HTTP or TLS, or that brings no frame in its first `FIRST_BYTES`.
+"""
+
+import re
 import select
 import socket
 from time import perf_counter
@@ -13,15 +18,24 @@ OUTPUT_BYTES = 1 << 18
 CONNECTIONS = 16
 """Limit of a server's clients."""
 RECONNECT_AFTER_S = 1.0
+IDLE_AFTER_S = 3.5
+"""Silence after which a client gives way to another where there are too many; stations send a HEARTBEAT a second."""
+FIRST_BYTES = 4096
+NOTE_EVERY_S = 1.0
+"""Interval of the notes on refused connections: who floods a port must not flood the terminal."""
 ACCEPT_EVERY_S = 0.1
-"""Accept interval of a busy server with clients: each attempt is a system call."""
+"""Accept interval of a busy server with clients: each attempt is a system call, each client costs time."""
 _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16
 """Limit per call, so that a continuous sender cannot stall the process."""
+_HTTP = re.compile(
+    rb"\s*(?:GET|HEAD|POST|PUT|DELETE|CONNECT|OPTIONS|TRACE|PATCH|PRI) |\s*[!-~]+ +[!-~]+ +HTTP/|HTTP/\d", re.IGNORECASE
+)
+_TLS = re.compile(rb"\x16\x03")
 
 
 class Connection:
-    """A connected socket with framing and a send queue."""
+    """A connected socket with framing and a send queue; `refused` says what its stream is instead of MAVLink."""
 
     def __init__(self, sock: socket.socket, address: Address) -> None:
         sock.setblocking(False)
@@ -29,8 +43,11 @@ class Connection:
         self._socket = sock
         self._framer = Framer()
         self._pending = bytearray()
+        self._head: bytes | None = b""  # of the stream, until its first frame
         self.address = address
         self.alive = True
+        self.refused = ""
+        self.spoke_s: float | None = None
 
     def send(self, datagram: bytes) -> None:
         if len(self._pending) + len(datagram) > OUTPUT_BYTES:
@@ -63,10 +80,29 @@ class Connection:
             if not chunk:
                 self.close()
                 break
-            frames += self._framer.take(chunk)
+            taken = self._framer.take(chunk)
+            if self._head is not None and not self._begins_well(chunk, taken):
+                self.close()
+                return []
+            frames += taken
             if len(chunk) < _CHUNK_BYTES:
                 break
+        if frames:
+            self.spoke_s = perf_counter()
         return frames
+
+    def _begins_well(self, chunk: bytes, frames: list[bytes]) -> bool:
+        assert self._head is not None, "asked until the first frame"
+        self._head += chunk
+        if _HTTP.match(self._head):
+            self.refused = "speaks HTTP, as a web page does"
+        elif _TLS.match(self._head):
+            self.refused = "speaks TLS, as a browser does"
+        elif not frames and len(self._head) >= FIRST_BYTES:
+            self.refused = "speaks no MAVLink"
+        if frames:
+            self._head = None
+        return not self.refused
 
     def close(self) -> None:
         self.alive = False
@@ -81,7 +117,7 @@ class TcpServer(Endpoint):
         sock.setblocking(False)
         self._socket = sock
         self._connections: dict[Address, Connection] = {}
-        self._accept_at_s = 0.0
+        self._accept_at_s = self._note_at_s = 0.0
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         for connection in list(self._connections.values()):
@@ -112,23 +148,44 @@ class TcpServer(Endpoint):
         self._socket.close()
 
     def _accept(self) -> None:
+        self._accept_at_s = perf_counter() + ACCEPT_EVERY_S
         for _ in range(CONNECTIONS):
             try:
                 sock, address = self._socket.accept()
             except OSError:  # nobody, gone again, or no descriptors left
-                self._accept_at_s = perf_counter() + ACCEPT_EVERY_S
                 return
-            connection = _established(sock, address) if len(self._connections) < CONNECTIONS else None
+            connection = _established(sock, address) if self._has_room() else None
             if connection is None:
                 sock.close()
             else:
                 self._connections[address] = connection
                 self._opened.append(address)
 
+    def _has_room(self) -> bool:
+        """Make room for a client, if it must be: who never spoke goes first, then who has been silent for longest."""
+        if len(self._connections) < CONNECTIONS:
+            return True
+        idle = min(self._connections.values(), key=lambda connection: connection.spoke_s or 0.0)
+        if idle.spoke_s is not None and perf_counter() < idle.spoke_s + IDLE_AFTER_S:
+            self._note(f"a client was turned away: {CONNECTIONS} others are active")
+            return False
+        self._note(f"{_named(idle.address)} was disconnected: it is silent, and another client waits")
+        idle.close()
+        self._forget_dead()
+        return True
+
     def _forget_dead(self) -> None:
-        for address in [connection.address for connection in self._connections.values() if not connection.alive]:
-            del self._connections[address]
-            self._closed.append(address)
+        for connection in [connection for connection in self._connections.values() if not connection.alive]:
+            del self._connections[connection.address]
+            self._closed.append(connection.address)
+            if connection.refused:
+                self._note(f"{_named(connection.address)} was disconnected: it {connection.refused}")
+
+    def _note(self, text: str) -> None:
+        now_s = perf_counter()
+        if now_s >= self._note_at_s:
+            self._note_at_s = now_s + NOTE_EVERY_S
+            self._notes.append(f"{self.url}: {text}")
 
 
 class TcpClient(Endpoint):
@@ -183,6 +240,8 @@ class TcpClient(Endpoint):
 
     def _notice_end(self, connection: Connection) -> None:
         if not connection.alive:
+            if connection.refused and not self._notes:
+                self._notes.append(f"{self.url}: disconnected: the server {connection.refused}")
             self._hang_up()
             self._closed.append(self.target)
 
@@ -201,6 +260,10 @@ class TcpClient(Endpoint):
             self._socket.close()
         self._socket = self._connection = None
         self._call_again_s = perf_counter() + RECONNECT_AFTER_S
+
+
+def _named(address: Address) -> str:
+    return f"{address[0]}:{address[1]}"
 
 
 def _established(sock: socket.socket, address: Address) -> Connection | None:

@@ -191,17 +191,73 @@ def test_a_sleeping_server_is_woken_by_a_new_client(monkeypatch: pytest.MonkeyPa
             assert server.take_opened() == [one.getsockname(), two.getsockname()]
 
 
-def test_too_many_clients_are_turned_away(server: GroundLink, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def now_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Return the time of the links, to be changed."""
+    now = [100.0]
+    monkeypatch.setattr(tcp, "perf_counter", lambda: now[0])
+    return now
+
+
+def enter(server: GroundLink, now_s: list[float], *, speaks: bool) -> socket.socket:
+    client = caller(server)
+    now_s[0] += tcp.ACCEPT_EVERY_S
+    if speaks:
+        client.sendall(HEARTBEAT)
+    awaited(lambda: server.receive_now() if speaks else server.receive_now() or True)
+    return client
+
+
+@pytest.mark.parametrize(("silent", "waits_s", "leaves"), [
+    ((0,), 0.0, 0),  # who never spoke goes first
+    ((0, 1), 0.0, 0),
+    ((), tcp.IDLE_AFTER_S, 0),  # then who has been silent for longest
+    ((), 0.0, 2),  # among active ones there is no room
+])  # fmt: skip
+def test_idle_clients_give_way(
+    server: GroundLink,
+    now_s: list[float],
+    monkeypatch: pytest.MonkeyPatch,
+    silent: tuple[int, ...],
+    waits_s: float,
+    leaves: int,
+) -> None:
     monkeypatch.setattr(tcp, "CONNECTIONS", 2)
-    with caller(server) as one, caller(server) as two, caller(server) as three:
-        sleep(0.05)
-        server.receive_now()
-        server.receive_now()
-        assert three.recv(10) == b""
-        for client in (one, two):
-            client.sendall(HEARTBEAT)
-        heard = awaited(server.receive_now) + server.receive_now()
-        assert [frame for frame, _ in heard] == [HEARTBEAT] * 2
+    clients = [enter(server, now_s, speaks=number not in silent) for number in range(2)]
+    now_s[0] += waits_s
+    clients.append(enter(server, now_s, speaks=False))
+    assert clients[leaves].recv(10) == b""
+    (note,) = server.take_notes()
+    assert ("turned away" if leaves == 2 else "another client waits") in note
+    for client in clients:
+        client.close()
+
+
+@pytest.mark.parametrize(("first", "why"), [
+    ([b"POST / HTTP/1.1\r\nHost: 127.0.0.1:5760\r\nContent-Length: 21\r\n\r\n"], "speaks HTTP"),
+    ([b"PO", b"ST", b" / HTTP/1.1\r\n", b"\r\n"], "speaks HTTP"),
+    ([b"FLY /" + b"x" * 90, b"x HTTP/1.1\r\n\r\n"], "speaks HTTP"),
+    ([b"\r\nget /\r\n"], "speaks HTTP"),
+    ([b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"], "speaks HTTP"),
+    ([b"\x16\x03\x01\x02\x00\x01\x00"], "speaks TLS"),
+    ([b"x" * 4096], "speaks no MAVLink"),
+])  # fmt: skip
+def test_web_pages_are_disconnected(server: GroundLink, first: list[bytes], why: str) -> None:
+    with caller(server) as page, caller(server) as station:
+        for part in first[:-1]:
+            page.sendall(part)
+            awaited(lambda: server.receive_now() or True)
+        page.sendall(first[-1] + HEARTBEAT)
+
+        def closed() -> list[Address]:
+            assert server.receive_now() == []
+            return server.take_closed()
+
+        assert awaited(closed) == [page.getsockname()]
+        (note,) = server.take_notes()
+        assert why in note
+        station.sendall(HEARTBEAT)
+        assert awaited(server.receive_now) == [(HEARTBEAT, station.getsockname())]
 
 
 def test_a_port_is_free_again_at_once(server: GroundLink) -> None:
