@@ -21,7 +21,7 @@ SUSPECTED_S = 0.1
 
 _CLEAR_M = 0.3
 
-_HARD_M_S, _HARD_UP = 3.0, 0.5
+HARD_M_S, HARD_UP = 3.0, 0.5
 """Speed, and cosine of the tilt, beyond which a contact is an impact."""
 HARD_WITHIN_US = 4_000_000
 """A landing is detected at most so long after its contact."""
@@ -83,7 +83,7 @@ class Hardest(NamedTuple):
         vx, vy, vz = state.velocity_enu_m_s
         _, x, y, _ = state.attitude
         squared, up = vx * vx + vy * vy + vz * vz, 1.0 - 2.0 * (x * x + y * y)
-        if squared <= _HARD_M_S * _HARD_M_S and up >= _HARD_UP:
+        if squared <= HARD_M_S * HARD_M_S and up >= HARD_UP:
             return self
         old = Hardest() if now_us - self.time_us > HARD_WITHIN_US else self
         return Hardest(now_us, max(sqrt(squared), old.speed_m_s), min(up, old.up))
@@ -93,9 +93,7 @@ class Hardest(NamedTuple):
         if now_us - self.time_us > HARD_WITHIN_US:
             return ""
         tilt_deg = degrees(acos(max(self.up, -1.0)))
-        return f"impact at {self.speed_m_s:.1f} m/s" + (
-            f", tilted {tilt_deg:.0f} degrees" if self.up < _HARD_UP else ""
-        )
+        return f"impact at {self.speed_m_s:.1f} m/s" + (f", tilted {tilt_deg:.0f} degrees" if self.up < HARD_UP else "")
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:

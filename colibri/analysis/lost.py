@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.series.flight_series import FlightSeries
+from colibri.autopilot.guidance.landing_detector import HARD_M_S, HARD_UP
 from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import Vehicle
 
@@ -52,6 +53,18 @@ def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
 def ground_contact_s(vehicle: Vehicle, flight: FlightSeries) -> float | None:
     """Return the time on the ground after the first lift-off."""
     return None if vehicle.ground is None else _lasted_s(_touches_again(flight), flight)
+
+
+def impact(flight: FlightSeries) -> str | None:
+    """Describe the hardest contact with the ground after the first lift-off, if it is no landing."""
+    down = _touches_again(flight)
+    speeds = {at: speed for at, speed in flight.contact_speed_m_s.items() if down[at + 1]}
+    hard = [at for at, speed in speeds.items() if speed > HARD_M_S or flight.upright[at] < HARD_UP]
+    if not hard:
+        return None
+    at = max(hard, key=lambda each: speeds[each])
+    tilt_deg = np.degrees(np.arccos(np.clip(flight.upright[at], -1.0, 1.0)))
+    return f"at {speeds[at]:.1f} m/s, tilted {tilt_deg:.0f}°, at t = {flight.t[at]:.2f} s"
 
 
 def _touches_again(flight: FlightSeries) -> NDArray[np.bool_]:

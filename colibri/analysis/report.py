@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.estimation import FIGURES, read_estimation, rms
-from colibri.analysis.lost import Lost, ground_contact_s
+from colibri.analysis.lost import Lost, ground_contact_s, impact
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
@@ -54,6 +54,7 @@ def report(
         "lost": None if lost is None else lost.why,
         "lost_at_s": None if lost is None else lost.at_s,
         "ground_contact_s": ground_contact_s(plan.plant_vehicle, flight),
+        "impact": impact(flight),
         "wall_time_s": wall_time_s,
         "real_time_factor": sim_time_s / wall_time_s if wall_time_s else None,
         "rmse_m": rms(error),
@@ -111,6 +112,7 @@ def report_rows(figures: Report) -> dict[str, str]:
     settled = figures["rmse_after_20s_m"]
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
     lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
+    lost |= {} if figures["impact"] is None else {"impact": figures["impact"]}
     return lost | {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),

@@ -47,6 +47,12 @@ class Flight:
         lost: str | None = self.report["lost"]
         return lost
 
+    @property
+    def impact(self) -> str | None:
+        """The hardest contact with the ground beyond 3 m/s or 60°, or `None`."""
+        impact: str | None = self.report["impact"]
+        return impact
+
     @cached_property
     def samples(self) -> Table:
         """`flight.csv`, one row per control sample: state, inputs, references; m, s, rad, N."""

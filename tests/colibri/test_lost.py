@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.limits import KEYS, Limit, exceeded
-from colibri.analysis.lost import Lost, ground_contact_s, lost
+from colibri.analysis.lost import Lost, ground_contact_s, impact, lost
 from colibri.analysis.recording import COLUMNS, Samples
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.flights.plan import FlightPlan
@@ -57,6 +57,18 @@ def test_one_that_comes_down_is_lost_when_it_does(plan: FlightPlan) -> None:
     assert found.at_s == pytest.approx(15.0, abs=0.02)
     assert found.why == "on the ground, 2.0 m off its track, tilted 0°; later up to 2.0 m off"
     assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(15.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("columns", "found"),
+    [
+        ({"w": -2.9}, None),
+        ({"w": -12.5}, "at 12.5 m/s, tilted 0°, at t = 5.00 s"),
+        ({"phi": 2.0}, "at 0.0 m/s, tilted 115°, at t = 5.00 s"),
+    ],
+)
+def test_a_hard_contact_is_an_impact(columns: dict[str, float], found: str | None) -> None:
+    assert impact(flown(z=lambda t: np.where(t > 5.0, -0.5, 2.0), **columns)) == found
 
 
 def test_a_short_touch_of_the_ground_is_no_loss(plan: FlightPlan) -> None:

@@ -20,6 +20,7 @@ class FlightSeries:
     Attributes:
         moment_n_m: Norm of U2, U3 and U4, (n,).
         upright: Cosine of the tilt, (n,).
+        contact_speed_m_s: Speed at each sample before a contact with the ground.
         touches, aloft: Masks of samples on the ground, and with the reference above it, (n,).
     """
 
@@ -32,6 +33,8 @@ class FlightSeries:
         self.qp_status, self.fallback = np.empty((2, samples - 1), dtype=np.int8)
         self.constrained = Active(*np.zeros(len(Active._fields), dtype=np.int64).tolist())
         self.max_slack = -np.inf
+        self.contact_speed_m_s: dict[int, float] = {}
+        self._last_speed = np.nan
         self.path_lag_s: float | None = None
         self.trajectory_sha256 = ""
         self._vehicle = vehicle
@@ -45,6 +48,11 @@ class FlightSeries:
         self.moment_n_m[at] = np.linalg.norm(part.columns(INPUT[1:]), axis=1)
         self.upright[at] = up[:, 2]
         self.touches[at] = _touches(self._vehicle, part["z"], up)
+        speeds = np.append(self._last_speed, np.linalg.norm(part.columns(("u", "v", "w")), axis=1))
+        touches = self.touches[max(at.start - 1, 0) : at.stop]
+        for index in at.stop - len(touches) + np.flatnonzero(touches[1:] & ~touches[:-1]):
+            self.contact_speed_m_s[int(index)] = float(speeds[index - at.start + 1])
+        self._last_speed = speeds[-1]
         self.aloft[at] = part["z_ref"] > _ABOVE_GROUND_M
         self._samples = at.stop
         at = slice(self._decisions, self._decisions + len(part.slack))
