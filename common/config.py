@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 import msgspec
 
 from colibri.common.errors import Error, unknown
+from colibri.common.files import read_bytes
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -39,7 +40,7 @@ def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     """Read a strict structure; raise `error`, with file and key, if a key is missing, unknown or invalid."""
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=kind)
+        return msgspec.toml.decode(read_bytes(path), type=kind)
     except OSError as reason:
         raise error(f"{path}: {reason.strerror}") from reason
     except msgspec.ValidationError as reason:

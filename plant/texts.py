@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from colibri.common.errors import unknown
+from colibri.common.files import read_text
 from colibri.common.process.arguments import number
 from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
@@ -50,7 +51,7 @@ def gust(text: str) -> Gust:
 
 def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
     try:
-        lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
+        lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
         raise ArgumentTypeError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:

@@ -6,6 +6,7 @@ from pathlib import Path
 import msgspec
 
 from colibri.autopilot.core.defence.errors import ErrorRecord
+from colibri.common.files import regular
 from colibri.common.process.status import Status
 
 FILE = "errors.jsonl"
@@ -33,7 +34,7 @@ class ErrorLog:
     def _kept(self, record: ErrorRecord) -> bool:
         if self._path is not None:
             try:
-                with self._path.open("ab") as file:
+                with open(self._path, "ab", opener=regular) as file:
                     file.write(msgspec.json.encode(record) + b"\n")
                 return True
             except OSError:

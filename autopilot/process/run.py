@@ -14,7 +14,7 @@ from colibri.autopilot.process.recorded_inputs import setup_of
 from colibri.autopilot.spec import TRACK, AutopilotSpec
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
@@ -54,7 +54,7 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
             log.close()
     if ground and ground.errors.failed:
         return EXIT_FAILED
-    return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
+    return stop.code
 
 
 def _end(spec: AutopilotSpec, frame_interval_us: int) -> AutopilotEnd:

@@ -8,6 +8,7 @@ from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.errors import unknown
+from colibri.common.files import read_bytes, read_text, write_bytes
 from colibri.common.process.folder_lock import FolderLock
 from colibri.common.process.slot_file import Slots
 from colibri.common.serialization import of_bytes, to_bytes
@@ -89,7 +90,7 @@ class StateFolder:
             return self._initial()
         path = self.parameter_path()
         try:
-            text = path.read_text()
+            text = read_text(path)
         except FileNotFoundError:
             return self._initial()
         except (OSError, UnicodeDecodeError) as error:
@@ -134,7 +135,7 @@ class StateFolder:
     def _read_plans(self) -> dict[int, list[MissionItem]]:
         assert self._path is not None, "called only where something is kept"
         try:
-            content = (self._path / PLANS).read_bytes()
+            content = read_bytes(self._path / PLANS)
         except OSError:
             return {}
         return of_bytes(dict[int, list[MissionItem]], content) or {}
@@ -143,7 +144,7 @@ class StateFolder:
         if path is None and self._path and (self._path / KEY).exists():
             path = self._path / KEY
         try:
-            return None if path is None else parse_key(path.read_bytes())
+            return None if path is None else parse_key(read_bytes(path))
         except OSError as error:
             raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
         except SigningError as error:
@@ -155,7 +156,7 @@ class StateFolder:
             return 0
         path = self._path / TIMESTAMP
         try:
-            return int(path.read_text())
+            return int(read_text(path))
         except (FileNotFoundError, NotADirectoryError):
             return 0
         except OSError as error:
@@ -169,7 +170,7 @@ def _replace(path: Path, content: bytes) -> None:
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        new.write_bytes(content)
+        write_bytes(new, content)
         new.replace(path)
     except OSError:
         return

@@ -14,6 +14,7 @@ import numpy as np
 
 from colibri.analysis.logs import csv_rows
 from colibri.common.errors import Error
+from colibri.common.files import regular
 from colibri.mavlink.ulog.flight_topics import FILTER, FLIGHT_TOPICS
 from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
 
@@ -42,7 +43,7 @@ def read_log(log: Path) -> "ULog":
     with _needed("pyulog", "export"):
         from pyulog import ULog
     try:
-        with log.open("rb") as file:
+        with open(log, "rb", opener=regular) as file:
             return ULog(file)
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error

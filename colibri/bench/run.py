@@ -22,6 +22,7 @@ from colibri.bench.serving import CHANNELS, serving_figures
 from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
 from colibri.bench.speed import CONTROL_S, LINKS, Peer, Report, rate_figures
 from colibri.bench.stages import BLOCKS, stage_figures
+from colibri.common.files import regular
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
@@ -156,7 +157,7 @@ def _number(value: float) -> str:
 def _write(path: Path, text: str = "") -> None:
     """Write a text; without one only check for permission, rather than after minutes of measurement."""
     try:
-        with path.open("w" if text else "a", encoding="utf-8") as file:
+        with open(path, "w" if text else "a", encoding="utf-8", opener=regular) as file:
             file.write(text)
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")

@@ -15,6 +15,7 @@ from colibri.autopilot.control.registry import controller_names, origin_of, orig
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flights import Common, Flown
 from colibri.campaigns.values import CampaignError, shown
+from colibri.common.files import read_bytes, regular
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
@@ -25,7 +26,7 @@ class Journal:
     def __init__(self, folder: Path, kept: dict[int, Flown], file: str = JOURNAL) -> None:
         self.kept = kept
         self._folder = folder
-        self._file: IO[bytes] = (folder / file).open("ab")
+        self._file: IO[bytes] = open(folder / file, "ab", opener=regular)  # noqa: SIM115
 
     def add(self, flown: Flown) -> None:
         """Write a flight's logs, then its line, and flush it to disk."""
@@ -69,7 +70,7 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
                 os.fsync(file.fileno())
             scratch.replace(path)
             return False
-        was, wanted = (msgspec.json.decode(content) for content in (path.read_bytes(), now))
+        was, wanted = (msgspec.json.decode(content) for content in (read_bytes(path), now))
     except (OSError, msgspec.DecodeError) as error:
         raise CampaignError(f"cannot use --out {folder}: {error}") from error
     if was != wanted:
@@ -132,7 +133,7 @@ def read_journal(path: Path) -> list[Flown]:
     """Read the flights of a journal, and cut off an incomplete last line in the file."""
     if not path.exists():
         return []
-    with path.open("r+b") as file:
+    with open(path, "r+b", opener=regular) as file:
         content = file.read()
         whole = content.rfind(b"\n") + 1
         file.truncate(whole)

@@ -1,7 +1,6 @@
 """`colibri`: the command. Loads only modules of the subcommand."""
 
 import os
-import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -13,14 +12,16 @@ from colibri.cli.shared.parser import parser_for, subcommand
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import (
     EXIT_FAILED,
-    EXIT_INTERRUPTED,
     end_quickly,
-    escape_what_no_stream_encodes,
     fail,
+    fail_interrupted,
+    handle_endings,
+    interrupt,
     loading,
     use_one_thread,
     use_safe_path,
 )
+from colibri.common.process.output import use_streams
 from colibri.common.process.writable_folders import use_writable_folders
 
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
@@ -28,7 +29,7 @@ _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 
 def main(argv: list[str] | None = None) -> int:
     given = sys.argv[1:] if argv is None else argv
-    escape_what_no_stream_encodes()
+    use_streams()
     _check_encoding(given)
     if given and given[0] in PROCESSES:
         process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
@@ -37,7 +38,7 @@ def main(argv: list[str] | None = None) -> int:
     use_safe_path()
     end_quickly()
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
+        handle_endings(interrupt)  # so that what was started is ended, too
     try:
         with loading():
             args, unknown = parser_for(given).parse_known_args(given)
@@ -57,8 +58,8 @@ def main(argv: list[str] | None = None) -> int:
             raise
         _drop_what_cannot_be_printed()
         fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", EXIT_FAILED)
-    except KeyboardInterrupt:
-        fail("interrupted", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended)
 
 
 def _drop_what_cannot_be_printed() -> None:

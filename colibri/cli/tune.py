@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from colibri.cli.shared.options import add_engine, add_out
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_INTERRUPTED, fail, loading
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted, loading
 
 if TYPE_CHECKING:
     from colibri.tuning.results import TuningResults
@@ -59,8 +59,8 @@ def run(args: Namespace) -> int:
                 watcher=watcher,
                 **given,
             )
-    except KeyboardInterrupt:
-        fail(f"interrupted; what was tried is in {args.out}: go on with --resume", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended, f"; what was tried is in {args.out}: go on with --resume")
     except Error as error:
         fail(str(error), EXIT_BAD_INPUT)
     if not args.quiet:

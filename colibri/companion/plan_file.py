@@ -13,6 +13,7 @@ import numpy as np
 
 from colibri.autopilot.guidance.trajectories.waypoint_file import DEFAULT_SPEED_M_S, MIN_LEG_S, Waypoints, leg_times
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
+from colibri.common.files import read_text
 from colibri.common.types import Vector
 from colibri.companion.errors import CompanionError
 from colibri.companion.home import Home
@@ -64,7 +65,7 @@ class MissionPlan(NamedTuple):
 def read_plan(path: Path) -> MissionPlan:
     """Read a mission, or raise `CompanionError` for an item that a track cannot fly."""
     try:
-        plan = json.loads(path.read_text(encoding="utf-8-sig"))
+        plan = json.loads(read_text(path, "utf-8-sig"))
         mission = plan["mission"]
         items, planned = mission["items"], Geodetic(*map(float, mission["plannedHomePosition"]))
         speed_m_s = float(mission.get("hoverSpeed", DEFAULT_SPEED_M_S))

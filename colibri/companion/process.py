@@ -12,6 +12,7 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track, track_through
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
+from colibri.common.files import read_bytes, regular
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
 from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
@@ -123,7 +124,7 @@ def fly(args: Namespace) -> int:
     with occupied(args.out):
         summary = FlightSummary()
         try:
-            with (args.out / LOG).open("w", newline="", encoding="utf-8") as file, gc_frozen():
+            with open(args.out / LOG, "w", newline="", encoding="utf-8", opener=regular) as file, gc_frozen():
                 serve(companion, wire, status, stop, _Log(file, summary))
         except Error as error:
             fail(str(error), EXIT_FAILED)
@@ -218,7 +219,7 @@ def _signing(path: Path | None) -> Signing | None:
     if path is None:
         return None
     try:
-        return Signing(parse_key(path.read_bytes()), tick_at(time()))
+        return Signing(parse_key(read_bytes(path)), tick_at(time()))
     except (OSError, SigningError) as error:
         raise CompanionError(f"--signing-key {path}: {error}") from error
 

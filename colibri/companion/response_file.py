@@ -6,6 +6,7 @@ from typing import Annotated, TypeAlias
 import msgspec
 
 from colibri.common.config import NotNegative, Positive, Table
+from colibri.common.files import read_text
 from colibri.companion.errors import CompanionError
 from colibri.companion.stacks.stack import Response
 
@@ -30,7 +31,7 @@ class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 def read_response(path: Path) -> tuple[Response, float]:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         found = msgspec.toml.decode(text, type=ResponseFile)
     except (OSError, UnicodeDecodeError) as error:
         raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error

@@ -4,8 +4,7 @@ A child is forked if this process may be: loading takes longer than most flights
 and reads its specification as JSON from standard input.
 
 Each has its own process group, so that Ctrl-C reaches only this process, which ends its children in order: SIGTERM,
-then
-SIGKILL after the grace period. Each also ends if this process dies.
+then SIGKILL after the grace period. Each also ends if this process dies.
 """
 
 import json
@@ -21,6 +20,8 @@ from select import select
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from colibri.autopilot.spec import AutopilotSpec
+from colibri.common.process.lifecycle import end_with, handle_endings
+from colibri.common.process.output import finish_outputs
 from colibri.common.process.spec import Starter
 from colibri.common.spec import to_json
 from colibri.plant.spec import PlantSpec
@@ -73,9 +74,17 @@ class Child:
         *lines, self._rest = (self._rest + os.read(self.stdout.fileno(), 65536)).split(b"\n")
         return [json.loads(line) for line in lines]
 
+    def is_stopped(self) -> bool:
+        """Whether SIGSTOP or a debugger holds the process."""
+        with suppress(ChildProcessError):
+            return os.waitid(os.P_PID, self.number, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+        return False
+
     def terminate(self) -> None:
+        """Send SIGTERM, and SIGCONT, without which a stopped process would not receive it."""
         if self.code() is None:
             os.kill(self.number, signal.SIGTERM)
+            os.kill(self.number, signal.SIGCONT)
 
     def wait(self, timeout_s: float | None = None) -> int | None:
         if isinstance(self._process, BaseProcess):
@@ -120,8 +129,8 @@ def _started(spec: ProcessSpec, stdout: int, stderr: int) -> "subprocess.Popen[b
 
 
 def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_DFL)
+    handle_endings(signal.SIG_DFL)
+    end_with(parent)
     os.setpgid(0, 0)
     _use_safe_path()
     for to, of in ((0, os.open(os.devnull, os.O_RDONLY)), (1, stdout), (2, stderr)):
@@ -130,13 +139,16 @@ def _fly(spec: ProcessSpec, stdout: int, stderr: int, parent: int) -> NoReturn:
     with suppress(OSError):
         _NAME.write_text(name_of(spec))
     starter = Starter(as_json=True, parent=parent)
-    if isinstance(spec, PlantSpec):
-        from colibri.plant.__main__ import run_plant
+    try:
+        if isinstance(spec, PlantSpec):
+            from colibri.plant.__main__ import run_plant
 
-        sys.exit(run_plant(spec, starter))
-    from colibri.autopilot.__main__ import run_autopilot
+            sys.exit(run_plant(spec, starter))
+        from colibri.autopilot.__main__ import run_autopilot
 
-    sys.exit(run_autopilot(spec, starter))
+        sys.exit(run_autopilot(spec, starter))
+    finally:
+        finish_outputs()
 
 
 def _use_safe_path() -> None:
@@ -158,7 +170,9 @@ def events_of(children: Iterable[Child]) -> Iterator[tuple[Child, dict[str, Any]
 
 
 def how_it_ended(code: int) -> str:
-    return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+    if code < 0:
+        return f"was killed by {signal.Signals(-code).name}"
+    return f"was ended by {signal.Signals(code - 128).name}" if code > 128 else f"ended with exit code {code}"
 
 
 def end_children(children: Iterable[Child]) -> None:

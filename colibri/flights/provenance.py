@@ -13,6 +13,7 @@ from colibri.autopilot.control.registry import Origin, origin_of, origin_of_fact
 from colibri.autopilot.guidance.trajectories.loading import with_file
 from colibri.autopilot.spec import name_of
 from colibri.common.errors import Error
+from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import fail
 from colibri.common.spec import from_values, plain_values
 from colibri.flights.folder import PROVENANCE
@@ -103,7 +104,7 @@ def write_provenance(plan: FlightPlan) -> None:
 def read_provenance(folder: Path) -> Provenance:
     path = folder / PROVENANCE
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Provenance)
+        return msgspec.json.decode(read_bytes(path), type=Provenance)
     except FileNotFoundError as error:
         raise ProvenanceError(f"{path} is missing: {folder} is no folder of a flight of this version") from error
     except OSError as error:

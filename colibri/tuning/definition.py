@@ -13,6 +13,7 @@ from colibri.campaigns.factors import SCALED, factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
 from colibri.common.config import value_at
 from colibri.common.errors import Error
+from colibri.common.files import read_text
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
 from colibri.tuning.space import Range, TuningError, as_flown, as_optuna, check_holds, read_range
 
@@ -174,7 +175,7 @@ def _at_least(value: int, least: int, called: str) -> int:
 def _text(given: Any) -> str | None:
     if not isinstance(given, str):
         return None
-    return Path(given).read_text(encoding="utf-8") if given.endswith(".toml") else profile_text(given)
+    return read_text(Path(given)) if given.endswith(".toml") else profile_text(given)
 
 
 def _check_ends(tuning: Tuning) -> None:

@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from typing import Self
 
+from colibri.common.files import regular
+
 
 class FileLock:
     """An exclusive lock on a folder or a file, which is created if missing."""
@@ -15,7 +17,7 @@ class FileLock:
 
     def acquire(self, *, wait: bool = True) -> bool:
         how = os.O_RDONLY if self._path.is_dir() else os.O_RDWR | os.O_CREAT
-        opened = os.open(self._path, how | os.O_CLOEXEC, 0o666)
+        opened = os.open(self._path, how | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
         try:
             fcntl.flock(opened, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError:
@@ -52,7 +54,7 @@ class JournalLock(FileLock):
 
 
 def _cut_off(journal: Path) -> None:
-    with journal.open("r+b") as file:
+    with open(journal, "r+b", opener=regular) as file:
         end = file.seek(0, os.SEEK_END)
         if end:
             file.seek(end - 1)

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import msgspec
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.folder import make_folder
 from colibri.verification.cases import Case, SitlCase
 from colibri.verification.golden_flights import FLIGHTS
@@ -43,8 +43,8 @@ def verify_golden(args: argparse.Namespace) -> int:
     make_folder(args.out)
     try:
         outcomes = [fly_golden(flight, args.out / flight.name, args.link) for flight in flights]
-    except KeyboardInterrupt:
-        fail(f"interrupted; what was logged is in {args.out}", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended, f"; what was logged is in {args.out}")
     found = {outcome.name: outcome._asdict() for outcome in outcomes}
     (args.out / FOUND).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if args.renew:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.processes import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
@@ -61,8 +61,8 @@ def verify(args: argparse.Namespace) -> int:
         fail(str(error), error.code)
     except Error as error:
         fail(str(error), EXIT_FAILED)
-    except KeyboardInterrupt:
-        fail(f"interrupted; what was logged is in {args.out}", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended, f"; what was logged is in {args.out}")
     if not args.quiet:
         _print(verdicts, args)
     differing = [verdict.name for verdict in verdicts if not verdict.same]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from colibri.common.files import write_bytes
 from colibri.common.process.lifecycle import Stop
 from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
@@ -110,7 +111,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
         held.callback(page.close)
         html = page.recorded_html(np.linspace(first_s, last_s, count).tolist())
     try:
-        path.write_text(html, encoding="utf-8")
+        write_bytes(path, html.encode())
     except OSError as error:
         raise ViewError(f"cannot write --export {path}: {error.strerror}") from error
 

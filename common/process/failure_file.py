@@ -5,6 +5,7 @@ from pathlib import Path
 from traceback import format_exception
 
 from colibri.common.errors import Error, ForeignError
+from colibri.common.files import read_text, write_bytes
 
 FAILURE = "failure.txt"
 
@@ -16,7 +17,7 @@ def keep_failure(error: Error, folder: Path | None) -> str:
     path = folder / FAILURE
     line, text = failure_text(error, str(path))
     with suppress(OSError):  # a full disk, say, which then is the reason itself
-        path.write_text(text, encoding="utf-8")
+        write_bytes(path, text.encode())
     return line
 
 
@@ -29,6 +30,6 @@ def failure_text(error: Error, file: str) -> tuple[str, str]:
 
 def kept_failure(folder: Path) -> str | None:
     try:
-        return (folder / FAILURE).read_text(encoding="utf-8").partition("\n")[0] or None
+        return read_text(folder / FAILURE).partition("\n")[0] or None
     except (OSError, UnicodeDecodeError):
         return None

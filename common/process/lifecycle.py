@@ -5,15 +5,13 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import TextIOWrapper
 from types import FrameType
 from typing import NoReturn
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 
 
 def use_one_thread() -> None:
@@ -25,12 +23,6 @@ def use_one_thread() -> None:
 def use_safe_path() -> None:
     """Keep the working directory, with possible namesakes, off the module path of child processes."""
     os.environ["PYTHONSAFEPATH"] = "1"
-
-
-def escape_what_no_stream_encodes() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def nudge_m() -> float:
@@ -90,31 +82,84 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
 
 _PARENT_EVERY = 8
 """Checks between two looks at the parent; a process checks every frame, or ten times a second."""
+_LAST_S = 5
+"""A process whose parent has died is killed after this time, wherever it hangs."""
+_PR_SET_PDEATHSIG = 1
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def handle_endings(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
+    """Handle Ctrl-C, `kill` and a closed terminal, unless `nohup` has excluded the last."""
+    for number in _ENDING:
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def interrupt(number: int, _frame: FrameType | None = None) -> NoReturn:
+    """Raise KeyboardInterrupt for any signal that ends a process."""
+    raise KeyboardInterrupt(number)
+
+
+def fail_interrupted(interrupt: KeyboardInterrupt, kept: str = "") -> NoReturn:
+    """End with a line, and 128 plus the signal's number."""
+    number = interrupt.args[0] if interrupt.args else signal.SIGINT
+    how = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+    fail(how + kept, 128 + number)
+
+
+def end_with(parent: int) -> None:
+    """End this process with its parent. Call it before anything can block; `Stop` then ends it in order."""
+
+    def look(*_signal: object) -> None:
+        if os.getppid() != parent:
+            os._exit(128 + signal.SIGHUP)
+
+    signal.signal(signal.SIGALRM, look)
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGALRM)
+    else:
+        signal.setitimer(signal.ITIMER_REAL, 1.0, 1.0)
+    look()
 
 
 class Stop:
-    """True once the process should end: on SIGINT, SIGTERM, or the parent's death."""
+    """True once the process should end: on SIGINT, SIGTERM, SIGHUP, or the parent's death.
+
+    Attributes:
+        code: The exit code by then: 128 plus the signal's number.
+    """
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
         """Handle signals; with `starting` they end the process at once until the first check.
 
         The parent passes its own id: it may die before this process reads it.
         """
-        self._signalled = False
+        self.code = 0
         self._starting = starting
         self._parent = parent
         self._asked = 0
-        signal.signal(signal.SIGINT, self._handle)
-        signal.signal(signal.SIGTERM, self._handle)
+        handle_endings(self._handle)
+        if parent is not None:
+            signal.signal(signal.SIGALRM, self._look_at_parent)
+            self._look_at_parent()
 
     def __bool__(self) -> bool:
         self._starting = False
         self._asked += 1
-        if self._parent is not None and self._asked % _PARENT_EVERY == 1 and os.getppid() != self._parent:
-            self._signalled = True
-        return self._signalled
+        if self._asked % _PARENT_EVERY == 1:
+            self._look_at_parent()
+        return self.code != 0
 
-    def _handle(self, _signal: int, _frame: FrameType | None) -> None:
+    def _look_at_parent(self, *_signal: object) -> None:
+        if self._parent is not None and os.getppid() != self._parent:
+            self._parent = None
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.alarm(_LAST_S)
+            self._handle(signal.SIGHUP)
+
+    def _handle(self, number: int, _frame: FrameType | None = None) -> None:
+        self.code = self.code or 128 + number
         if self._starting:
-            os._exit(EXIT_INTERRUPTED)
-        self._signalled = True
+            os._exit(self.code)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from colibri.common.errors import InFlightError
+from colibri.common.files import regular
 from colibri.common.process.lifecycle import fail
 
 
@@ -36,7 +37,7 @@ class LogFile:
         self._path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open(how, buffering=0)
+            self._file = open(path, how, buffering=0, opener=regular)  # noqa: SIM115
         except OSError as error:
             fail(f"cannot write {path}: {error.strerror}")
 

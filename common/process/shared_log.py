@@ -4,6 +4,7 @@ import fcntl
 from contextlib import suppress
 from pathlib import Path
 
+from colibri.common.files import regular
 from colibri.common.process.log_files import LogError, LogFile
 
 
@@ -25,7 +26,7 @@ class SharedLog(LogFile):
 
 
 def remove_unused(path: Path) -> None:
-    with suppress(OSError), path.open("rb") as file:
+    with suppress(OSError), open(path, "rb", opener=regular) as file:
         if _is_alone(file.fileno()):
             path.unlink()
 

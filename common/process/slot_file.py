@@ -9,6 +9,8 @@ from pathlib import Path
 from struct import Struct
 from zlib import crc32
 
+from colibri.common.files import regular
+
 SLOT = 256 << 10
 _HEAD = Struct("<QII")
 """Number, from 1; length; checksum of both and of the content."""
@@ -23,7 +25,7 @@ class Slots:
     def __init__(self, path: Path) -> None:
         """Open or create the file. All of it is written: a page without disk space would later raise SIGBUS."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("r+b" if path.exists() else "w+b") as file:
+        with open(path, "r+b" if path.exists() else "w+b", opener=regular) as file:
             content = file.read()
             if len(content) != 2 * SLOT:
                 content = bytes(2 * SLOT)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, NamedTuple, TypeVar
 
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.lifecycle import end_with, fail
 from colibri.common.spec import Option, SpecError, from_json, from_namespace
 
 S = TypeVar("S")
@@ -48,6 +48,8 @@ def add_process_options(parser: ArgumentParser) -> None:
 def read_process(spec: type[S], args: Namespace) -> tuple[S, Starter]:
     """Read the command line, or with `--spec` JSON from standard input."""
     starter = Starter(args.json, args.parent)
+    if args.parent is not None:
+        end_with(args.parent)
     if not args.spec:
         return from_namespace(spec, args), starter
     try:

@@ -5,6 +5,10 @@ import os
 import sys
 from typing import Any, TextIO
 
+from colibri.common.process.output import Output, text_output
+
+_LEFT_OUT = '{{"event": "left_out", "text": "{0} lines were left out, as nobody read them", "lines": {0}}}\n'
+
 
 class Status:
     """Reports status as text on standard error, or JSON lines on standard output."""
@@ -14,9 +18,12 @@ class Status:
         self.as_json = as_json
         self._stream: TextIO | None = None
 
-    def take_standard_output(self) -> None:
-        """Reserve standard output for status; redirect other output to standard error."""
-        self._stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    def take_standard_output(self, *, patient: bool) -> None:
+        """Reserve standard output for status; redirect other output to standard error.
+
+        A `patient` process waits for its reader before it ends.
+        """
+        self._stream = text_output(Output(os.dup(1), left_out=_LEFT_OUT, patient=patient))
         os.dup2(2, 1)
 
     def say(self, event: str, text: str, **facts: Any) -> None:
@@ -40,7 +47,7 @@ def _print(stream: TextIO, line: str) -> None:
     try:
         stream.write(line + "\n")
         stream.flush()
-    except BrokenPipeError:
+    except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 

@@ -4,7 +4,8 @@ import gc
 from collections.abc import Callable
 from typing import TypeVar
 
-from colibri.common.process.lifecycle import Stop, end_quickly, escape_what_no_stream_encodes, fail, use_one_thread
+from colibri.common.process.lifecycle import Stop, end_quickly, fail, use_one_thread
+from colibri.common.process.output import use_streams
 from colibri.common.process.spec import Starter
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import LinkError
@@ -16,7 +17,7 @@ COMPILING = "compiling, once: half a minute and more"
 
 def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
     """Open the link at `url` and handle signals, or end with one line; call before numpy is loaded."""
-    escape_what_no_stream_encodes()
+    use_streams()
     use_one_thread()
     end_quickly()
     gc.disable()  # until all is loaded, see `gc_frozen`: what is loaded stays
@@ -27,7 +28,7 @@ def begin(name: str, url: str, starter: Starter, opened: Callable[[str], Link]) 
         fail(str(error))
     status = Status(name, as_json=starter.as_json)
     if starter.as_json:
-        status.take_standard_output()
+        status.take_standard_output(patient=starter.parent is not None)
     return link, status, stop
 
 

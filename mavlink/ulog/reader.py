@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colibri.common.files import regular
 from colibri.common.types import Array
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.ulog import messages
@@ -30,7 +31,7 @@ class FlightFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with path.open("rb") as file:
+        with open(path, "rb", opener=regular) as file:
             self._size = path.stat().st_size
             self._log = mmap(file.fileno(), self._size, access=ACCESS_READ) if self._size else b""
         self._runs: dict[int, list[tuple[int, int]]] = {topic.number: [] for topic in FLIGHT_TOPICS}

@@ -5,7 +5,7 @@ from time import perf_counter
 from typing import Any
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
+from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
 from colibri.mavlink.links.udp import UdpLink
@@ -37,7 +37,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     logs = PlantLogs(spec.out, vehicle) if spec.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=spec.duration)
-    return EXIT_INTERRUPTED if stop else 0
+    return stop.code
 
 
 REPEATED_AFTER_S = 0.5

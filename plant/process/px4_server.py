@@ -6,7 +6,7 @@ from typing import Any
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
+from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
@@ -39,7 +39,7 @@ def run(spec: PlantSpec, link: GroundLink, status: Status, stop: Stop) -> int:
         fail(str(error))
     with closing(link, simulator):
         simulator.serve()
-    return EXIT_INTERRUPTED if stop else 0
+    return stop.code
 
 
 class Simulator:

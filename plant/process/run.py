@@ -1,7 +1,7 @@
 """The plant from its command line to its exit code."""
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
+from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
@@ -41,4 +41,4 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
         if server.wait():
             plant = builder.build(end.feedback, end.frame_interval_us)
             server.fly(plant, duration_s=spec.duration, speed=spec.pace)
-    return EXIT_INTERRUPTED if stop else 0
+    return stop.code

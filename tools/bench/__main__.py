@@ -7,7 +7,7 @@ from colibri.bench.run import bench
 from colibri.bench.speed import Peer
 from colibri.cli.computer.bench import add_options
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_INTERRUPTED, fail, use_one_thread
+from colibri.common.process.lifecycle import fail_interrupted, use_one_thread
 from tools.bench import rotorpy_peer
 
 
@@ -21,8 +21,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"colibri: {rotorpy_peer.MISSING}\n")
     try:
         return bench(args, peer)
-    except KeyboardInterrupt:
-        fail("interrupted", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended)
 
 
 if __name__ == "__main__":

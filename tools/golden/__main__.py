@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from tools.golden.pythons import other_pythons, set_up
 from tools.golden.variations import ROOT, Flown, Variation, VariationError, fly, variations
 
@@ -18,8 +18,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.pythons:
             _set_up_pythons()
         return _fly_all(_chosen(args), args)
-    except KeyboardInterrupt:
-        fail("interrupted", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended)
 
 
 def table(flown: Mapping[str, Flown]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
+from colibri.common.files import read_text
 from colibri.common.types import Array
 
 MAX_DURATION_S = 3600.0
@@ -60,7 +61,7 @@ class CsvTable:
 def read_table(path: Path, required: Collection[str], optional: Collection[str], text: str | None = None) -> CsvTable:
     """Read a CSV file, or its `text`; TrackFileError if malformed."""
     try:
-        lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
+        lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
         raise TrackFileError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:

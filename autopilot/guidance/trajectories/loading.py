@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.trajectories.registry import TrackError, read_op
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, FileOptions, Track
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
+from colibri.common.files import read_text
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -68,7 +69,7 @@ def file_text(name: str) -> str | None:
     if path is None:
         return None
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        return read_text(Path(path), "utf-8-sig")
     except OSError as error:
         raise TrackError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -12,7 +12,7 @@ from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.campaigns.values import CampaignError, first_twice
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, fail, fail_interrupted
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec
 
@@ -32,8 +32,8 @@ def fly(args: Namespace) -> int:
         with closing(_Bar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
             results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
-    except KeyboardInterrupt:
-        fail(f"interrupted; what was flown is in {args.out}: go on with --resume", EXIT_INTERRUPTED)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended, f"; what was flown is in {args.out}: go on with --resume")
     except Error as error:
         fail(str(error), EXIT_BAD_INPUT)
     if not args.quiet:

@@ -6,6 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.errors import Error
+from colibri.common.files import write_bytes
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail
 
@@ -39,7 +40,7 @@ def run(args: Namespace) -> int:
         return 0
     try:
         args.out.parent.mkdir(parents=True, exist_ok=True)
-        args.out.write_text(text, encoding="utf-8")
+        write_bytes(args.out, text.encode())
     except OSError as error:
         fail(f"cannot write {args.out}: {error.strerror}")
     return 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from colibri.analysis.limits import exceeded
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.common.spec import from_namespace
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import occupied, prepare
@@ -47,9 +47,9 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
         fail(f"{error}; what was logged is in {plan.out}", error.code)
     except Error as error:
         fail(keep_failure(error, plan.out))
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as ended:
         _keep_what_there_is(plan)
-        fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
+        fail_interrupted(ended, f"; what was logged is in {plan.out}")
     found = _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
     if found["lost"] is not None:
         fail(f"lost at t = {found['lost_at_s']:.2f} s: {found['lost']}; the logs are in {plan.out}", EXIT_FAILED)

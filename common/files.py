@@ -1,0 +1,42 @@
+"""Files opened without waiting: a FIFO, a device or a socket in a file's place is an error."""
+
+import os
+import stat
+from errno import EINVAL, EISDIR, ENXIO
+from pathlib import Path
+
+_NOT_REGULAR = "is a FIFO, device or socket: a regular file is required"
+
+
+def regular(path: str, flags: int) -> int:
+    """Open a regular file, as `opener` of `open`; OSError for anything else."""
+    try:
+        file = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno != ENXIO:  # a FIFO without a reader
+            raise
+        raise OSError(EINVAL, _NOT_REGULAR, path) from None
+    kind = os.fstat(file).st_mode
+    if not stat.S_ISREG(kind):
+        os.close(file)
+        raise (
+            IsADirectoryError(EISDIR, os.strerror(EISDIR), path)
+            if stat.S_ISDIR(kind)
+            else OSError(EINVAL, _NOT_REGULAR, path)
+        )
+    return file
+
+
+def read_bytes(path: Path) -> bytes:
+    with open(path, "rb", opener=regular) as file:
+        return file.read()
+
+
+def read_text(path: Path, encoding: str = "utf-8") -> str:
+    with open(path, encoding=encoding, opener=regular) as file:
+        return file.read()
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    with open(path, "wb", opener=regular) as file:
+        file.write(content)
