@@ -221,7 +221,7 @@ def _signing(path: Path | None) -> Signing | None:
     try:
         return Signing(parse_key(read_bytes(path)), tick_at(time()))
     except (OSError, SigningError) as error:
-        raise CompanionError(f"--signing-key {path}: {error}") from error
+        raise CompanionError(f"--signing-key {path}: {getattr(error, 'strerror', error)}") from error
 
 
 def _identify(companion: Companion, status: Status, out: Path) -> None:

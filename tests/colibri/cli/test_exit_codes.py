@@ -1,0 +1,103 @@
+"""The table of exit codes in docs/cli.md, over real processes."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic
+
+import psutil
+import pytest
+
+from tests.colibri.cli.test_processes import fly_slowly, has_flown
+from tools.harness.ports import bound_socket
+from tools.harness.processes import THESIS_PLANT, wait_for
+
+COLIBRI = (sys.executable, "-m", "colibri")
+KEPT = "; what was logged is in {}"
+
+
+@pytest.mark.parametrize(
+    ("whom", "number", "code", "line"),
+    [
+        ("colibri", signal.SIGINT, 130, "interrupted"),
+        ("colibri", signal.SIGTERM, 143, "ended by SIGTERM"),
+        ("colibri", signal.SIGHUP, 129, "ended by SIGHUP"),
+        ("plant", signal.SIGTERM, 1, "the plant was ended by SIGTERM"),
+        ("autopilot", signal.SIGHUP, 1, "the autopilot was ended by SIGHUP"),
+    ],
+)
+def test_a_signal_ends_the_flight_with_a_line(
+    tmp_path: Path, whom: str, number: signal.Signals, code: int, line: str
+) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    processes = {each.name(): each for each in psutil.Process(flight.pid).children()}
+    processes.get(whom, flight).send_signal(number)
+    _, said = flight.communicate(timeout=60.0)
+    assert (flight.returncode, said) == (code, f"colibri: error: {line}{KEPT.format(tmp_path)}\n")
+    assert (tmp_path / "flight.csv").exists()
+    assert not any(each.is_running() for each in processes.values())
+
+
+@pytest.mark.parametrize("name", ["plant", "autopilot"])
+def test_a_stopped_process_holds_up_neither_signal_nor_end(tmp_path: Path, name: str) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    (held,) = (each for each in psutil.Process(flight.pid).children() if each.name() == name)
+    held.suspend()
+    wait_for(lambda: held.status() == psutil.STATUS_STOPPED, "the process to stop")
+    flight.kill() if name == "plant" else flight.terminate()
+    began_s = monotonic()
+    wait_for(lambda: not held.is_running() or held.status() == psutil.STATUS_ZOMBIE, "the stopped process to end")
+    assert monotonic() < began_s + 4.0
+    assert (flight.wait(), flight.communicate()[1].count("\n")) == ((-9, 0) if name == "plant" else (143, 1))
+
+
+def full_pipe() -> tuple[int, int]:
+    read, write = os.pipe()
+    fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, 4096)
+    os.write(write, bytes(4096))
+    return read, write
+
+
+def test_an_unread_pipe_does_not_hold_up_a_flight(tmp_path: Path) -> None:
+    free, called = bound_socket()
+    free.close()
+    read, write = full_pipe()
+    options = (
+        "--link",
+        called.replace("udpout", "udpin"),
+        "--duration",
+        "2",
+        "--json",
+        "--out",
+        str(tmp_path),
+        *THESIS_PLANT,
+    )
+    plant = subprocess.Popen([*COLIBRI, "plant", *options], stdout=write, stderr=write)
+    autopilot = subprocess.Popen([*COLIBRI, "autopilot", "--plant", called, "--profile", "thesis"], stderr=write)
+    assert plant.wait(60.0) == 0
+    autopilot.terminate()
+    assert autopilot.wait(10.0) == 143
+    os.close(read)
+    os.close(write)
+
+
+def test_a_fifo_in_a_files_place_is_bad_input(tmp_path: Path) -> None:
+    fifo, profile = tmp_path / "fifo", tmp_path / "fifo.toml"
+    os.mkfifo(fifo)
+    os.mkfifo(profile)
+    calls = ("--gcs", "udpout:127.0.0.1:9")
+    for options in (
+        ("fly", "hover", *calls, "--signing-key", str(fifo)),
+        ("fly", "hover", "--profile", str(profile)),
+        ("fly", f"waypoints:{fifo}"),
+        ("autopilot", *calls, "--signing-key", str(fifo)),
+        ("vehicle", "hummingbird", "--for", "px4", "--out", str(fifo)),
+    ):
+        done = subprocess.run([*COLIBRI, *options], capture_output=True, text=True, cwd=tmp_path, check=False)
+        assert done.returncode == 2, options
+        assert done.stderr.endswith("is a FIFO, device or socket: a regular file is required\n")
