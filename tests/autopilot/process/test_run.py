@@ -19,7 +19,8 @@ PARAMETERS = "whole-lpv-mpc-asctec-hummingbird.params"
 
 class AtOnce(Stop):
     def __init__(self) -> None:
-        """Do nothing."""
+        """Handle no signals."""
+        self.code = 130
 
     def __bool__(self) -> bool:
         """Return that it is time."""

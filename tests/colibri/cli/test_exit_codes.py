@@ -11,7 +11,7 @@ from time import monotonic
 import psutil
 import pytest
 
-from tests.colibri.cli.test_processes import fly_slowly, has_flown
+from tests.colibri.cli.test_processes import flying
 from tools.harness.ports import bound_socket
 from tools.harness.processes import THESIS_PLANT, wait_for
 
@@ -32,21 +32,19 @@ KEPT = "; what was logged is in {}"
 def test_a_signal_ends_the_flight_with_a_line(
     tmp_path: Path, whom: str, number: signal.Signals, code: int, line: str
 ) -> None:
-    flight = fly_slowly(tmp_path)
-    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
-    processes = {each.name(): each for each in psutil.Process(flight.pid).children()}
+    flight, children = flying(tmp_path)
+    processes = {each.name(): each for each in children}
     processes.get(whom, flight).send_signal(number)
     _, said = flight.communicate(timeout=60.0)
     assert (flight.returncode, said) == (code, f"colibri: error: {line}{KEPT.format(tmp_path)}\n")
     assert (tmp_path / "flight.csv").exists()
-    assert not any(each.is_running() for each in processes.values())
+    assert not any(each.is_running() for each in children)
 
 
 @pytest.mark.parametrize("name", ["plant", "autopilot"])
 def test_a_stopped_process_holds_up_neither_signal_nor_end(tmp_path: Path, name: str) -> None:
-    flight = fly_slowly(tmp_path)
-    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
-    (held,) = (each for each in psutil.Process(flight.pid).children() if each.name() == name)
+    flight, children = flying(tmp_path)
+    (held,) = (each for each in children if each.name() == name)
     held.suspend()
     wait_for(lambda: held.status() == psutil.STATUS_STOPPED, "the process to stop")
     flight.kill() if name == "plant" else flight.terminate()

@@ -67,9 +67,9 @@ def test_it_is_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
         wait_for(tmp_path, '"pruned"', 1)
         first.terminate()
         _, said = first.communicate(timeout=PATIENCE_S)
-    assert first.returncode == 130
+    assert first.returncode == 143
     out = tmp_path / "out"
-    assert said == f"colibri: error: interrupted; what was tried is in {out}: go on with --resume\n"
+    assert said == f"colibri: error: ended by SIGTERM; what was tried is in {out}: go on with --resume\n"
 
 
 @pytest.mark.long

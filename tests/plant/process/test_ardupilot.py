@@ -180,7 +180,7 @@ def test_the_process_answers_and_keeps_its_log(plant: Process, tmp_path: Path) -
             assert received[0] == answered(end, sent)
             told = read(received[0])
     plant.process.terminate()
-    assert plant.wait() == 130
+    assert plant.wait() == 143
     ended = plant.events("ended")[0]
     assert ended["steps"] == 300
     times_s = topic_rows(tmp_path / "out")["t"]

@@ -213,7 +213,7 @@ def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
             assert len(px4.fixes) == pytest.approx(15 * 20, abs=10)
         assert process.events("gone")[1]["text"].endswith(f"; waiting for PX4 on {url.replace('tcp', 'tcpin')}")
         process.process.terminate()
-        assert process.wait() == 130
+        assert process.wait() == 143
     for name in ("flight-1.ulg", "flight.ulg"):  # a flight has a file of its own
         flown_s = topic_rows(tmp_path / "out" / name)["t"]
         assert (flown_s[0], flown_s[-1]) == (0.004, pytest.approx(15.0, abs=0.1))
