@@ -116,7 +116,7 @@ class SnapshotBuilder:
             load=min(duration_s / dt, 1.0),
             sensed=state_source.sensed,
             fix=state_source.fix,
-            latest=dict(state_source.latest),
+            latest=dict(state_source.latest) if state_source.latest else {},
             estimator=None if state_source.estimate is None else estimator_state(state_source.estimate),
         )
 
@@ -184,5 +184,4 @@ def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors
 
 
 def first(column: Array) -> Vector:
-    x, y, z = column[0].tolist()
-    return (x, y, z)
+    return (column.item(0), column.item(1), column.item(2))

@@ -129,9 +129,10 @@ class Codec:
     def framed(self, payload: bytes, message_id: bytes, crc_extra: bytes) -> bytes:
         if not payload[-1]:
             payload = payload.rstrip(b"\0") or b"\0"
-        seal = self.seal
+        sequence, seal = self._sequence, self.seal
+        self._sequence = (sequence + 1) % 256
         flags = 0 if seal is None else SIGNED
-        covered = bytes((len(payload), flags, 0, self.next_sequence())) + self._source_bytes + message_id + payload
+        covered = bytes((len(payload), flags, 0, sequence)) + self._source_bytes + message_id + payload
         frame = _MARKER + covered + crc16(covered + crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
         return frame if seal is None else frame + seal(frame)
 

@@ -73,7 +73,7 @@ class Conditions:
             since_us = silent_since(inputs, condition in held)
             if since_us is not None:
                 found[condition] = since_us
-        for condition, holds in HOLDS.items():
+        for condition, holds in (HOLDS_ON_STATE if inputs.estimate is None else HOLDS).items():
             if holds(inputs, limits):
                 found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
         if inputs.estimate is not None and inputs.estimate.health.any_lost:
@@ -171,6 +171,9 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.DEADLINE_MISSED: lambda inputs, _: inputs.late,
 }
 """Conditions that begin with the first sample at which they hold."""
+
+_OF_ESTIMATE = (Condition.ATTITUDE_LOST, Condition.POSITION_LOST, Condition.ESTIMATE_INVALID)
+HOLDS_ON_STATE = {condition: holds for condition, holds in HOLDS.items() if condition not in _OF_ESTIMATE}
 
 
 SENSORS: Mapping[Condition, Callable[[Health], bool]] = {

@@ -10,6 +10,7 @@ from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WAR
 CLEAR_AFTER_US = 1_000_000
 """A condition is over after not holding this long, so that a flickering link is lost once."""
 
+_ORDER = {row.condition: place for place, row in enumerate(TABLE)}
 _SEVERITIES: Mapping[Action, int] = {
     Action.WARN: WARNING,
     Action.HOLD: WARNING,
@@ -76,12 +77,8 @@ def following(
     }
     begun: list[Row] = []
     cleared: list[tuple[int, str]] = []
-    for row in TABLE:
-        condition = row.condition
-        began_us = since_us.get(condition)
-        if began_us is None and condition not in held_us:
-            continue
-        setting = settings[condition]
+    for condition in sorted({*since_us, *held_us}, key=_ORDER.__getitem__):
+        row, setting, began_us = ROWS[condition], settings[condition], since_us.get(condition)
         holds = began_us is not None and now_us - began_us > setting.delay_us
         if holds and setting.action is not Action.NONE and (flight.armed or row.grounded):
             if condition not in held_us:
