@@ -1,9 +1,8 @@
 """The autopilot's end of the link to a plant."""
 
 from collections.abc import Callable
-from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVarTuple
 
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Step, answer
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from colibri.autopilot.process.ground import Ground
 
 
+Ts = TypeVarTuple("Ts")
 _SILENCE_REPORTED_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
 _UNKNOWN_REPORTED_AFTER_US = 3_000_000
@@ -72,7 +72,7 @@ class Client:
                 self._frame_came = True
                 self._report_if_unknown(step)
                 datagram = received[0] if received and isinstance(self._end, AutopilotEnd) else None
-                self._keep(partial(AutopilotLog.write, step=step, datagram=datagram))
+                self._keep(AutopilotLog.write, step, datagram)
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
@@ -83,12 +83,12 @@ class Client:
         self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _keep(self, write: Callable[[AutopilotLog], None]) -> None:
+    def _keep(self, write: Callable[[AutopilotLog, *Ts], None], *args: *Ts) -> None:
         """Write to the log; with ground stations, a failed log does not end the flight."""
         if self._log is None:
             return
         try:
-            write(self._log)
+            write(self._log, *args)
         except LogError as error:
             if self._ground is None:
                 raise

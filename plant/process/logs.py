@@ -45,7 +45,7 @@ class PlantLogs:
 
     def __init__(self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, tlog: bool = False) -> None:
         """Write into `folder`; without `boot_unix_us`, times of `flight.tlog` are simulated."""
-        self._folder, self._vehicle, self._boot_unix_us, self._has_tlog = folder, vehicle, boot_unix_us, tlog
+        self._folder, self._vehicle, self._boot_unix_us, self.has_tlog = folder, vehicle, boot_unix_us, tlog
         self._open()
 
     def _open(self) -> None:
@@ -53,7 +53,7 @@ class PlantLogs:
         remove_unused(path)
         self._log = FileLog(partial(SharedLog, path, beginning(self._vehicle.name, {}), goes_on=True))
         self._truth = TruthLog(self._log, self._vehicle)
-        self._tlog = TlogWriter(self._folder / TRAFFIC) if self._has_tlog else None
+        self._tlog = TlogWriter(self._folder / TRAFFIC) if self.has_tlog else None
 
     def begin_again(self) -> None:
         """Rename the files to `flight-1.ulg`, `flight-1.tlog` and so on, and begin others."""

@@ -160,8 +160,9 @@ class Server:
 
     def _log_traffic(self, sent: list[Outgoing]) -> None:
         received, time_us = self._end.received, self._time_us
-        frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
-        self._keep(lambda logs: logs.write_frames(time_us, frames))
+        if self._logs is not None and self._logs.has_tlog:
+            frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
+            self._keep(lambda logs: logs.write_frames(time_us, frames))
         received.clear()
 
     def _wait_until(self, due_s: float) -> None:
