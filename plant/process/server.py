@@ -58,6 +58,7 @@ class Server:
         self._time_us = 0
         self._logged: World | None = None
         self._ends = True
+        self._progress, self._began_s = Progress(status), 0.0
 
     def wait(self) -> bool:
         while not self._stop and self._end.peer is None:
@@ -67,14 +68,12 @@ class Server:
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
         """Fly for `duration_s` at `speed` times real time, or until a signal."""
         self._ends = isfinite(duration_s)
-        began_s = perf_counter()
-        pace, progress = Pace(speed, began_s), Progress(self._status)
-        frames = 0
+        self._began_s = began_s = perf_counter()
+        pace, frames = Pace(speed, began_s), 0
         while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
             if not self._advance(plant, pace):
                 break
             frames += 1
-            progress.report(plant.world.time_us / 1e6, perf_counter() - began_s)
         self._log_traffic([])
         self._log(plant.world)
         self._keep(PlantLogs.flush)
@@ -106,6 +105,7 @@ class Server:
         self._time_us = world.time_us
         self._log_traffic(sent)
         self._log(world)
+        self._progress.report(world.time_us / 1e6, now_s - self._began_s)
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
