@@ -35,7 +35,8 @@ _ELSEWHERE: Address = ("127.0.0.1", 1)
 class _Never(Stop):
     """Is never set."""
 
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        self.code = 0
 
     def __bool__(self) -> bool:
         return False
