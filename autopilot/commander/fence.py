@@ -2,21 +2,26 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.mission.geofence import AroundHome, Geofence
+from colibri.autopilot.guidance.mission.geofence import EDGE_M, OUTSIDE, AroundHome, Geofence
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.wire.refusal import Refusal
 
 _LOOK_EVERY_US = 100_000
+_ITEM_US, _PAIR_US = 4.0, 0.02
+"""Work to build an item of a fence, and to compare a place with one of its edges."""
 
 
 class Fence:
     """The fences of one vehicle."""
 
-    def __init__(self, home: Home, behaviour: Behaviour) -> None:
-        self._home = home
+    def __init__(self, home: Home, behaviour: Behaviour, budget: Budget) -> None:
+        self._home, self._budget = home, budget
         self._behaviour = behaviour
         self._items: tuple[MissionItem, ...] = ()
         self._geofence = Geofence((), home.origin)
@@ -31,6 +36,7 @@ class Fence:
         self.rebuild()
 
     def rebuild(self) -> None:
+        self._budget.spend(_ITEM_US * len(self._items))
         self._geofence = Geofence(self._items, self._home.origin)
         self._breach, self._breach_due_us = None, 0
 
@@ -46,6 +52,24 @@ class Fence:
 
     def refusal(self, place: Vector) -> Refusal | None:
         return self._geofence.refusal(place) or self._around_home.refusal(place)
+
+    @property
+    def size(self) -> int:
+        """Edges and circles that each place is compared with."""
+        return self._geofence.size + 1
+
+    def first_outside(self, places: Sequence[Vector]) -> tuple[int, Refusal] | None:
+        """Return the index of the first place outside, and why it is; all of them are compared at once."""
+        if not self.exists:
+            return None
+        self._budget.spend(_PAIR_US * len(places) * self.size)
+        margins = self._geofence.margins_m(np.array(places)[:, :2]).tolist()
+        around = self._around_home
+        for i, (place, margin) in enumerate(zip(places, margins, strict=True)):
+            refusal = around.refusal(place) if margin >= -EDGE_M else OUTSIDE
+            if refusal is not None:
+                return i, refusal
+        return None
 
     def margin_m(self, place: Vector) -> float:
         """Return the distance to the nearest edge, m; negative outside."""

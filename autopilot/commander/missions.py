@@ -1,6 +1,6 @@
 """Uploaded plans, and the task that flies a mission."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
@@ -21,12 +21,16 @@ from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
+CHECKED_AT_ONCE = 60_000
+"""Pairs of a place and an edge of the fence."""
+
 
 class Missions:
     """The mission of one vehicle, and the plans around it.
 
     Attributes:
         outside, below: Why items lead outside the fence or below the ground; empty if they do not.
+        checking: Whether `check_on` is due at the next frame, as the check of a long mission takes several.
         changes: Number of uploads.
     """
 
@@ -37,6 +41,8 @@ class Missions:
         self._behaviour = behaviour
         self._executor = MissionExecutor()
         self.outside = self.below = ""
+        self.checking = False
+        self._check: Iterator[int] = iter(())
         self._reached: list[int] = []
         self.changes = 0
 
@@ -119,20 +125,38 @@ class Missions:
             self._home.origin,
         )
 
+    def check_on(self) -> None:
+        """Check a few more items: at most `CHECKED_AT_ONCE` pairs of a place and an edge of the fence."""
+        self.checking = next(self._check, None) is not None
+
     def _check_mission(self) -> None:
+        self._check = self._checked()
+        self.check_on()
+
+    def _checked(self) -> Iterator[int]:
         """Warn of items outside the fence or below the ground; legs between items are not checked."""
         home, items, said = self._home, self._executor.items, (self.outside, self.below)
         found = list(places(items, home.position_enu_m, home.origin))
-        outside = ((seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place)))
+        at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
+        outside = ""
+        for first in range(0, len(found), at_once):
+            part = found[first : first + at_once]
+            refused = self._fence.first_outside([place for _, place in part])
+            if refused is not None:
+                outside = _of_item(part[refused[0]][0], refused[1])
+                break
+            if first + at_once < len(found):
+                yield first + at_once
         flown = ((seq, place) for seq, place in found if items[seq].command != mav.MAV_CMD_NAV_LAND)
-        below = ((seq, refusal.reason) for seq, place in flown if (refusal := home.refusal(place[2])))
-        self.outside, self.below = (
-            f"item {seq} of the mission: {reason}" if reason else ""
-            for seq, reason in (next(outside, (0, "")), next(below, (0, "")))
-        )
+        below = (_of_item(seq, refusal) for seq, place in flown if (refusal := home.refusal(place[2])))
+        self.outside, self.below = outside, next(below, "")
         for text in (self.outside, self.below):
             if text and text not in said:
                 self._lines.say(WARNING, text)
+
+
+def _of_item(seq: int, refusal: Refusal) -> str:
+    return f"item {seq} of the mission: {refusal.reason}"
 
 
 class MissionTask:

@@ -64,11 +64,14 @@ class MotionCommands:
     def may_fly_at(self, speed_m_s: float) -> bool:
         return 0.0 < speed_m_s <= self._pilot.behaviour.max_speed_m_s
 
-    def unreachable(self, place: Vector) -> Refusal | None:
-        away = hypot(place[0], place[1])
-        if not isfinite(away) or away > MAX_DISTANCE_M or not -MAX_HEIGHT_M < place[2] < MAX_HEIGHT_M:
-            return Refusal("too far away")
-        return self._fence.refusal(place)
+    def unreachable(self, *places: Vector) -> Refusal | None:
+        """Refuse places, if one of them is too far away or outside the fence."""
+        for east, north, up in places:
+            away = hypot(east, north)
+            if not isfinite(away) or away > MAX_DISTANCE_M or not -MAX_HEIGHT_M < up < MAX_HEIGHT_M:
+                return Refusal("too far away")
+        outside = self._fence.first_outside(places)
+        return None if outside is None else outside[1]
 
     def _fly(self, mode: Mode, task: FlightTask) -> Refusal | None:
         return self._pilot.fly(mode, task, self._needs.missing())
@@ -161,7 +164,7 @@ class MotionCommands:
             return Refusal("no such yaw behaviour")
         angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
-        return self._home.refusal(z) or next(filter(None, map(self.unreachable, around)), None)
+        return self._home.refusal(z) or self.unreachable(*around)
 
     def _turn(self, command: Command) -> Refusal | None:
         """Turn clockwise from north, or from the heading if p4 is 1."""

@@ -56,6 +56,7 @@ class ModeNeeds:
             Need.MISSION: self._missions.has_mission,
             Need.INSIDE_FENCE: not self._missions.outside,
             Need.ABOVE_GROUND: not self._missions.below,
+            Need.CHECKED: not self._missions.checking,
             Need.CIRCLE: False,
             Need.FLYING: not self._pilot.ground.standing,
             Need.POSITION: self._pilot.sensed.position_known,

@@ -197,6 +197,8 @@ class Copter:
         plant_status, self._plant_status = self._plant_status, NOTHING
         self.guard(table.STATIONS, self.stations.receive_status, _nothing, plant_status, now_us)
         self._receive_from_stations(inbox, now_us)
+        if self.parameters.proposed and self.parts.budget.allows(now_us):
+            self.guard(table.PARAMETERS, self.parameters.settle, _nothing)
         if self.parameters.revision != self.parts.subscribers.revision:
             self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)
         return self.stations.poll(now_us)
@@ -218,7 +220,9 @@ class Copter:
             self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, *sampled)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
-        """Pass on what came; a datagram that raises is dropped."""
+        """Pass on what came, after what waits; a datagram that raises is dropped."""
+        if self.stations.hub.waiting:
+            self.guard(table.DATAGRAM, self.stations.hub.work, _nothing, now_us)
         if not inbox:
             return
         arriving = iter(inbox)

@@ -28,6 +28,7 @@ from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import WARNING
 from colibri.plant.vehicle.description import Vehicle
@@ -52,6 +53,7 @@ class Parts:
     snapshots: SnapshotBuilder
     lines: StatusQueue
     defence: Defence
+    budget: Budget
 
 
 def parts_of(
@@ -73,8 +75,8 @@ def parts_of(
     loop = ControlLoop(flown, assumed, clock)
     attitude = AttitudeReference(assumed, loop.preview, attitude_limits(flies_by)) if loop.takes_attitude else None
     planned_at = instants(loop.preview, loop.control_interval_us)
-    home, lines = Home(settings.origin), StatusQueue()
-    fence = Fence(home, flies_by)
+    home, lines, budget = Home(settings.origin), StatusQueue(), Budget()
+    fence = Fence(home, flies_by, budget)
     missions = Missions(home, fence, lines, flies_by)
     tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first)
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
@@ -83,6 +85,7 @@ def parts_of(
         *(settings, pilot, missions, fence, lines, parameters, vehicle.name),
         takes_attitude=attitude is not None,
         defence=defence,
+        budget=budget,
     )
     supervisor = Supervisor(parameters, lines)
     rotor_loss = RotorLoss(assumed, loop.control_interval_us)
@@ -97,7 +100,7 @@ def parts_of(
 
     obey_delay(flies_by)
     trial = Trial(loop, rotor_loss, planned_at)
-    tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial)
+    tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
     if values:
         tuning.try_all(parameters.values)
     parameters.ask(tuning.prepare)
@@ -129,4 +132,5 @@ def parts_of(
         snapshots,
         lines,
         defence,
+        budget,
     )

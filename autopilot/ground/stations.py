@@ -26,6 +26,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
 from colibri.mavlink.mission.service import MissionService, Vehicle
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata, metadata_json
@@ -101,6 +102,7 @@ class Stations:
         *,
         takes_attitude: bool,
         defence: Guarding,
+        budget: Budget,
     ) -> None:
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._guard = lines, pilot, defence.guard
@@ -138,9 +140,9 @@ class Stations:
             self.manual,
             self._follow,
             OriginService(setters, self._text),
-            Ftp(files),
-            Logs(files, (LOGS,), lambda: self.log.name),
-            Shell(self.system.shell()),
+            Ftp(files, budget),
+            Logs(files, (LOGS,), lambda: self.log.name, budget),
+            Shell(self.system.shell(), budget),
         )
         self.hub = Hub(
             settings.system_id,
@@ -149,6 +151,7 @@ class Stations:
             signing=settings.signing,
             observers=(self._streams,),
             caught=defence.caught,
+            budget=budget,
         )
         self.snapshot: Snapshot | None = None
         self._logged: Snapshot | None = None
@@ -205,6 +208,8 @@ class Stations:
         self.hub.poll(now_us)
 
     def _tell(self, now_us: int) -> None:
+        if self.missions.checking:
+            self.missions.check_on()
         for seq in self.missions.take_reached():
             self.plans.reached(seq)
         for text in self.system.poll(now_us):

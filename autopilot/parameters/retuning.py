@@ -1,6 +1,6 @@
 """Retuning: the control law is rebuilt and checked before a change."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from math import pi
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -18,9 +18,12 @@ from colibri.autopilot.control.interface import (
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import check_controller, check_rotor_speeds, in_words, load_controller
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
+_LAW_US, _VALUES_US = 6000.0, 300.0
+"""Work to build and try a control law with its vehicle, and to try the other parameters."""
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
 _TRIED = (
     AT_REST,
@@ -65,28 +68,36 @@ class Tuning:
         say: Callable[[str], None],
         parameters: Parameters | None = None,
         trial: Trial | None = None,
+        budget: Budget | None = None,
     ) -> None:
         self._numbers = numbers
         self._build = build
         self._say = say
         self._rhythm = _rhythm(running)
-        self._parameters, self._trial = parameters, trial
+        self._parameters, self._trial, self._budget = parameters, trial, budget or Budget()
         self._tried: Vehicle | None = None
 
-    def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
-        """Return the changed control law as a `Tuned`, or a refusal."""
+    def prepare(self, names: Collection[str], values: Mapping[str, Value]) -> Prepared | ParamError:
+        """Return the control law with all these changes as a `Tuned`, or a refusal; say why one alone is refused."""
+        changed = ", ".join(names) if len(names) == 1 else ""
         try:
-            if name not in self._numbers.defaults:
+            if any(name not in self._numbers.defaults for name in names):
+                self._budget.spend(_VALUES_US)
                 self._try_values(values)
+            if all(name not in self._numbers.defaults for name in names):
                 return Prepared()
+            self._budget.spend(_LAW_US)
             tuned = self.tuned(values)
         except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
-            self._say(f"{name} not changed: {in_words(error)}")
-            return ParamError.VALUE_OUT_OF_RANGE
+            return self._refused(changed, in_words(error), ParamError.VALUE_OUT_OF_RANGE)
         if _rhythm(tuned.controller) != self._rhythm:
-            self._say(f"{name} not changed: the law's sample and preview stay in flight")
-            return ParamError.PERMISSION_DENIED
+            return self._refused(changed, "the law's sample and preview stay in flight", ParamError.PERMISSION_DENIED)
         return Prepared(tuned)
+
+    def _refused(self, changed: str, reason: str, refusal: ParamError) -> ParamError:
+        if changed:
+            self._say(f"{changed} not changed: {reason}")
+        return refusal
 
     def tuned(self, values: Mapping[str, Value]) -> Tuned:
         profile, vehicle = self._numbers.applied(values)

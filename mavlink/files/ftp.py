@@ -27,7 +27,8 @@ from colibri.mavlink.files.ftp_wire import (
     path_in,
     request_of,
 )
-from colibri.mavlink.files.tree import FileRefusal, Files, Names, Reading
+from colibri.mavlink.files.tree import ENTRY_US, FileRefusal, Files, Names, Reading
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
@@ -81,8 +82,8 @@ class Ftp:
 
     handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 
-    def __init__(self, files: Files) -> None:
-        self._files = files
+    def __init__(self, files: Files, budget: Budget | None = None) -> None:
+        self._files, self._budget = files, budget or Budget()
         self._sessions: dict[Key, _Session] = {}
         self._bursts: dict[Key, _Burst] = {}
         self._checksums: dict[Key, _Checksum] = {}
@@ -186,6 +187,7 @@ class Ftp:
         found = self._files.list(names)
         if isinstance(found, FileRefusal):
             return found
+        self._budget.spend(ENTRY_US * len(found))
         if request.offset >= len(found):
             return Nak(Error.END_OF_FILE)
         data = b""

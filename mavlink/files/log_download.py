@@ -8,7 +8,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, Reading
+from colibri.mavlink.files.tree import ENTRY_US, Entry, FileRefusal, Files, Names, Reading
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.wire.dialect import Message
 
@@ -48,9 +49,13 @@ class Logs:
     handles = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_ERASE", "LOG_REQUEST_END"})
 
     def __init__(
-        self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None
+        self,
+        files: Files,
+        folder: Names = (),
+        being_written: Callable[[], str | None] = lambda: None,
+        budget: Budget | None = None,
     ) -> None:
-        self._files = files
+        self._files, self._budget = files, budget or Budget()
         self._folder = folder
         self._being_written = being_written
         self._shown: dict[Peer, list[Entry]] = {}
@@ -107,6 +112,7 @@ class Logs:
         """Fix the present logs' ids for this client."""
         found = self._files.list(self._folder)
         logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
+        self._budget.spend(ENTRY_US * len(logs))
         self._shown.pop(peer, None)
         if len(self._shown) >= MAX_PEERS:
             forgotten = next(iter(self._shown))

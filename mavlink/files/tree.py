@@ -12,6 +12,8 @@ Names: TypeAlias = tuple[str, ...]
 
 MAX_NAME_BYTES = 255
 MAX_DEPTH = 16
+ENTRY_US = 4.0
+"""Work to list an entry of a folder."""
 
 
 class FileRefusal(Enum):

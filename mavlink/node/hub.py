@@ -1,10 +1,11 @@
 """The hub of all links: checks and routes messages, dispatches them to services, sends their answers."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from colibri.common.types import Address
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.router import Router, target_of
 from colibri.mavlink.node.service import IDLE, Peer, PolledService, Send, Service
@@ -20,6 +21,10 @@ _OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
 """Messages without a verifiable CRC or signature."""
 
 
+_HANDLED_US, _ANSWERED_US = 20.0, 8.0
+"""Work for a message that a service handles, and for each that is sent in answer to one channel."""
+MAX_WAITING = 1000
+"""Limit of messages of one channel that wait for the budget; more are dropped."""
 _TRIES = 3
 """Exceptions in `poll` before a service is switched off."""
 Caught: TypeAlias = Callable[[str, Exception, str], None]
@@ -54,8 +59,14 @@ class Hub:
         signing: Signing | None = None,
         observers: Sequence[ChannelObserver] = (),
         caught: Caught | None = None,
+        budget: Budget | None = None,
     ) -> None:
-        """Create a component; without `caught` services' exceptions are raised."""
+        """Create a component; without `caught` services' exceptions are raised.
+
+        Messages beyond the `budget` wait, and are handled in turn of the channels by `work`.
+        """
+        self._budget = budget or Budget()
+        self.waiting: dict[int, deque[Message]] = {}
         self._own = (system_id, component_id)
         self._polled = tuple(service for service in services if isinstance(service, PolledService))
         self._awake = self._polled
@@ -117,6 +128,17 @@ class Hub:
                 continue
             self._take_in(message, channel, loopback)
 
+    def work(self, now_us: int) -> None:
+        """Handle the messages that wait, one of each channel in turn, as far as the budget allows."""
+        self._now_us = now_us
+        while self.waiting and self._budget.allows(now_us):
+            number = next(iter(self.waiting))
+            waiting = self.waiting.pop(number)
+            message = waiting.popleft()
+            if waiting:
+                self.waiting[number] = waiting  # at the end of the line
+            self._handle(message, number)
+
     def poll(self, now_us: int) -> None:
         self._now_us = now_us
         for service in self._awake:
@@ -133,14 +155,19 @@ class Hub:
             self._tidy_at_us = now_us + _TIDY_EVERY_US
             self._forget_silent()
 
-    def send(self, sends: Iterable[Send]) -> None:
+    def send(self, sends: Iterable[Send]) -> int:
+        """Send messages, each to one channel or to all; return how many were encoded."""
+        sent = 0
         for name, fields, number in sends:
             if number is None:
+                sent += len(self._channels)
                 for channel in self._channels.values():
                     channel.say(channel.codec.encode(name, *fields))
             elif number in self._channels:
+                sent += 1
                 channel = self._channels[number]
                 channel.say(channel.codec.encode(name, *fields))
+        return sent
 
     def take_outbox(self) -> list[Outgoing]:
         return [
@@ -169,16 +196,34 @@ class Hub:
             self._set_up_signing(message, target, channel, loopback)
             return
         self._forward(message, target, channel)
-        if self._router.concerns_us(target) and (self.accepts_only is None or message.name in self.accepts_only):
-            peer = Peer(channel.number, *message.source)
-            for service in self._receivers.get(message.name, ()):
-                if service in self._idle:
-                    self._idle.discard(service)
-                    self._choose()
-                try:
-                    self.send(service.receive(message, peer, self._now_us))
-                except Exception as error:
-                    self._tell(service, error, f"{message.name} dropped")
+        if self._router.concerns_us(target) and message.name in self._receivers:
+            self._queue(message, channel)
+
+    def _queue(self, message: Message, channel: Channel) -> None:
+        """Handle a message at once, or have it wait behind those of its channel."""
+        waiting = self.waiting.get(channel.number)
+        if waiting is None and self._budget.allows(self._now_us):
+            self._handle(message, channel.number)
+        elif waiting is None:
+            self.waiting[channel.number] = deque((message,))
+        elif len(waiting) < MAX_WAITING:
+            waiting.append(message)
+        else:
+            channel.codec.dropped["too many at once"] += 1
+
+    def _handle(self, message: Message, number: int) -> None:
+        if self.accepts_only is not None and message.name not in self.accepts_only:
+            return
+        self._budget.spend(_HANDLED_US)
+        peer = Peer(number, *message.source)
+        for service in self._receivers[message.name]:
+            if service in self._idle:
+                self._idle.discard(service)
+                self._choose()
+            try:
+                self._budget.spend(_ANSWERED_US * self.send(service.receive(message, peer, self._now_us)))
+            except Exception as error:
+                self._tell(service, error, f"{message.name} dropped")
 
     def _choose(self) -> None:
         self._awake = tuple(service for service in self._polled if service not in self._idle)
@@ -241,6 +286,7 @@ class Hub:
 
     def _forget(self, number: int) -> None:
         channel = self._channels.pop(number)
+        self.waiting.pop(number, None)
         del self._numbers[channel.link, channel.address]
         self._router.close(number)
         self._dropped_before += channel.codec.dropped

@@ -3,7 +3,7 @@
 Values are encoded bytewise, as PX4's (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
@@ -36,6 +36,7 @@ class ParameterService:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._listings: dict[int, _Listing] = {}
+        self._proposed: dict[str, list[Peer]] = {}  # who waits for `Parameters.settle`
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
@@ -43,14 +44,27 @@ class ParameterService:
             self._begin_list(peer, now_us)
             return ()
         if message.name == "PARAM_REQUEST_READ":
-            return (self._read(fields.param_id, fields.param_index, peer),)
+            return self._read(fields.param_id, fields.param_index, peer)
         return self._set(fields.param_id, fields.param_type, param_bits(message), peer)
 
     def poll(self, now_us: int) -> Iterable[Send]:
         """Send the due parameters of each list: "allow breaks between each message"."""
-        if not self._listings:
+        if not self._listings and not self._proposed:
             return IDLE
-        return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
+        sends = [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
+        settled = self._parameters.settled
+        for name, refusal in settled[:MAX_AT_ONCE]:
+            sends += self._answers(name, refusal)
+        del settled[:MAX_AT_ONCE]
+        return sends
+
+    def _answers(self, name: str, refusal: ParamError | None) -> Iterator[Send]:
+        index = self._parameters.index(name)
+        assert index is not None, "only known parameters are proposed"
+        for peer in self._proposed.pop(name, ()):
+            if refusal is not None:
+                yield _refuse(peer, name, index, refusal)
+        yield self._value(index)
 
     def _begin_list(self, peer: Peer, now_us: int) -> None:
         listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
@@ -70,14 +84,16 @@ class ParameterService:
             del self._listings[channel]
         return sends
 
-    def _read(self, name: str, index: int, peer: Peer) -> Send:
+    def _read(self, name: str, index: int, peer: Peer) -> Iterable[Send]:
         if index == BY_ID:
             known = self._parameters.index(name)
         else:
             known = None if self._parameters.at(index) is None else index
         if known is None:
-            return _refuse(peer, name, index, ParamError.DOES_NOT_EXIST)
-        return self._value(known, peer.channel)
+            return (_refuse(peer, name, index, ParamError.DOES_NOT_EXIST),)
+        if name in self._proposed:  # its value is sent as soon as it is settled
+            return ()
+        return (self._value(known, peer.channel),)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
         index = self._parameters.index(name)
@@ -85,9 +101,13 @@ class ParameterService:
         if index is None or definition is None:
             return (_refuse(peer, name, BY_ID, ParamError.DOES_NOT_EXIST),)
         value = _meant(definition, wire_type, bits)
-        refusal = value if isinstance(value, ParamError) else self._parameters.set(name, value)
-        answer = self._value(index)
-        return (answer,) if refusal is None else (_refuse(peer, name, index, refusal), answer)
+        outcome = value if isinstance(value, ParamError) else self._parameters.propose(name, value)
+        if isinstance(outcome, ParamError):
+            return (_refuse(peer, name, index, outcome), self._value(index))
+        if not outcome:
+            return (self._value(index),)
+        self._proposed.setdefault(name, []).append(peer)
+        return ()
 
     def _value(self, index: int, channel: int | None = None) -> Send:
         definition = self._parameters.at(index)

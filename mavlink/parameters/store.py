@@ -1,6 +1,7 @@
 """Parameters of a vehicle: definitions and values, in two types of 32 bits on the wire."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from math import copysign, inf, isfinite
@@ -16,6 +17,8 @@ Value: TypeAlias = int | float
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 FLOAT32_MAX = 3.4028234663852886e38
 _NAME = "[A-Z][A-Z0-9_]{0,15}"
+_MAX_BATCHES = 8
+"""With more, the last value that was proposed for a name counts."""
 _INT, _REAL, _BITS = Struct("<i"), Struct("<f"), Struct("<I")
 
 
@@ -43,8 +46,8 @@ class Prepared(NamedTuple):
     made: object | None = None
 
 
-Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
-"""(name, all new values) -> acceptance or refusal of a change; without side effects."""
+Prepare: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], Prepared | ParamError]
+"""(changed names, all new values) -> acceptance or refusal of a change; without side effects."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +101,8 @@ class Parameters:
         self._values = {parameter.name: parameter.default for parameter in self._definitions}
         self._made: object | None = None
         self.prepare = prepare
+        self.proposed: deque[dict[str, Value]] = deque()  # batches that `settle` is to prepare
+        self.settled: list[tuple[str, ParamError | None]] = []  # names and refusals of proposed changes
         self.revision = 0  # number of changes so far
 
     def trial(self, values: Mapping[str, Value]) -> "Parameters":
@@ -135,6 +140,32 @@ class Parameters:
 
     def set(self, name: str, value: Value) -> ParamError | None:
         """Change a value, if valid and accepted by `prepare`; return the refusal."""
+        wanted = self._wanted(name, value)
+        return wanted if isinstance(wanted, ParamError) else self._try({name: wanted})
+
+    def propose(self, name: str, value: Value) -> ParamError | bool:
+        """Propose a change for `settle`; return the refusal of an invalid one, or whether it changes anything."""
+        wanted = self._wanted(name, value)
+        if isinstance(wanted, ParamError):
+            return wanted
+        if wanted == self._values[name] and not any(name in batch for batch in self.proposed):
+            return False
+        if not self.proposed or (name in self.proposed[-1] and len(self.proposed) < _MAX_BATCHES):
+            self.proposed.append({})
+        self.proposed[-1][name] = wanted
+        return True
+
+    def settle(self) -> None:
+        """Prepare a batch of proposed changes at once; of a refused one, try the halves at the next calls."""
+        batch = self.proposed.popleft()
+        refusal = self._try(batch)
+        if refusal is None or len(batch) == 1:
+            self.settled += [(name, refusal) for name in batch]
+            return
+        changes, half = list(batch.items()), len(batch) // 2
+        self.proposed.extendleft((dict(changes[half:]), dict(changes[:half])))
+
+    def _wanted(self, name: str, value: Value) -> Value | ParamError:
         index = self._index.get(name)
         if index is None:
             return ParamError.DOES_NOT_EXIST
@@ -142,16 +173,19 @@ class Parameters:
         if definition.kind == Kind.REAL:
             value = float32(value)
         if value == self._values[name] and isinstance(value, type(self._values[name])):
+            return value
+        return definition.refusal(value) or (ParamError.READ_ONLY if definition.read_only else value)
+
+    def _try(self, changes: Mapping[str, Value]) -> ParamError | None:
+        changed = {name: value for name, value in changes.items() if value != self._values[name]}
+        if not changed:
             return None
-        refusal = definition.refusal(value) or (ParamError.READ_ONLY if definition.read_only else None)
-        if refusal is not None:
-            return refusal
-        prepared = self.prepare(name, {**self._values, name: value}) if self.prepare is not None else Prepared()
+        prepared = self.prepare(changed, {**self._values, **changed}) if self.prepare is not None else Prepared()
         if isinstance(prepared, ParamError):
             return prepared
         if prepared.made is not None:
             self._made = prepared.made
-        self._change(name, value)
+        self.load(changed)
         return None
 
     def load(self, values: Mapping[str, Value]) -> None:
@@ -161,8 +195,7 @@ class Parameters:
                 self._change(name, value)
 
     def reset(self) -> None:
-        for definition in self._definitions:
-            self.set(definition.name, definition.default)
+        self._try({definition.name: definition.default for definition in self._definitions})
 
     def take_made(self) -> object | None:
         made, self._made = self._made, None

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.wire.dialect import Message, mav
 
@@ -11,6 +12,8 @@ MAX_LINE_BYTES = 200
 MAX_ANSWER_BYTES = 20_000
 MESSAGES_A_POLL = 10
 MAX_PEERS = 16
+_ANSWER_US, _LETTER_US = 20.0, 0.05
+"""Work for an answer, and for each of its letters."""
 PROMPT = "colibri> "
 
 _SHELL: int = mav.SERIAL_CONTROL_DEV_SHELL
@@ -26,7 +29,8 @@ class Shell:
 
     handles = frozenset({"SERIAL_CONTROL"})
 
-    def __init__(self, commands: Mapping[str, Command]) -> None:
+    def __init__(self, commands: Mapping[str, Command], budget: Budget | None = None) -> None:
+        self._budget = budget or Budget()
         self._commands = {"help": self._help, **commands}
         self._lines: dict[Peer, bytes] = {}
         self._answers: dict[Peer, bytes] = {}
@@ -44,6 +48,7 @@ class Shell:
         self._lines[peer] = begun[:MAX_LINE_BYTES]
         for line in lines if fields.flags & _RESPOND else ():
             text = self._answer(line) + PROMPT
+            self._budget.spend(_ANSWER_US + _LETTER_US * len(text))
             self._answers[peer] = (self._answers.get(peer, b"") + text.encode(errors="replace"))[:MAX_ANSWER_BYTES]
         return ()
 

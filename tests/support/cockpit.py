@@ -25,6 +25,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem, plan_of
+from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import ACCEPTED, Command
 from colibri.mavlink.wire.dialect import mav
@@ -70,7 +71,7 @@ class Cockpit:
         behaviour = behaviour or Behaviour()
         vehicle, planned_at = load_vehicle("hummingbird"), instants(PREVIEW, PREVIEW.interval_us)
         self.home, self.lines = Home(DEFAULT_ORIGIN), StatusQueue()
-        self.fence = Fence(self.home, behaviour)
+        self.fence = Fence(self.home, behaviour, Budget())
         self.missions = Missions(self.home, self.fence, self.lines, behaviour)
         attitude = AttitudeReference(vehicle, PREVIEW) if takes_attitude else None
         references = load_profile("flight").references

@@ -51,8 +51,12 @@ class BareFlight(Stepped, Steered):
         self.step()
 
     @property
+    def autopilot(self) -> Autopilot[Copter]:
+        return self._flight.autopilot
+
+    @property
     def copter(self) -> Copter:
-        return self._flight.autopilot.stages
+        return self.autopilot.stages
 
     @property
     def time_us(self) -> int:

@@ -77,6 +77,8 @@ class Target:
         for client in (*self._shooters, self.flight.client):
             client.forget()
         self.flight.step()
+        while self.flight.copter.stations.hub.waiting:  # beyond what is handled in a frame
+            self.flight.step()
         for place, shooter in enumerate(self._shooters):
             commands, self._unanswered[place] = self._unanswered[place], []
             self._check_answers(commands, shooter.acks)

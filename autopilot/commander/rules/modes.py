@@ -34,6 +34,7 @@ class Need(Enum):
     MISSION = "there is no mission"
     INSIDE_FENCE = "the mission leads outside the geofence"
     ABOVE_GROUND = "the mission leads below the ground"
+    CHECKED = "the mission is being compared with the geofence: try again"
     CIRCLE = "command DO_ORBIT says where"
     POSITION = "the position is not known"
     FLYING = "the vehicle is not flying"

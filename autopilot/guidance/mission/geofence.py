@@ -5,14 +5,15 @@ inside all inclusion zones of one group (parameter 2), and outside all exclusion
 placeholders.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import hypot, inf, isfinite, isnan
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from colibri.autopilot.guidance.mission.items import MAX_DISTANCE_M, check_place
-from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.earth.compiled_geodesy import enu_of
+from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Array, Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
@@ -30,6 +31,7 @@ INCLUSIONS: tuple[int, ...] = (POLYGONS[0], CIRCLES[0])
 FEWEST_VERTICES = 3
 EDGE_M = 1e-6
 """Tolerance for points on an edge, which count as inside."""
+OUTSIDE = Refusal("outside the geofence")
 
 
 def check_fence_item(item: MissionItem) -> int:
@@ -60,72 +62,88 @@ def check_fence(items: Sequence[MissionItem]) -> int:
 FENCE_RULES = Rules(check_fence_item, check_fence)
 
 
-class Disc(NamedTuple):
-    """The inside of a circle."""
+class Discs:
+    """The insides of circles."""
 
-    east_m: float
-    north_m: float
-    radius_m: float
+    def __init__(self, places_m: Sequence[tuple[float, float]], radii_m: Sequence[float]) -> None:
+        self._east, self._north = np.array(places_m, dtype=float).reshape(-1, 2).T
+        self._radii = np.array(radii_m, dtype=float)
 
-    def depth_m(self, east_m: float, north_m: float) -> float:
-        """Return the depth inside, m; negative outside."""
-        return self.radius_m - hypot(east_m - self.east_m, north_m - self.north_m)
+    def depths_m(self, places_m: Array) -> Array:
+        """Return the depth of each place (rows) inside each circle (columns), m; negative outside."""
+        east, north = places_m[:, :1] - self._east, places_m[:, 1:] - self._north
+        depths: Array = self._radii - np.sqrt(east * east + north * north)
+        return depths
 
 
-class Polygon:
-    """The inside of a polygon, by the even-odd rule."""
+class Polygons:
+    """The insides of polygons, by the even-odd rule."""
 
-    def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
-        self._from: Array = np.array(list(vertices_m), dtype=float)
-        self._to = np.roll(self._from, -1, axis=0)
-        self._along = self._to - self._from
-        squared = (self._along * self._along).sum(axis=1)
+    def __init__(self, polygons_m: Sequence[Sequence[tuple[float, float]]]) -> None:
+        starts = [np.array(vertices, dtype=float) for vertices in polygons_m]
+        ends = [np.roll(vertices, -1, axis=0) for vertices in starts]
+        self._firsts = np.cumsum([0, *map(len, starts)])[:-1]  # the first edge of each polygon
+        self._east, self._north = np.concatenate([*starts, np.empty((0, 2))]).T
+        to_east, self._to_north = np.concatenate([*ends, np.empty((0, 2))]).T
+        self._along_east, self._along_north = to_east - self._east, self._to_north - self._north
+        squared = self._along_east * self._along_east + self._along_north * self._along_north
         self._squared = np.where(squared > 0.0, squared, 1.0)
 
-    def depth_m(self, east_m: float, north_m: float) -> float:
-        to = np.array((east_m, north_m)) - self._from  # each edge's start to the point
-        part = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
-        away = to - part[:, None] * self._along
-        nearest = float(np.sqrt((away * away).sum(axis=1).min()))
+    def __len__(self) -> int:
+        return len(self._east)
+
+    def depths_m(self, places_m: Array) -> Array:
+        """Return the depth of each place (rows) inside each polygon (columns), m; negative outside."""
+        along_east, along_north = self._along_east, self._along_north
+        to_east, to_north = places_m[:, :1] - self._east, places_m[:, 1:] - self._north  # from each edge's start
+        part = (to_east * along_east + to_north * along_north) / self._squared
+        part = np.minimum(np.maximum(part, 0.0), 1.0)
+        away_east, away_north = to_east - part * along_east, to_north - part * along_north
+        nearest = np.sqrt(np.minimum.reduceat(away_east**2 + away_north**2, self._firsts, axis=1))
         # An edge is crossed where just one of its ends is north of the point. Both edges of a corner compare the same
         # two numbers, so that a ray through it crosses once or not at all, however they round.
-        starts, ends = self._from[:, 1] > north_m, self._to[:, 1] > north_m
-        side = self._along[:, 0] * to[:, 1] - self._along[:, 1] * to[:, 0]
-        crossed = (starts != ends) & ((side > 0.0) == (self._along[:, 1] > 0.0))
-        return nearest if np.count_nonzero(crossed) % 2 else -nearest
-
-
-Zone: TypeAlias = Disc | Polygon
+        starts, ends = self._north > places_m[:, 1:], self._to_north > places_m[:, 1:]
+        crossed = (starts != ends) & ((along_east * to_north > along_north * to_east) == (along_north > 0.0))
+        inside = np.logical_xor.reduceat(crossed, self._firsts, axis=1)
+        return np.where(inside, nearest, -nearest)
 
 
 class Geofence:
     """A fence in ENU, m; return points are accepted, and ignored."""
 
     def __init__(self, items: Sequence[MissionItem], origin: Geodetic) -> None:
-        self._groups: dict[float, list[Zone]] = {}
-        self._exclusions: list[Zone] = []
-        for zone in _zones(items):
-            self._add(zone[0], [_place(item, origin) for item in zone])
+        zones = sorted((zone for zone in _zones(items) if not _is_ignored(zone[0])), key=_rank)
+        polygons = [i for i, zone in enumerate(zones) if zone[0].command in POLYGONS]
+        discs = [i for i, zone in enumerate(zones) if zone[0].command in CIRCLES]
+        self._polygons = Polygons([[_place(item, origin) for item in zones[i]] for i in polygons])
+        self._discs = Discs([_place(zones[i][0], origin) for i in discs], [zones[i][0].p1 for i in discs])
+        self._order = np.argsort([*polygons, *discs]) if polygons and discs else None
+        ranks = [_rank(zone) for zone in zones if zone[0].command in INCLUSIONS]
+        self._groups = [i for i, rank in enumerate(ranks) if i == 0 or rank != ranks[i - 1]]
+        self._inclusions = len(ranks)
+        self.size = len(self._polygons) + len(discs)
 
-    def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
-        if item.command == RETURN_POINT or (item.command in CIRCLES and item.p1 == 0.0):
-            return
-        zone: Zone = Polygon(places) if item.command in POLYGONS else Disc(*places[0], item.p1)
-        if item.command in INCLUSIONS:
-            self._groups.setdefault(_group(item), []).append(zone)
-        else:
-            self._exclusions.append(zone)
+    def margins_m(self, places_m: Array) -> Array:
+        """Return the depth inside of each place (east, north), m; negative outside."""
+        if not self.size:
+            return np.full(len(places_m), inf)
+        depths = self._polygons.depths_m(places_m) if len(self._polygons) else self._discs.depths_m(places_m)
+        if self._order is not None:
+            depths = np.concatenate((depths, self._discs.depths_m(places_m)), axis=1)[:, self._order]
+        margins: Array = -depths[:, self._inclusions :].max(axis=1, initial=-inf)
+        if self._groups:
+            inside = np.minimum.reduceat(depths[:, : self._inclusions], self._groups, axis=1)
+            margins = np.minimum(margins, inside.max(axis=1))
+        return margins
 
     def margin_m(self, position_enu_m: Vector) -> float:
         """Return the depth inside, m; negative outside."""
-        east, north, up = position_enu_m
-        if not (isfinite(east) and isfinite(north) and isfinite(up)):
+        if not all(map(isfinite, position_enu_m)):
             return -inf
-        groups = (min(zone.depth_m(east, north) for zone in zones) for zones in self._groups.values())
-        return min(max(groups, default=inf), *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
+        return float(self.margins_m(np.array([position_enu_m[:2]]))[0])
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
-        return None if self.margin_m(position_enu_m) >= -EDGE_M else Refusal("outside the geofence")
+        return None if self.margin_m(position_enu_m) >= -EDGE_M else OUTSIDE
 
 
 class AroundHome(NamedTuple):
@@ -160,6 +178,15 @@ def _zones(items: Sequence[MissionItem]) -> Iterator[Sequence[MissionItem]]:
         length = _length(items[at])
         yield items[at : at + length]
         at += length
+
+
+def _rank(zone: Sequence[MissionItem]) -> float:
+    """Return the group of an inclusion zone; exclusion zones come after all groups."""
+    return _group(zone[0]) if zone[0].command in INCLUSIONS else inf
+
+
+def _is_ignored(first: MissionItem) -> bool:
+    return first.command == RETURN_POINT or (first.command in CIRCLES and first.p1 == 0.0)
 
 
 def _length(first: MissionItem) -> int:

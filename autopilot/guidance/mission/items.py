@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite, isnan
 from typing import NamedTuple, TypeAlias
 
-from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic, enu_of
+from colibri.common.earth.compiled_geodesy import enu_of
+from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules

@@ -35,12 +35,15 @@ def parameters_of(count: int = 0) -> Parameters:
 
 class Talk:
     def __init__(self, parameters: Parameters) -> None:
-        self.service = ParameterService(parameters)
+        self.parameters, self.service = parameters, ParameterService(parameters)
         self.now_us = 0
 
     def ask(self, name: str, *fields: Any, peer: Peer = ME) -> list[Message]:
         (message,) = STATION.decode(STATION.encode(name, 1, 1, *fields))
         sends = list(self.service.receive(message, peer, self.now_us))
+        if self.parameters.proposed:
+            self.parameters.settle()
+            sends += self.service.poll(self.now_us)
         assert all(send.channel in (None, peer.channel) for send in sends)
         return heard(sends)
 
@@ -95,7 +98,9 @@ def test_every_real_survives_the_round_trip(value: float) -> None:
 def test_a_set_is_told_to_everybody() -> None:
     talk = Talk(parameters_of())
     (message,) = STATION.decode(STATION.encode("PARAM_SET", 1, 1, b"REAL", 2.5, REAL32))
-    (send,) = talk.service.receive(message, ME, 0)
+    assert not list(talk.service.receive(message, ME, 0))
+    talk.parameters.settle()
+    (send,) = talk.service.poll(0)
     assert send.channel is None
 
 

@@ -1,6 +1,6 @@
 """What a parameter may be, and what happens when it changes."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import inf, nan
 
 import pytest
@@ -81,7 +81,7 @@ def test_changes_are_counted(parameters: Parameters) -> None:
 
 
 def test_a_prepared_value_is_returned_with_its_change(parameters: Parameters) -> None:
-    parameters.prepare = lambda name, values: Prepared(values[name] if name == "COUNT" else None)
+    parameters.prepare = lambda names, values: Prepared(values["COUNT"] if "COUNT" in names else None)
     assert parameters.set("COUNT", 4) is None
     assert parameters.set("ANY", 1) is None
     assert parameters.take_made() == 4
@@ -90,10 +90,10 @@ def test_a_prepared_value_is_returned_with_its_change(parameters: Parameters) ->
 
 
 def test_the_check_sees_all_values_and_can_refuse(parameters: Parameters) -> None:
-    seen: list[tuple[str, Mapping[str, Value]]] = []
+    seen: list[tuple[list[str], Mapping[str, Value]]] = []
 
-    def prepare(name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
-        seen.append((name, values))
+    def prepare(names: Collection[str], values: Mapping[str, Value]) -> Prepared | ParamError:
+        seen.append((list(names), values))
         return ParamError.PERMISSION_DENIED if values["COUNT"] + values["ANY"] > 8 else Prepared()
 
     parameters.prepare = prepare
@@ -102,8 +102,30 @@ def test_the_check_sees_all_values_and_can_refuse(parameters: Parameters) -> Non
     assert parameters["ANY"] == 0
     assert parameters.set("ANY", 3) is None
     assert parameters.set("COUNT", 99) == ParamError.VALUE_OUT_OF_RANGE
-    assert seen[1] == ("ANY", {**parameters.values, "ANY": 4})
+    assert seen[1] == (["ANY"], {**parameters.values, "ANY": 4})
     assert len(seen) == 3
+
+
+def test_proposed_changes_are_prepared_at_once(parameters: Parameters) -> None:
+    """Of a batch that is refused, the halves are tried; a second value for a name waits for the first."""
+    tried: list[Mapping[str, Value]] = []
+
+    def prepare(names: Collection[str], values: Mapping[str, Value]) -> Prepared | ParamError:
+        tried.append({name: values[name] for name in names})
+        return ParamError.PERMISSION_DENIED if values["ANY"] == 13 else Prepared()
+
+    parameters.prepare = prepare
+    assert [parameters.propose(*each) for each in (("COUNT", 4), ("SPEED", 0.5), ("TRACK", 2))] == [True] * 3
+    parameters.settle()
+    assert (tried.pop(), len(parameters.settled)) == ({"COUNT": 4, "SPEED": 0.5, "TRACK": 2}, 3)
+    parameters.settled.clear()
+    changes = (("COUNT", 5), ("ANY", 13), ("TRACK", 0), ("COUNT", 6), ("COUNT", 99), ("ID", 7))
+    assert [parameters.propose(*each) for each in changes] == [True] * 4 + [ParamError.VALUE_OUT_OF_RANGE, False]
+    while parameters.proposed:
+        parameters.settle()
+    refused = [name for name, refusal in parameters.settled if refusal is not None]
+    assert (refused, tried[-1]) == (["ANY"], {"COUNT": 6})
+    assert [parameters[name] for name in ("COUNT", "ANY", "TRACK")] == [6, 0, 0]
 
 
 def test_loading_and_resetting(parameters: Parameters) -> None:

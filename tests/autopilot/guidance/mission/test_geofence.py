@@ -3,11 +3,12 @@
 from math import atan2, cos, hypot, inf, nan, pi, sin
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from colibri.autopilot.guidance.mission.geofence import FENCE_RULES, Disc, Geofence, Polygon
+from colibri.autopilot.guidance.mission.geofence import FENCE_RULES, Discs, Geofence, Polygons
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.dialect import mav
@@ -16,6 +17,7 @@ from tests.support.strategies import reals
 
 IN, OUT, DISC_IN, DISC_OUT, BACK = 5001, 5002, 5003, 5004, 5000
 SQUARE = [(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)]
+DIAMOND = [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)]
 HOLE = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
 HOUR_GLASS = [(0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0)]
 HORSESHOE = [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (4.0, 6.0), (4.0, 2.0), (2.0, 2.0), (2.0, 6.0), (0.0, 6.0)]
@@ -35,6 +37,11 @@ def fence(*items: MissionItem) -> Geofence:
     assert all(FENCE_RULES.check_item(each) == ACCEPTED for each in items)
     assert FENCE_RULES.check_plan(items) == ACCEPTED
     return Geofence(items, DEFAULT_ORIGIN)
+
+
+def depth_m(zones: Discs | Polygons, east: float, north: float) -> float:
+    """Return the depth inside the first of the zones."""
+    return float(zones.depths_m(np.array([[east, north]]))[0, 0])
 
 
 def test_no_fence_holds_nothing_back() -> None:
@@ -88,13 +95,13 @@ def test_return_points_are_accepted_and_ignored() -> None:
 
 def test_level_with_a_corner() -> None:
     """A ray through a corner crosses once."""
-    diamond = Polygon([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
-    assert diamond.depth_m(0.0, 0.0) == pytest.approx(0.5**0.5)
-    assert diamond.depth_m(-2.0, 0.0) == pytest.approx(-1.0)
-    assert diamond.depth_m(-2.0, 1.0) == pytest.approx(-(2.0**0.5))
-    assert Polygon(HORSESHOE).depth_m(3.0, 5.0) == pytest.approx(-1.0)
-    assert Polygon(HORSESHOE).depth_m(1.0, 5.0) == pytest.approx(1.0)
-    assert Polygon(HOUR_GLASS).depth_m(2.0, 1.0) < 0.0 < Polygon(HOUR_GLASS).depth_m(3.5, 2.0)
+    diamond, horseshoe, glass = (Polygons([each]) for each in (DIAMOND, HORSESHOE, HOUR_GLASS))
+    assert depth_m(diamond, 0.0, 0.0) == pytest.approx(0.5**0.5)
+    assert depth_m(diamond, -2.0, 0.0) == pytest.approx(-1.0)
+    assert depth_m(diamond, -2.0, 1.0) == pytest.approx(-(2.0**0.5))
+    assert depth_m(horseshoe, 3.0, 5.0) == pytest.approx(-1.0)
+    assert depth_m(horseshoe, 1.0, 5.0) == pytest.approx(1.0)
+    assert depth_m(glass, 2.0, 1.0) < 0.0 < depth_m(glass, 3.5, 2.0)
 
 
 MILLIMETRES = st.integers(-100_000, 100_000).map(lambda number: number / 1000.0)
@@ -104,8 +111,8 @@ MILLIMETRES = st.integers(-100_000, 100_000).map(lambda number: number / 1000.0)
 def test_a_polygon_has_the_sum_of_angles_as_its_measure(
     vertices: list[tuple[float, float]], east: float, north: float
 ) -> None:
-    depth = Polygon(vertices).depth_m(east, north)
-    assert Polygon(vertices[::-1]).depth_m(east, north) == pytest.approx(depth, abs=1e-9)
+    depth = depth_m(Polygons([vertices]), east, north)
+    assert depth_m(Polygons([vertices[::-1]]), east, north) == pytest.approx(depth, abs=1e-9)
     assume(abs(depth) > 1e-6)
     turned = 0.0
     for (a, b), (c, d) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
@@ -116,13 +123,23 @@ def test_a_polygon_has_the_sum_of_angles_as_its_measure(
 
 @given(reals(100.0), reals(100.0), st.floats(0.0, 2.0 * pi), st.floats(0.1, 50.0))
 def test_nothing_closer_than_the_margin_changes_sides(east: float, north: float, angle: float, part: float) -> None:
-    for zone in (Polygon(HORSESHOE), Disc(1.0, 2.0, 30.0)):
-        depth = zone.depth_m(east, north)
+    for zone in (Polygons([HORSESHOE]), Discs([(1.0, 2.0)], [30.0])):
+        depth = depth_m(zone, east, north)
         step = min(part, max(0.999 * abs(depth) - 1e-9, 0.0))
-        there = zone.depth_m(east + step * cos(angle), north + step * sin(angle))
+        there = depth_m(zone, east + step * cos(angle), north + step * sin(angle))
         assert there * depth >= 0.0 or abs(depth) < 1e-9
         assert abs(there - depth) <= step + 1e-9
-    assert Disc(0.0, 0.0, 1.0).depth_m(east, north) == 1.0 - hypot(east, north)
+    unit = Discs([(0.0, 0.0)], [1.0])
+    assert depth_m(unit, east, north) == pytest.approx(1.0 - hypot(east, north), abs=1e-12)
+
+
+def test_many_places_have_the_margins_of_each() -> None:
+    zones = [*polygon(IN, SQUARE), item(DISC_OUT, 6.0, 6.0, 1.0), *polygon(OUT, HOLE), item(DISC_IN, 0.0, 0.0, 9.0)]
+    around, places = fence(*zones), [(0.7 * i - 12.0, 0.5 * i - 9.0) for i in range(40)]
+    margins = around.margins_m(np.array(places)).tolist()
+    assert margins == [around.margin_m((*place, 0.0)) for place in places]
+    alone = [fence(*zone).margin_m((*places[20], 0.0)) for zone in (zones[:4], zones[4:5], zones[5:9], zones[9:])]
+    assert margins[20] == min(alone)
 
 
 @pytest.mark.parametrize(

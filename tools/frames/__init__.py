@@ -1,0 +1,1 @@
+"""The time that a frame takes of the autopilot, whatever ground stations request."""

@@ -1,0 +1,267 @@
+"""Requests of ground stations that cost a vehicle the most, one function for each kind."""
+
+from collections.abc import Callable, Iterator, Mapping
+from math import cos, nan, pi, sin
+from struct import pack
+
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode
+from colibri.autopilot.parameters.behaviour import TRACKS
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
+from colibri.mavlink.parameters.store import Kind, Parameter, bits_of
+from colibri.mavlink.telemetry.table import telemetry
+from colibri.mavlink.wire.dialect import Bits, Codec, mav
+from tools.fuzz.flight import BareFlight
+from tools.fuzz.vehicle import HIGH
+from tools.harness.client import COMPONENT, SYSTEM, Client
+
+TO = (SYSTEM, COMPONENT)
+STATIONS = 32
+ITEMS, TRIANGLES = 900, 330
+_LIST, _OPEN, _BURST, _CHECKSUM, _CREATE = 3, 4, 15, 14, 6
+
+Request = Callable[[BareFlight], Iterator[list[bytes]]]
+"""Yields what is sent at each frame: one datagram of all these messages, at most 4 kB of them."""
+
+
+def item(command: int, east_m: float, north_m: float, up_m: float = 10.0, p1: float = 0.0) -> MissionItem:
+    place = geodetic_of((east_m, north_m, 0.0), DEFAULT_ORIGIN)
+    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+    return MissionItem(mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, command, 1, p1, 0.0, 0.0, nan, x, y, up_m)
+
+
+def mission(items: int = ITEMS) -> list[MissionItem]:
+    return [item(mav.MAV_CMD_NAV_WAYPOINT, 50.0 * cos(i), 50.0 * sin(i)) for i in range(items)]
+
+
+def fence(triangles: int = TRIANGLES) -> list[MissionItem]:
+    """Return exclusion triangles on a circle of 500 m."""
+    vertex = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+    centers = [(500.0 * cos(2 * pi * i / triangles), 500.0 * sin(2 * pi * i / triangles)) for i in range(triangles)]
+    corners = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    return [item(vertex, x + dx, y + dy, p1=3.0) for x, y in centers for dx, dy in corners]
+
+
+def load(flight: BareFlight, *, items: int = ITEMS, triangles: int = TRIANGLES) -> None:
+    flight.copter.stations.plans.load(FENCE, fence(triangles))
+    flight.copter.stations.plans.load(MISSION, mission(items))
+
+
+class Sender:
+    """Encodes the messages of one ground station."""
+
+    def __init__(self, flight: BareFlight) -> None:
+        self.flight, self._codec = flight, Codec(255, 190)
+
+    def __call__(self, name: str, *fields: object) -> bytes:
+        return self._codec.encode(name, *fields)
+
+    def command(self, number: int, *params: float) -> bytes:
+        return self("COMMAND_LONG", *TO, number, 0, *params, *(0.0,) * (7 - len(params)))
+
+    def sets(self, parameter: Parameter, share: float) -> bytes:
+        """Set a parameter off its default by a share of its value, or to another of its values."""
+        default = parameter.default
+        value = default * (1.0 + share) if isinstance(default, float) else default + 1
+        value = min(max(value, parameter.minimum), parameter.maximum)
+        if parameter.kind == Kind.INT:
+            value = int(value)
+        bits = Bits(bits_of(parameter.kind, value))
+        return self("PARAM_SET", *TO, parameter.name.encode(), bits, parameter.kind)
+
+    def file(self, opcode: int, path: bytes = b"/", *, session: int = 0, offset: int = 0) -> bytes:
+        payload = pack("<HBBBBBBI", 0, session, opcode, len(path), 0, 0, 0, offset) + path
+        return self("FILE_TRANSFER_PROTOCOL", 0, *TO, payload.ljust(251, b"\0"))
+
+
+def _parameters(*prefixes: str) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        send = Sender(flight)
+        chosen = [p for p in flight.copter.parameters if p.name.startswith(prefixes) and not p.read_only]
+        for share in (0.001, 0.002):
+            yield [send.sets(chosen[i % len(chosen)], share * (1 + i // len(chosen))) for i in range(120)]
+
+    return request
+
+
+def _each_parameter(flight: BareFlight) -> Iterator[list[bytes]]:
+    send = Sender(flight)
+    for parameter in flight.copter.parameters:
+        yield [send.sets(parameter, 0.001)]
+
+
+def _commands(number: int, *params: float, count: int = 80, planned: bool = True) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        if planned:
+            load(flight)
+        send = Sender(flight)
+        yield []
+        yield [send.command(number, *params[:-1], params[-1] + 1e-3 * i) for i in range(count)]
+
+    return request
+
+
+def _upload(plan_type: int, items: list[MissionItem], first: Mapping[int, list[MissionItem]] = {}) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        for kind, plan in first.items():
+            flight.copter.stations.plans.load(kind, plan)
+        send = Sender(flight)
+        yield [send("MISSION_COUNT", *TO, len(items), plan_type)]
+        for at in range(0, len(items), 60):
+            whole = list(enumerate(items))[at : at + 60]
+            yield [send("MISSION_ITEM_INT", *TO, i, *each[:2], 0, *each[2:], plan_type) for i, each in whole]
+
+    return request
+
+
+def _files(opcode: int, path: bytes, count: int) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        send = Sender(flight)
+        yield [send.file(opcode, path, session=i) for i in range(count)]
+
+    return request
+
+
+def _bursts(flight: BareFlight) -> Iterator[list[bytes]]:
+    send = Sender(flight)
+    yield [send.file(_OPEN, b"/big", session=i) for i in range(8)]
+    yield [send.file(_BURST, session=i) for i in range(8)]
+
+
+def _others(flight: BareFlight) -> list[Client]:
+    return [flight.add(Client(port=20_000 + i)) for i in range(STATIONS - 1)]
+
+
+def _streams(flight: BareFlight) -> Iterator[list[bytes]]:
+    names = telemetry(0)
+    for client in _others(flight):
+        for name in names:
+            number = getattr(mav, f"MAVLINK_MSG_ID_{name}", 0)
+            client.send("COMMAND_LONG", *TO, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0, number, 4000.0, *(0.0,) * 5)
+    yield []
+
+
+def _groups(flight: BareFlight) -> Iterator[list[bytes]]:
+    send = Sender(flight)
+    yield [send("REQUEST_DATA_STREAM", *TO, 0, 1 + i % 50, 1) for i in range(200)]
+
+
+def _lists(flight: BareFlight) -> Iterator[list[bytes]]:
+    for client in _others(flight):
+        client.send("PARAM_REQUEST_LIST", *TO)
+        client.send("LOG_REQUEST_LIST", *TO, 0, 0xFFFF)
+    yield []
+
+
+def _broadcast(flight: BareFlight) -> Iterator[list[bytes]]:
+    _others(flight)
+    yield from _parameters("MPC", "MIS", "NAV")(flight)
+
+
+def _forwarded(flight: BareFlight) -> Iterator[list[bytes]]:
+    _others(flight)
+    send = Sender(flight)
+    yield [send("PING", 0, i, 0, 0) for i in range(120)]
+
+
+def _repeated(name: str, *fields: object, count: int) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        send = Sender(flight)
+        yield [send(name, *fields) for _ in range(count)]
+
+    return request
+
+
+def _planned(name: str, *fields: object, count: int) -> Request:
+    def request(flight: BareFlight) -> Iterator[list[bytes]]:
+        load(flight)
+        yield []
+        yield from _repeated(name, *fields, count=count)(flight)
+
+    return request
+
+
+def _tracks(flight: BareFlight) -> Iterator[list[bytes]]:
+    number = custom_mode(Mode.TRACK)
+    send = Sender(flight)
+    for index, _ in enumerate(TRACKS):
+        yield [
+            send("PARAM_SET", *TO, b"TRACK", Bits(index), Kind.INT),
+            send.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24),
+        ]
+        yield []
+        yield [send.command(mav.MAV_CMD_NAV_LOITER_UNLIM)]
+
+
+def _disarmed(flight: BareFlight) -> Iterator[list[bytes]]:
+    send = Sender(flight)
+    for parameter in flight.copter.parameters:
+        if not parameter.read_only:
+            flight.copter.parameters.set(parameter.name, parameter.minimum)
+    flight.copter.pilot.disarm(force=True)
+    yield []
+    yield [send.command(mav.MAV_CMD_PREFLIGHT_STORAGE, 2.0)]
+
+
+def _garbage(byte: bytes) -> Request:
+    def request(_: BareFlight) -> Iterator[list[bytes]]:
+        yield [byte * 4096][:1]
+        yield [(byte * 4096)[:4096]]
+
+    return request
+
+
+def _old_frames(flight: BareFlight) -> Iterator[list[bytes]]:
+    del flight
+    sender = mav.MAVLink(None, srcSystem=255, srcComponent=190)
+    heartbeat = mav.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(sender, force_mavlink1=True)
+    yield [bytes(heartbeat)] * (4096 // len(heartbeat))
+
+
+_SHELL = b"param\n" * 11
+REQUESTS: Mapping[str, Request] = {
+    "120 parameters of the law": _parameters("LPV", "WHL"),
+    "120 parameters of the vehicle": _parameters("VEH"),
+    "120 parameters of the behaviour": _parameters("MPC", "MIS", "NAV"),
+    "120 parameters of failsafes": _parameters("COM", "BAT", "GF"),
+    "120 parameters, 32 stations": _broadcast,
+    "each parameter alone": _each_parameter,
+    "reset of all parameters": _disarmed,
+    "lists of parameters and logs, 32 stations": _lists,
+    "mission of 900 items": _upload(MISSION, mission(), {FENCE: fence()}),
+    "fence of 330 triangles": _upload(FENCE, fence(), {MISSION: mission()}),
+    "80 orbits": _commands(mav.MAV_CMD_DO_ORBIT, 5.0, 2.0, 0.0, 0.0, nan, nan, nan),
+    "80 new homes": _commands(mav.MAV_CMD_DO_SET_HOME, 1.0, 0.0),
+    "100 new origins": _planned("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473977420, 85455940, 488000, 0, count=100),
+    "80 plans cleared": _planned("MISSION_CLEAR_ALL", *TO, 255, count=80),
+    "120 mission items read": _planned("MISSION_REQUEST_INT", *TO, 5, 0, count=120),
+    "130 turns of the mission": _planned("MISSION_SET_CURRENT", *TO, 3, count=130),
+    "15 listings of 1000 files": _files(_LIST, b"/", 15),
+    "15 checksums of 8 MB": _files(_CHECKSUM, b"/big", 15),
+    "15 packed parameter files": _files(_OPEN, b"@PARAM/param.pck", 15),
+    "15 new files": _files(_CREATE, b"/new", 15),
+    "8 bursts": _bursts,
+    "200 lists of logs": _repeated("LOG_REQUEST_LIST", *TO, 0, 0xFFFF, count=200),
+    "all logs erased": _repeated("LOG_ERASE", *TO, count=200),
+    "50 lines of the shell": _repeated("SERIAL_CONTROL", 10, 6, 0, 0, 66, _SHELL.ljust(70, b"\0"), count=45),
+    "32 stations at 250 Hz": _streams,
+    "200 groups of streams": _groups,
+    "120 pings to 32 stations": _forwarded,
+    "120 requests of messages": _commands(
+        mav.MAV_CMD_REQUEST_MESSAGE, mav.MAVLINK_MSG_ID_AVAILABLE_MODES, 0.0, count=95
+    ),
+    "each track": _tracks,
+    "300 heartbeats": _repeated("HEARTBEAT", 6, 8, 0, 0, 4, 3, count=190),
+    "4 kB of markers": _garbage(b"\xfd"),
+    "4 kB of old markers": _garbage(b"\xfe"),
+    "4 kB of noise": _garbage(b"\x00"),
+    "4 kB of MAVLink 1": _old_frames,
+}
+
+
+def in_the_air(flight: BareFlight) -> None:
+    """Put the vehicle into the air, in hold."""
+    flight.reset_world(HIGH)
+    flight.copter.pilot.ground.take_off(0)
+    flight.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 21196.0)
+    flight.run(0.2)
