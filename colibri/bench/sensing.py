@@ -10,7 +10,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.bench.speed import Report, real_time_factor, sampled, summarised
 from colibri.bench.stages import summary
-from colibri.bench.variants import plan_of
+from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.flights.flight import SYSTEM_ID
 from colibri.flights.fly import fly_plan
@@ -21,7 +21,6 @@ from colibri.mavlink.ulog.inputs import InputRecord, Kind
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import load_vehicle
 
-TRACK = "spiral"
 FRAME_US, CONTROL_US = 4_000, 8_000
 LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
