@@ -38,3 +38,26 @@ def refusal(headers: Mapping[str, str], port: int) -> str | None:
     if origin not in {f"http://{name}:{port}" for name in _OURS}:
         return f"{origin} may not use this page"
     return None
+
+
+def content_policy(port: int, nonce: str) -> dict[str, str]:
+    """Return headers by which a browser runs the page's own scripts only, and connects to this server only."""
+    sources = {
+        "default-src": "'none'",
+        "script-src": f"'nonce-{nonce}' 'wasm-unsafe-eval'",
+        "worker-src": "blob:",
+        "connect-src": " ".join(
+            ["data: blob:", *(f"{kind}://{name}:{port}" for kind in ("http", "ws") for name in _OURS)]
+        ),
+        "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:",
+        "font-src": "data:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+        "frame-ancestors": "'none'",
+    }
+    return {
+        "Content-Security-Policy": "; ".join(f"{what} {allowed}" for what, allowed in sources.items()),
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+    }

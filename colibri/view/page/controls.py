@@ -1,6 +1,7 @@
 """The left panel; user actions go into a queue."""
 
 from collections.abc import Sequence
+from html import escape
 from queue import SimpleQueue
 from typing import Any, NamedTuple
 
@@ -10,6 +11,8 @@ import viser
 from colibri.view.page.scene import COLOURS, LAYERS
 from colibri.view.recorded.playback import SPEEDS
 from colibri.view.snapshot import Snapshot
+
+_STYLE = "margin:0 0.75rem 0.75rem;font-size:0.875rem;line-height:1.55;overflow-wrap:anywhere"
 
 
 class Done(NamedTuple):
@@ -24,7 +27,7 @@ class Controls:
 
     def __init__(self, gui: viser.GuiApi, span_s: tuple[float, float] | None, scale: float) -> None:
         self.done: SimpleQueue[Done] = SimpleQueue()
-        self._words = gui.add_markdown("")
+        self._words = gui.add_html("")
         self._play: viser.GuiButtonHandle | None = None
         self._slider: viser.GuiSliderHandle[float] | None = None
         if span_s is not None:
@@ -70,7 +73,8 @@ class Controls:
 
 
 def words(names: Sequence[str], snapshots: Sequence[Snapshot]) -> str:
-    return "\n\n".join(
+    """Return HTML, in which names and texts of flights and vehicles are text."""
+    return "".join(
         _of_one(name, "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)]), now)
         for number, (name, now) in enumerate(zip(names, snapshots, strict=True))
     )
@@ -90,11 +94,16 @@ def _of_one(name: str, colour: str, now: Snapshot) -> str:
     if np.isfinite(error):
         facts.append(f"error {error:.3f} m")
     lines = [
-        f"**<span style='color:{colour}'>■</span> {name}** {' · '.join(filter(None, (now.mode, armed)))}",
-        " · ".join(filter(None, facts)),
-        *(f"*{text}*" for text in now.texts),
+        f"<b><span style='color:{colour}'>■</span> {_text(name)}</b> "
+        f"{_text(' · '.join(filter(None, (now.mode, armed))))}",
+        _text(" · ".join(filter(None, facts))),
+        *(f"<i>{_text(text)}</i>" for text in now.texts),
     ]
-    return "  \n".join(lines)
+    return f"<p style='{_STYLE}'>{'<br>'.join(lines)}</p>"
+
+
+def _text(foreign: str) -> str:
+    return escape("".join(letter if letter.isprintable() else "\ufffd" for letter in foreign))
 
 
 def _widened(span_s: tuple[float, float]) -> tuple[float, float]:

@@ -1,5 +1,6 @@
-"""The server of the page: viser on loopback, with access control."""
+"""The server of the page: viser on loopback, with access control and a Content-Security-Policy."""
 
+import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from http import HTTPStatus
@@ -11,7 +12,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from colibri.view.access import HOST, refusal
+from colibri.view.access import HOST, content_policy, refusal
 from colibri.view.snapshot import ViewError
 
 _Answer = Callable[[ServerConnection, Request], Response | None]
@@ -64,10 +65,24 @@ def _guarded() -> Iterator[list[str]]:
 
 
 def _looks_first(answer: _Answer) -> _Answer:
+    nonce = secrets.token_urlsafe()
+
     def look(connection: ServerConnection, request: Request) -> Response | None:
         port = connection.local_address[1]
         if why := refusal(request.headers, port):
             return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
-        return answer(connection, request)
+        request.headers.pop("Accept-Encoding", None)
+        response = answer(connection, request)
+        if response is not None:
+            response.body = _with_nonce(response.body, nonce.encode())
+            response.headers.pop("Content-Length", None)
+            response.headers.update(content_policy(port, nonce), **{"Content-Length": str(len(response.body))})
+        return response
 
     return look
+
+
+def _with_nonce(page: bytes, nonce: bytes) -> bytes:
+    """Mark viser's loader, and the script that it unpacks and starts, as the page's own."""
+    page = page.replace(b"<script ", b'<script nonce="%s" ' % nonce)
+    return page.replace(b'createElement("script");', b'createElement("script");e.nonce="%s";' % nonce)

@@ -1,13 +1,15 @@
 """Who may use the page, asked as a browser would, at a server that runs."""
 
 import http.client
+import re
 from collections.abc import Iterator
 
 import pytest
 
 from colibri.view.access import Token, refusal
+from colibri.view.page.controls import words
 from colibri.view.page.server import PageServer, serve, stop
-from colibri.view.snapshot import ViewError
+from colibri.view.snapshot import Snapshot, ViewError
 
 CONNECTS = {
     "Upgrade": "websocket",
@@ -58,6 +60,34 @@ def test_the_page_is_served_under_its_own_names_alone(server: PageServer) -> Non
     port = server.get_port()
     assert status(server, {"Host": f"localhost:{port}"}) == 200
     assert status(server, {"Host": f"rebound.example:{port}"}) == 403
+
+
+def test_only_marked_scripts_run_on_the_page(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20.0)
+    connection.request("GET", "/", headers={"Accept-Encoding": "gzip"})
+    answer = connection.getresponse()
+    page, policy = answer.read().decode(), answer.headers["Content-Security-Policy"]
+    connection.close()
+    (nonce,) = re.findall(r"script-src 'nonce-([^']+)' 'wasm-unsafe-eval';", policy)
+    assert "default-src 'none'" in policy
+    assert page.count("<script ") == page.count(f'<script nonce="{nonce}" ') == 1
+    assert page.count('createElement("script")') == page.count(f'createElement("script");e.nonce="{nonce}";') == 1
+
+
+def test_names_and_texts_from_outside_are_text() -> None:
+    hostile = "</p><img src=x onerror='alert(1)'> **bold** &lt;\n\x1b"
+    now = Snapshot(
+        time_s=0.0,
+        position_enu_m=(0.0,) * 3,
+        attitude=(1.0, 0.0, 0.0, 0.0),
+        mode=hostile,
+        battery=hostile,
+        texts=(hostile,),
+    )
+    shown = words([hostile], [now])
+    assert "<img" not in shown
+    assert shown.count("</p>") == 1
+    assert shown.count("&lt;/p&gt;&lt;img src=x onerror=&#x27;alert(1)&#x27;&gt; **bold** &amp;lt;\ufffd\ufffd") == 4
 
 
 def test_no_tunnel_leads_to_it(server: PageServer) -> None:

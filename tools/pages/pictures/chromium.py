@@ -20,7 +20,8 @@ FLAGS = (
 SIZE = (1280, 800)
 WITHIN_MS = 60_000
 """How long anything may take: without a GPU, on a computer that does other things too, seconds a picture."""
-_KNOWN_WARNINGS = ("THREE.Clock",)
+_KNOWN_WARNINGS = ("THREE.Clock", "Evaluating a string as JavaScript")
+"""The second: viser's sorter of Gaussian splats, of which the page has none, is refused to compile text."""
 
 
 class Tab:
@@ -31,7 +32,7 @@ class Tab:
         self.complaints: list[str] = []
         page.set_default_timeout(WITHIN_MS)
         page.on("console", lambda message: self._console(message.type, message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("pageerror", lambda error: self._console("error", str(error)))
         page.on("request", lambda request: self._request(request.url))
         page.goto(url)
 
