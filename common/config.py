@@ -12,6 +12,8 @@ from colibri.common.files import read_bytes
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)
+"""Raised for content that is not valid: `RecursionError` for nesting, a `ValueError` for text that is not UTF-8."""
 T = TypeVar("T")
 
 
@@ -48,7 +50,7 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     except UnicodeDecodeError as reason:
         line = reason.object.count(b"\n", 0, reason.start) + 1
         raise error(f"{path}: line {line}: is not UTF-8: save the file as that") from reason
-    except (msgspec.DecodeError, ValueError) as reason:
+    except UNREADABLE as reason:
         raise error(f"{path}: {reason}") from reason
 
 

@@ -1,4 +1,4 @@
-"""The base of all errors shown to users, and the message for an unknown name."""
+"""The base of all errors shown to users, the message for an unknown name, and values in messages."""
 
 from collections.abc import Iterable
 
@@ -23,7 +23,17 @@ def unknown(what: str, given: object, known: Iterable[str]) -> str:
     """Return the message for an unknown name, with the closest match or all valid names."""
     from difflib import get_close_matches
 
-    names = [str(name) for name in known]
-    near = get_close_matches(str(given), names, 1)
+    names, text = [str(name) for name in known], shown(given)
+    near = get_close_matches(text, names, 1)
     hint = f'did you mean "{near[0]}"?' if near else f"choose {', '.join(names)}"
-    return f'unknown {what} "{given}" ({hint})'
+    return f'unknown {what} "{text}" ({hint})'
+
+
+def shown(given: object, most: int = 60) -> str:
+    """Return a value for a message: control characters escaped, and cut to `most` characters."""
+    text = str(given)
+    whole = text if len(text) <= most else f"{text[: most // 2]}…{text[-(most // 2) :]}"
+    return "".join(
+        letter if letter.isprintable() or letter == "\n" else letter.encode("unicode_escape").decode()
+        for letter in whole
+    )

@@ -17,7 +17,7 @@ def of_bytes(kind: type[Data], content: bytes) -> Data | None:
     """Decode `to_bytes`; `None` if the content is invalid."""
     try:
         return msgspec.msgpack.decode(content, type=kind, dec_hook=_decoded)
-    except (msgspec.DecodeError, TypeError, ValueError):
+    except (msgspec.DecodeError, TypeError, ValueError, RecursionError):
         return None
 
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, ge
 
 import msgspec
 
+from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error, unknown
 
 ENDLESS = "max"
@@ -296,6 +297,6 @@ def to_json(spec: object) -> bytes:
 def from_json(spec: type[S], text: bytes) -> S:
     try:
         values = msgspec.json.decode(text, type=dict[str, Any])
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         raise SpecError(f"no specification: {error}") from error
     return from_values(spec, values)

@@ -8,6 +8,7 @@ import msgspec
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.spec import AutopilotSpec, name_of
+from colibri.common.config import UNREADABLE
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
@@ -111,7 +112,7 @@ def read_inputs(records: Iterable[InputRecord]) -> Inputs:
             continue
         try:
             what = _DECODER.decode(content)
-        except msgspec.MsgspecError as error:
+        except UNREADABLE as error:
             raise InputsError(f"input at t = {time_us * 1e-6:.3f} s: {error}") from error
         if isinstance(what, Setup):
             inputs.setups[time_us] = what

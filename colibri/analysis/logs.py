@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from colibri.common.errors import InFlightError
 from colibri.common.types import Array
-from colibri.mavlink.ulog.flight_topics import Topic
+from colibri.mavlink.ulog.flight_topics import DECISION, TRUTH, Topic
 from colibri.mavlink.ulog.log import TopicReader
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 _AT_ONCE = 4096
+_MOST = 1e100
+"""Powers of the values that analysis takes are finite up to there."""
+_FINITE = {TRUTH.name: list(range(18)), DECISION.name: [*range(6), *range(10, 14)]}
+"""Columns that are finite in every flight: states and rotor speeds, references and codes."""
 _NUMBERS = msgspec.json.Encoder()
 
 
@@ -38,7 +42,16 @@ def read_blocks(log: TopicReader, topic: Topic, wanted: NDArray[np.bool_] | None
             first += len(block)
             block = block[: len(chosen)][chosen]
         if len(block):
+            _check(topic, block)
             yield block
+
+
+def _check(topic: Topic, block: Array) -> None:
+    """Refuse rows without a state or decision: the file is damaged, or the flight diverged."""
+    sound = (np.abs(block[:, _FINITE.get(topic.name, [0])]) < _MOST).all(axis=1)
+    if not sound.all():
+        row = int(np.argmin(sound))
+        raise RecordingError(f"{topic.name} at t = {block[row, 0]:g} s: not a finite number: the log is damaged")
 
 
 def read_series(log: TopicReader, topic: Topic, *columns: str) -> list[Array]:

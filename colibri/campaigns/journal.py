@@ -15,6 +15,7 @@ from colibri.autopilot.control.registry import controller_names, origin_of, orig
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flights import Common, Flown
 from colibri.campaigns.values import CampaignError, shown
+from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes, regular
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
@@ -70,8 +71,8 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
                 os.fsync(file.fileno())
             scratch.replace(path)
             return False
-        was, wanted = (msgspec.json.decode(content) for content in (read_bytes(path), now))
-    except (OSError, msgspec.DecodeError) as error:
+        was, wanted = (msgspec.json.decode(content, type=dict[str, Any]) for content in (read_bytes(path), now))
+    except (OSError, *UNREADABLE) as error:
         raise CampaignError(f"cannot use --out {folder}: {error}") from error
     if was != wanted:
         differs = ", ".join(sorted(name for name in {*was, *wanted} if was.get(name) != wanted.get(name)))
@@ -141,7 +142,7 @@ def read_journal(path: Path) -> list[Flown]:
     for number, line in enumerate(content[:whole].splitlines(), start=1):
         try:
             kept.append(msgspec.json.decode(line, type=Flown))
-        except msgspec.DecodeError as error:
+        except UNREADABLE as error:
             raise CampaignError(
                 f"{path}: line {number}: {error}: remove the line, its flight is flown again"
             ) from error

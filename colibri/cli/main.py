@@ -55,7 +55,9 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_FAILED
     except OSError as error:
         if error.errno not in _NO_ROOM:
-            raise
+            if error.filename is None:
+                raise
+            fail(f"{error.filename}: {error.strerror}", EXIT_FAILED)
         _drop_what_cannot_be_printed()
         fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", EXIT_FAILED)
     except KeyboardInterrupt as ended:

@@ -5,7 +5,7 @@ Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/pla
 
 import json
 from collections.abc import Iterator
-from math import dist, isfinite, radians
+from math import dist, radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from colibri.autopilot.guidance.trajectories.waypoint_file import DEFAULT_SPEED_M_S, MIN_LEG_S, Waypoints, leg_times
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
+from colibri.common.errors import shown
 from colibri.common.files import read_text
 from colibri.common.types import Vector
 from colibri.companion.errors import CompanionError
@@ -21,6 +22,8 @@ from colibri.mavlink.wire.dialect import mav
 
 SUFFIX = ".plan"
 _EAST_DEG = 90.0
+_MOST = 1e6
+"""Limit of numbers, and of the mission's duration in seconds."""
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _ENDS = {mav.MAV_CMD_NAV_LAND: "landing", mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "return"}
 
@@ -59,7 +62,10 @@ class MissionPlan(NamedTuple):
         points, headings = np.array(places), [point.heading_deg for point in self.points]
         looks = [radians(_EAST_DEG - heading) for heading in headings if heading is not None]
         yaw = np.unwrap(looks) if len(looks) == len(points) else None
-        return Waypoints(self.path, leg_times(points, self.speed_m_s), points, yaw, timed=False)
+        times_s = leg_times(points, self.speed_m_s)
+        if not times_s[-1] <= _MOST:
+            raise CompanionError(f"{self.path}: takes {times_s[-1]:g} s: {_MOST:g} s is the longest")
+        return Waypoints(self.path, times_s, points, yaw, timed=False)
 
 
 def read_plan(path: Path) -> MissionPlan:
@@ -71,7 +77,7 @@ def read_plan(path: Path) -> MissionPlan:
         speed_m_s = float(mission.get("hoverSpeed", DEFAULT_SPEED_M_S))
     except OSError as error:
         raise CompanionError(f"{path}: {error.strerror}") from error
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise CompanionError(f"{path}: no mission of QGroundControl: save it there as .plan") from error
     if not isinstance(items, list) or not is_on_earth(*planned[:2]) or not 0.0 < speed_m_s < float("inf"):
         raise CompanionError(f"{path}: no mission of QGroundControl: save it there as .plan")
@@ -97,7 +103,7 @@ def _items(path: Path, items: list[Any]) -> Iterator[tuple[int, dict[str, Any], 
     for number, item in enumerate(items, start=1):
         kind = item.get("complexItemType", item.get("type")) if isinstance(item, dict) else None
         if kind != "SimpleItem":
-            raise _refused(path, number, f"is no waypoint ({kind}): a track has none of it")
+            raise _refused(path, number, f"is no waypoint ({shown(kind)}): a track has none of it")
         command, numbers = item.get("command"), item.get("params")
         if not isinstance(command, int) or not isinstance(numbers, list) or len(numbers) != 7:
             raise _refused(path, number, "has no command with seven parameters")
@@ -116,7 +122,9 @@ def _point(path: Path, number: int, item: dict[str, Any], numbers: list[Any]) ->
 
 def _height(path: Path, number: int, item: dict[str, Any], numbers: list[Any]) -> float:
     if item.get("frame") not in _RELATIVE:
-        raise _refused(path, number, f"is not at a height above home (frame {item.get('frame')}): give it as relative")
+        raise _refused(
+            path, number, f"is not at a height above home (frame {shown(item.get('frame'))}): give it as relative"
+        )
     height_m = _number(path, number, numbers[6])
     if height_m <= 0.0:
         raise _refused(path, number, f"is {height_m:g} m above home: a vehicle does not fly there")
@@ -124,8 +132,8 @@ def _height(path: Path, number: int, item: dict[str, Any], numbers: list[Any]) -
 
 
 def _number(path: Path, number: int, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise _refused(path, number, f"has {value!r} where a number belongs")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MOST:
+        raise _refused(path, number, f"has '{shown(value)}' where a number belongs")
     return float(value)
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, TypeAlias
 
 import msgspec
 
-from colibri.common.config import NotNegative, Positive, Table
+from colibri.common.config import UNREADABLE, NotNegative, Positive, Table
 from colibri.common.files import read_text
 from colibri.companion.errors import CompanionError
 from colibri.companion.stacks.stack import Response
@@ -35,7 +35,7 @@ def read_response(path: Path) -> tuple[Response, float]:
         found = msgspec.toml.decode(text, type=ResponseFile)
     except (OSError, UnicodeDecodeError) as error:
         raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         raise CompanionError(f"{path}: {error}") from error
     response = Response(*(getattr(found, name) for name in Response._fields))
     return response, found.thrust_scale

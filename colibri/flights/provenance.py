@@ -12,6 +12,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import Origin, origin_of, origin_of_factory
 from colibri.autopilot.guidance.trajectories.loading import with_file
 from colibri.autopilot.spec import name_of
+from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
 from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import fail
@@ -109,7 +110,7 @@ def read_provenance(folder: Path) -> Provenance:
         raise ProvenanceError(f"{path} is missing: {folder} is no folder of a flight of this version") from error
     except OSError as error:
         raise ProvenanceError(f"cannot read {path}: {error.strerror}") from error
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         raise ProvenanceError(f"{path}: {error}") from error
 
 

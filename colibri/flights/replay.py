@@ -1,12 +1,13 @@
 """`colibri replay`: feed recorded frames to the autopilot and compare its commands."""
 
 import argparse
-import json
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import msgspec
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import DecisionError
@@ -19,6 +20,7 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.process.recorded_inputs import Inputs, InputsError, Setup, read_inputs
+from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.rotations import earth_from_body, euler_from_quaternion
@@ -238,10 +240,15 @@ def _changed(setups: Iterable[Setup]) -> list[str]:
     return list(dict.fromkeys(changed))
 
 
+class _Ended(msgspec.Struct):
+    sim_time_s: float
+
+
 def _ended_us(flight: _Flight) -> int:
     ended_s = max((float(block[-1, 0]) for block in flight.log.blocks(TRUTH)), default=0.0)
-    with suppress(OSError, ValueError, KeyError):
-        ended_s = max(ended_s, json.loads((flight.path.parent / "report.json").read_text("utf-8"))["sim_time_s"])
+    with suppress(OSError, *UNREADABLE):
+        content = (flight.path.parent / "report.json").read_bytes()
+        ended_s = max(ended_s, msgspec.json.decode(content, type=_Ended).sim_time_s)
     return round(1e6 * ended_s)
 
 

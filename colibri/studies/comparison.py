@@ -16,6 +16,7 @@ from colibri.campaigns.flights import Common, Flown, check, common_of, fly_point
 from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.values import CampaignError, shown
+from colibri.common.config import UNREADABLE
 from colibri.common.spec import keywords_of
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.provenance import provenance_of
@@ -91,7 +92,7 @@ def _keep_settings(path: Path, planned: Campaign, *, resume: bool) -> None:
     if resume and path.exists():
         try:
             was = msgspec.json.decode(path.read_bytes(), type=dict[str, str])
-        except msgspec.DecodeError as error:
+        except UNREADABLE as error:
             raise CampaignError(f"cannot read {path}: {error}; leave --resume out") from error
         changed = ", ".join(f"{name}={was.get(name)}, now {now[name]}" for name in now if was.get(name) != now[name])
         if changed:

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
+from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.folder import make_folder
@@ -81,7 +82,7 @@ def read_hashes(path: Path) -> dict[str, str]:
         fail(f"there are no golden hashes in {path}: say which FILE has them, or write them with --renew")
     except OSError as error:
         fail(f"cannot read {path}: {error.strerror}")
-    except msgspec.MsgspecError as error:
+    except UNREADABLE as error:
         fail(f"{path} holds no golden hashes, names and SHA-256 as one JSON object: {error}")
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from math import inf
+from os.path import realpath
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter, sleep
@@ -188,7 +189,7 @@ def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
 
 def _names(folders: Sequence[Path]) -> list[str]:
     """Return short unique names: the last parts of the paths."""
-    paths = [folder.resolve().parts for folder in folders]
+    paths = [Path(realpath(folder)).parts for folder in folders]
     if len(set(paths)) < len(paths):
         raise ViewError(f"{folders[0]} is given twice: name two flights")
     for count in range(1, max(map(len, paths)) + 1):

@@ -6,12 +6,16 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
+from colibri.common.errors import Error, shown
+
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
+_LONGEST_MESSAGE = 2000
+_MOST_NUDGE_M = 100.0
 
 
 def use_one_thread() -> None:
@@ -27,7 +31,13 @@ def use_safe_path() -> None:
 
 def nudge_m() -> float:
     """Return the offset of every flight's start, m: COLIBRI_NUDGE_M, which tests the tests."""
-    return float(os.environ.get("COLIBRI_NUDGE_M", "0"))
+    text = os.environ.get("COLIBRI_NUDGE_M", "0")
+    try:
+        if abs(offset_m := float(text)) <= _MOST_NUDGE_M:
+            return offset_m
+    except ValueError:
+        pass
+    raise Error(f'COLIBRI_NUDGE_M must be a number from -{_MOST_NUDGE_M:g} to {_MOST_NUDGE_M:g}, not "{shown(text)}"')
 
 
 @contextmanager
@@ -75,8 +85,9 @@ def end_quickly() -> None:
 
 
 def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
-    sys.stderr.write(f"colibri: error: {message}\n")
-    sys.stderr.flush()
+    with suppress(OSError):
+        sys.stderr.write(f"colibri: error: {shown(message, _LONGEST_MESSAGE)}\n")
+        sys.stderr.flush()
     raise SystemExit(code)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
+from colibri.common.errors import shown
 from colibri.common.files import read_text
 from colibri.common.types import Array
 
@@ -79,7 +80,7 @@ def _header(path: Path, cells: list[str], required: Collection[str], known: Coll
     for column in header:
         if column not in known or header.count(column) > 1:
             what = "twice" if column in known else "unknown"
-            raise TrackFileError(f"{path}: line 1, column {column}: {what}: choose {', '.join(known)}")
+            raise TrackFileError(f"{path}: line 1, column {shown(column)}: {what}: choose {', '.join(known)}")
     for column in required:
         if column not in header:
             raise TrackFileError(f"{path}: line 1, column {column}: missing")
@@ -94,7 +95,7 @@ def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int
         for column, cell in zip(header, cells, strict=False):
             if not _is_sane(cell):
                 limits = f"a number from {-_MAX_NUMBER:g} to {_MAX_NUMBER:g}"
-                raise TrackFileError(f"{path}: line {line}, column {column}: expected {limits}, not {cell!r}")
+                raise TrackFileError(f"{path}: line {line}, column {column}: expected {limits}, not '{shown(cell)}'")
         if len(cells) != len(header):
             column = header[len(cells)] if len(cells) < len(header) else str(len(header) + 1)
             what = "missing" if len(cells) < len(header) else "has no name in the header"

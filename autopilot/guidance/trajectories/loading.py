@@ -72,7 +72,7 @@ def file_text(name: str) -> str | None:
         return read_text(Path(path), "utf-8-sig")
     except OSError as error:
         raise TrackError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
+    except ValueError as error:
         raise TrackError(f"{path}: {error}") from error
 
 

@@ -10,7 +10,7 @@ from typing import NoReturn, Protocol, cast
 from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.common.process.arguments import ArgumentParser
 
-_MAX_WIDTH = 120
+_MIN_WIDTH, _MAX_WIDTH = 40, 120
 _NAME = 18
 
 
@@ -73,7 +73,7 @@ def parser_of(*whole: str) -> ArgumentParser:
 
 def _listed() -> str:
     known = {group: {name: it.does for name, it in commands.items()} for group, commands in GROUPS.items()}
-    width, lines = min(get_terminal_size().columns, _MAX_WIDTH), []
+    width, lines = min(max(get_terminal_size().columns, _MIN_WIDTH), _MAX_WIDTH), []
     for group, commands in (known | {"the two processes of a flight": PROCESSES}).items():
         lines.append(f"{group}:")
         for name, does in commands.items():

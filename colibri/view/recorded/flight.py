@@ -213,7 +213,7 @@ def _events(decisions: Columns) -> list[tuple[float, str]]:
         codes = decisions.named[column].astype(int)
         for row in np.flatnonzero(np.diff(codes, prepend=codes[:1])).tolist():
             time_s = float(decisions.times_s[row])
-            events.append((time_s, f"{time_s:.2f} s: {said} {_word(names[int(codes[row])])}"))
+            events.append((time_s, f"{time_s:.2f} s: {said} {_word(names.get(int(codes[row]), codes[row]))}"))
     return sorted(events)
 
 
