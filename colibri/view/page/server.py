@@ -74,7 +74,7 @@ def _looks_first(answer: _Answer) -> _Answer:
         request.headers.pop("Accept-Encoding", None)
         response = answer(connection, request)
         if response is not None:
-            response.body = _with_nonce(response.body, nonce.encode())
+            response.body = _with_nonce(bytes(response.body), nonce.encode())
             response.headers.pop("Content-Length", None)
             response.headers.update(content_policy(port, nonce), **{"Content-Length": str(len(response.body))})
         return response
