@@ -68,6 +68,7 @@ class QpSolver:
         self._optimum: Callable[[Qp], _Optimum] = (
             _Daqp(options) if name == _DAQP else _Clarabel(options) if name == _CLARABEL else _Qpsolvers(name, options)
         )
+        self._nearest = _Daqp({"iter_limit": MAX_ITERATIONS})
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # completes lazy imports before any flight
 
     def solve(self, qp: Qp) -> QpResult:
@@ -76,11 +77,18 @@ class QpSolver:
         except (ArithmeticError, ValueError, RuntimeWarning):
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if optimum.x is None:
-            return QpResult(why_none(qp), None, optimum.iterations)
+            return QpResult(self._why_none(qp), None, optimum.iterations)
         x = np.array(optimum.x, dtype=np.float64)  # a copy: some solvers return read-only arrays
         if self._residual(*qp, x, _some(optimum.z), _some(optimum.z_box)) > MAX_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None, optimum.iterations)
         return QpResult(QpStatus.SOLVED, x, optimum.iterations)
+
+    def _why_none(self, qp: Qp) -> QpStatus:
+        """Return the status of an unsolved QP: out of time if a point within its constraints exists, else infeasible."""
+        if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
+            return QpStatus.NOT_ACCURATE
+        nearest = self._nearest(qp._replace(H=np.eye(len(qp.f)), f=np.zeros(len(qp.f))))
+        return QpStatus.INFEASIBLE if nearest.x is None else QpStatus.TIME_OUT
 
 
 class _Optimum(NamedTuple):
@@ -184,20 +192,6 @@ def _some(vector: Array | None) -> Array:
 
 def _or_none(vector: Array) -> Array | None:
     return vector if vector.size else None
-
-
-def why_none(qp: Qp) -> QpStatus:
-    """Return the status of an unsolved QP: infeasible by a linear program, or out of time."""
-    from scipy.optimize import linprog
-
-    if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
-        return QpStatus.NOT_ACCURATE
-    n = len(qp.f)
-    lower = np.full(n, -np.inf) if not qp.lower.size else qp.lower
-    upper = np.full(n, np.inf) if not qp.upper.size else qp.upper
-    bounds = list(zip(lower.tolist(), upper.tolist(), strict=True))
-    feasible = linprog(np.zeros(n), A_ub=qp.G, b_ub=qp.h, bounds=bounds).status == 0
-    return QpStatus.TIME_OUT if feasible else QpStatus.INFEASIBLE
 
 
 def installed_solvers() -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import qpsolvers
+from scipy.optimize import linprog
 
 from colibri.autopilot.control.qp import IN_SOLVERS_EXTRA, Qp, QpSolver, QpStatus, SolverError, box, installed_solvers
 from colibri.common.types import Array
@@ -97,6 +98,19 @@ def test_the_extra_and_the_profiles_solvers_are_installed() -> None:
 @pytest.mark.parametrize("name", ["clarabel", "daqp", "quadprog", "piqp"])
 def test_an_empty_box_is_infeasible(name: str) -> None:
     assert QpSolver(name, TOLERANCE).solve(in_a_box(*random_qp(0, 6), -1.0))[:2] == (QpStatus.INFEASIBLE, None)
+
+
+def test_an_unsolved_qp_is_infeasible_as_a_linear_program() -> None:
+    solver, found = QpSolver("daqp", TOLERANCE, max_iterations=1), set()
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        H, f = random_qp(seed, 6)
+        G, h, upper = 100.0 * rng.normal(size=(12, 6)), rng.normal(size=12) + 0.8, np.abs(rng.normal(size=6))
+        status = solver.solve(Qp(H, f, G, h, -upper, upper)).status
+        feasible = linprog(np.zeros(6), A_ub=G, b_ub=h, bounds=list(zip(-upper, upper, strict=True))).status == 0
+        assert status is (QpStatus.TIME_OUT if feasible else QpStatus.INFEASIBLE)
+        found.add(status)
+    assert len(found) == 2
 
 
 @pytest.mark.parametrize("name", ["clarabel", "daqp", "piqp", "osqp"])
