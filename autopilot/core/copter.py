@@ -27,6 +27,9 @@ from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
 
+_SETTLES_WITHIN_US = 200_000
+"""Parameters are settled this often even if messages use up the budget."""
+
 T = TypeVar("T")
 
 
@@ -98,6 +101,7 @@ class Copter:
         self._plant_status = NOTHING
         self.time_us: int | None = None
         self._waiting_us: int | None = None
+        self._settles_by_us = 0
 
     @property
     def mode(self) -> str:
@@ -197,7 +201,8 @@ class Copter:
         plant_status, self._plant_status = self._plant_status, NOTHING
         self.guard(table.STATIONS, self.stations.receive_status, _nothing, plant_status, now_us)
         self._receive_from_stations(inbox, now_us)
-        if self.parameters.proposed and self.parts.budget.allows(now_us):
+        if self.parameters.proposed and (self.parts.budget.allows(now_us) or now_us >= self._settles_by_us):
+            self._settles_by_us = now_us + _SETTLES_WITHIN_US
             self.guard(table.PARAMETERS, self.parameters.settle, _nothing)
         if self.parameters.revision != self.parts.subscribers.revision:
             self.guard(table.PARAMETERS, self.parts.subscribers.adopt, self._keep_parameters, self.parameters)

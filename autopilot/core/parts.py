@@ -103,7 +103,7 @@ def parts_of(
     tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
     if values:
         tuning.try_all(parameters.values)
-    parameters.ask(tuning.prepare)
+    parameters.ask(tuning.prepare, tuning.is_ready)
     snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)
     leads = () if attitude is None else (attitude,)
     subscribers = Subscribers(

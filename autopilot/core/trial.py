@@ -31,6 +31,10 @@ class Trial:
         """Try for a vehicle of these parts."""
         self._loop, self._rotor_loss, self._planned_at = loop, rotor_loss, planned_at
 
+    def is_ready(self, vehicle: Vehicle) -> bool:
+        """Whether a vehicle can be tried; if not, design one more of its laws for landing on three rotors."""
+        return self._rotor_loss.has_designed(vehicle)
+
     def try_vehicle(self, vehicle: Vehicle) -> None:
         """Build all that is built from a vehicle's numbers, and try each part in hover.
 

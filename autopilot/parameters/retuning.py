@@ -22,8 +22,8 @@ from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
-_LAW_US, _VALUES_US = 6000.0, 300.0
-"""Work to build and try a control law with its vehicle, and to try the other parameters."""
+_LAW_US, _SLICE_US, _VALUES_US = 6000.0, 4000.0, 300.0
+"""Work to build and try a control law, a slice of what the trial of its vehicle needs, and to try other parameters."""
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
 _TRIED = (
     AT_REST,
@@ -43,6 +43,8 @@ class Rhythm(Protocol):
 
 class Trial(Protocol):
     """Other objects built from parameters; methods raise on bad values."""
+
+    def is_ready(self, vehicle: Vehicle) -> bool: ...
 
     def try_vehicle(self, vehicle: Vehicle) -> None: ...
 
@@ -88,11 +90,23 @@ class Tuning:
                 return Prepared()
             self._budget.spend(_LAW_US)
             tuned = self.tuned(values)
+            if _rhythm(tuned.controller) == self._rhythm:
+                return Prepared(tuned)
         except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
             return self._refused(changed, in_words(error), ParamError.VALUE_OUT_OF_RANGE)
-        if _rhythm(tuned.controller) != self._rhythm:
-            return self._refused(changed, "the law's sample and preview stay in flight", ParamError.PERMISSION_DENIED)
-        return Prepared(tuned)
+        return self._refused(changed, "the law's sample and preview stay in flight", ParamError.PERMISSION_DENIED)
+
+    def is_ready(self, names: Collection[str], values: Mapping[str, Value]) -> bool:
+        """Whether `prepare` may be called; if not, do a slice of its work."""
+        if self._trial is None or all(name not in self._numbers.defaults for name in names):
+            return True
+        try:
+            ready = self._trial.is_ready(self._numbers.applied(values)[1])
+        except Exception:  # `prepare` says why
+            return True
+        if not ready:
+            self._budget.spend(_SLICE_US)
+        return ready
 
     def _refused(self, changed: str, reason: str, refusal: ParamError) -> ParamError:
         if changed:

@@ -48,6 +48,8 @@ class Prepared(NamedTuple):
 
 Prepare: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], Prepared | ParamError]
 """(changed names, all new values) -> acceptance or refusal of a change; without side effects."""
+Ready: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], bool]
+"""(changed names, all new values) -> whether `Prepare` may be called; if not, a part of its work was done beforehand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +103,8 @@ class Parameters:
         self._values = {parameter.name: parameter.default for parameter in self._definitions}
         self._made: object | None = None
         self.prepare = prepare
+        self._ready: Ready | None = None
+        self._begun = False  # whether a part of the work for the first batch was done
         self.proposed: deque[dict[str, Value]] = deque()  # batches that `settle` is to prepare
         self.settled: list[tuple[str, ParamError | None]] = []  # names and refusals of proposed changes
         self.revision = 0  # number of changes so far
@@ -110,8 +114,8 @@ class Parameters:
         trial.load(values)
         return trial
 
-    def ask(self, prepare: Prepare) -> None:
-        self.prepare = prepare
+    def ask(self, prepare: Prepare, ready: Ready | None = None) -> None:
+        self.prepare, self._ready = prepare, ready
 
     def __len__(self) -> int:
         return len(self._definitions)
@@ -150,14 +154,19 @@ class Parameters:
             return wanted
         if wanted == self._values[name] and not any(name in batch for batch in self.proposed):
             return False
-        if not self.proposed or (name in self.proposed[-1] and len(self.proposed) < _MAX_BATCHES):
+        batches = len(self.proposed)
+        if batches <= self._begun or (name in self.proposed[-1] and batches < _MAX_BATCHES):
             self.proposed.append({})
         self.proposed[-1][name] = wanted
         return True
 
     def settle(self) -> None:
-        """Prepare a batch of proposed changes at once; of a refused one, try the halves at the next calls."""
-        batch = self.proposed.popleft()
+        """Do a slice of work for a batch of proposed changes; of a refused one, try the halves at the next calls."""
+        batch = self.proposed[0]
+        self._begun = self._ready is not None and not self._ready(batch, {**self._values, **batch})
+        if self._begun:
+            return
+        self.proposed.popleft()
         refusal = self._try(batch)
         if refusal is None or len(batch) == 1:
             self.settled += [(name, refusal) for name in batch]
@@ -195,7 +204,9 @@ class Parameters:
                 self._change(name, value)
 
     def reset(self) -> None:
-        self._try({definition.name: definition.default for definition in self._definitions})
+        """Propose all defaults."""
+        for definition in self._definitions:
+            self.propose(definition.name, definition.default)
 
     def take_made(self) -> object | None:
         made, self._made = self._made, None

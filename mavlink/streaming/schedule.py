@@ -54,8 +54,8 @@ class Schedule:
         entry = self._entries.get(key)
         return None if entry is None else entry.interval_us
 
-    def due(self, now_us: int) -> list[Key]:
-        """Return the keys due since the last call, each once, in order of their times."""
+    def due(self, now_us: int, at_most: int) -> list[Key]:
+        """Return keys due since the last call, each once, in order of their times; those beyond `at_most` wait."""
         heap = self._heap
         if now_us < self._now_us:  # a new flight has begun
             self._rebuild(now_us)
@@ -63,7 +63,7 @@ class Schedule:
         if not heap or heap[0][0] > now_us:
             return []
         keys = []
-        while heap and heap[0][0] <= now_us:
+        while heap and heap[0][0] <= now_us and len(keys) < at_most:
             entry = heappop(heap)[2]
             if entry.live:
                 keys.append(entry.key)

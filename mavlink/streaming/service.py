@@ -23,6 +23,8 @@ MIN_INTERVAL_US = 1_000
 MIN_GROUP_INTERVAL_US = 20_000
 """All groups at frame rate would take computing time from the control law."""
 MAX_INTERVAL_US = 2**31 - 1
+MAX_STREAMED = 128
+"""Limit of streamed messages between two frames of the plant; the others are late, and rates decrease for all."""
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
@@ -100,7 +102,7 @@ class StreamService:
 
     def poll(self, now_us: int) -> Iterable[Send]:
         self._now_us = now_us
-        due = self._schedule.due(now_us)
+        due = self._schedule.due(now_us, MAX_STREAMED)
         if not due and not self._waiting:
             return ()
         sends, self._waiting = self._waiting, []

@@ -18,6 +18,7 @@ from tools.harness.client import COMPONENT, SYSTEM, Client
 TO = (SYSTEM, COMPONENT)
 STATIONS = 32
 ITEMS, TRIANGLES = 900, 330
+FRAMES_BETWEEN = 30
 _LIST, _OPEN, _BURST, _CHECKSUM, _CREATE = 3, 4, 15, 14, 6
 
 Request = Callable[[BareFlight], Iterator[list[bytes]]]
@@ -193,13 +194,13 @@ def _tracks(flight: BareFlight) -> Iterator[list[bytes]]:
         yield [send.command(mav.MAV_CMD_NAV_LOITER_UNLIM)]
 
 
-def _disarmed(flight: BareFlight) -> Iterator[list[bytes]]:
+def _reset(flight: BareFlight) -> Iterator[list[bytes]]:
     send = Sender(flight)
-    for parameter in flight.copter.parameters:
-        if not parameter.read_only:
-            flight.copter.parameters.set(parameter.name, parameter.minimum)
+    changed = [parameter for parameter in flight.copter.parameters if parameter.name.startswith(("WHL", "VEH", "MPC"))]
+    for at in range(0, len(changed), 40):
+        yield [send.sets(parameter, 0.001) for parameter in changed[at : at + 40] if not parameter.read_only]
+    yield from [[]] * FRAMES_BETWEEN
     flight.copter.pilot.disarm(force=True)
-    yield []
     yield [send.command(mav.MAV_CMD_PREFLIGHT_STORAGE, 2.0)]
 
 
@@ -226,7 +227,7 @@ REQUESTS: Mapping[str, Request] = {
     "120 parameters of failsafes": _parameters("COM", "BAT", "GF"),
     "120 parameters, 32 stations": _broadcast,
     "each parameter alone": _each_parameter,
-    "reset of all parameters": _disarmed,
+    "reset of all parameters": _reset,
     "lists of parameters and logs, 32 stations": _lists,
     "mission of 900 items": _upload(MISSION, mission(), {FENCE: fence()}),
     "fence of 330 triangles": _upload(FENCE, fence(), {MISSION: mission()}),

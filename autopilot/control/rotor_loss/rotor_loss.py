@@ -18,9 +18,14 @@ Laws: TypeAlias = tuple[ReducedAttitude, ...]
 """One law for the loss of each rotor, (4,)."""
 
 
+@lru_cache(maxsize=16)
+def _law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
+    return law_without(vehicle, lost, interval_s)
+
+
 @lru_cache(maxsize=4)
 def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
-    return tuple(law_without(vehicle, lost, interval_s) for lost in range(4))
+    return tuple(_law_without(vehicle, lost, interval_s) for lost in range(4))
 
 
 class Permission(Protocol):
@@ -36,6 +41,7 @@ class RotorLoss:
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
         self._interval_s = interval_us * 1e-6
         self._adopt_laws(vehicle)
+        self._designing, self._designed = vehicle, 4
         self.watch = RotorWatch(vehicle, self._interval_s)
         self._three: ThreeRotors | None = None
         self.enabled = True
@@ -56,6 +62,21 @@ class RotorLoss:
         """Change the vehicle's parameters; a landing keeps the old ones."""
         self._adopt_laws(vehicle)
         self.watch.adopt(vehicle)
+
+    def has_designed(self, vehicle: Vehicle) -> bool:
+        """Whether the laws for a vehicle are designed, or cannot be; if not, design one of them, in some ms."""
+        if self._interval_s > MAX_INTERVAL_S:
+            return True
+        if vehicle != self._designing:
+            self._designing, self._designed = vehicle, 0
+        if self._designed == 4:
+            return True
+        try:
+            _law_without(vehicle, self._designed, self._interval_s)
+            self._designed += 1
+        except ThreeRotorsError:
+            self._designed = 4
+        return False
 
     def try_out(self, vehicle: Vehicle) -> None:
         """Raise a ThreeRotorsError if a changed vehicle cannot land, but the present one can."""

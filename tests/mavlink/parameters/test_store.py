@@ -132,6 +132,7 @@ def test_loading_and_resetting(parameters: Parameters) -> None:
     parameters.load({"COUNT": 6, "SPEED": 0.5})
     assert (parameters["COUNT"], parameters["SPEED"]) == (6, 0.5)
     parameters.reset()
+    parameters.settle()
     assert (parameters["COUNT"], parameters["SPEED"]) == (3, float32(0.1))
 
 
