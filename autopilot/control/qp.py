@@ -84,7 +84,7 @@ class QpSolver:
         return QpResult(QpStatus.SOLVED, x, optimum.iterations)
 
     def _why_none(self, qp: Qp) -> QpStatus:
-        """Return the status of an unsolved QP: out of time if a point within its constraints exists, else infeasible."""
+        """Return the status of an unsolved QP: out of time if any point satisfies its constraints, else infeasible."""
         if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
             return QpStatus.NOT_ACCURATE
         nearest = self._nearest(qp._replace(H=np.eye(len(qp.f)), f=np.zeros(len(qp.f))))

@@ -27,7 +27,7 @@ from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
 
-_SETTLES_WITHIN_US = 200_000
+_SETTLES_WITHIN_US = 100_000
 """Parameters are settled this often even if messages use up the budget."""
 
 T = TypeVar("T")

@@ -32,6 +32,8 @@ from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
+PATH_US = 400.0
+"""Work to find a file or folder, or to generate a file."""
 MAX_SESSIONS = 32
 MAX_SESSIONS_OF_A_PEER = 8
 SESSION_ENDS_AFTER_US = 20_000_000
@@ -187,7 +189,7 @@ class Ftp:
         found = self._files.list(names)
         if isinstance(found, FileRefusal):
             return found
-        self._budget.spend(ENTRY_US * len(found))
+        self._budget.spend(PATH_US + ENTRY_US * len(found))
         if request.offset >= len(found):
             return Nak(Error.END_OF_FILE)
         data = b""
@@ -199,6 +201,7 @@ class Ftp:
         return data
 
     def _open_to_read(self, request: Request, names: Names) -> Outcome:
+        self._budget.spend(PATH_US)
         reading = self._files.open(names)
         if isinstance(reading, FileRefusal):
             return reading

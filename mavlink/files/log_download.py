@@ -15,6 +15,7 @@ from colibri.mavlink.wire.dialect import Message
 
 BLOCK_BYTES = 90
 MESSAGES_A_POLL = 20
+ERASED_A_POLL = 20
 MESSAGES_A_POLL_OF_A_LONG_PART = 8
 SHORT_BYTES = 256 * BLOCK_BYTES
 """Fits any client's socket buffer: the most that MAVSDK and QGroundControl request at once. MAVProxy requests
@@ -61,6 +62,7 @@ class Logs:
         self._shown: dict[Peer, list[Entry]] = {}
         self._listings: dict[Peer, _Listing] = {}
         self._transfers: deque[_Transfer] = deque()
+        self._erasing: dict[str, None] = {}
 
     def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
@@ -75,11 +77,14 @@ class Logs:
         return ()
 
     def poll(self, _now_us: int) -> Iterable[Send]:
-        if not self._transfers and not self._listings:
+        if not self._transfers and not self._listings and not self._erasing:
             return IDLE
+        for _ in range(min(len(self._erasing), ERASED_A_POLL)):
+            self._files.remove((*self._folder, self._erasing.popitem()[0]))
         sends: list[Send] = []
+        share = MESSAGES_A_POLL // max(len(self._listings), 1)  # of at most `MAX_PEERS`
         for listing in list(self._listings.values()):
-            sends += self._entries(listing)
+            sends += self._entries(listing, share)
         share = max(MESSAGES_A_POLL // max(len(self._transfers), 1), 1)
         for _ in range(min(len(self._transfers), MESSAGES_A_POLL)):
             transfer = self._transfers.popleft()
@@ -96,10 +101,10 @@ class Logs:
         self._listings[peer] = _Listing(peer, start, min(end, len(logs) - 1))
         return ()
 
-    def _entries(self, listing: _Listing) -> Iterator[Send]:
+    def _entries(self, listing: _Listing, at_most: int) -> Iterator[Send]:
         logs = self._shown.get(listing.peer, ())
         last = min(listing.last, len(logs) - 1)
-        until = min(last + 1, listing.next + MESSAGES_A_POLL)
+        until = min(last + 1, listing.next + at_most)
         for number in range(listing.next, until):
             log = logs[number]
             facts = (len(logs), len(logs) - 1, log.modified_s & _UINT32_MAX, min(log.size, _UINT32_MAX))
@@ -111,8 +116,9 @@ class Logs:
     def _look(self, peer: Peer) -> list[Entry]:
         """Fix the present logs' ids for this client."""
         found = self._files.list(self._folder)
-        logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
+        logs = () if isinstance(found, FileRefusal) else found
         self._budget.spend(ENTRY_US * len(logs))
+        logs = [entry for entry in logs if not entry.is_folder and entry.name not in self._erasing]
         self._shown.pop(peer, None)
         if len(self._shown) >= MAX_PEERS:
             forgotten = next(iter(self._shown))
@@ -144,9 +150,9 @@ class Logs:
     def _erase(self) -> None:
         found = self._files.list(self._folder)
         kept = self._being_written()
-        for entry in () if isinstance(found, FileRefusal) else found:
-            if not entry.is_folder and entry.name != kept:
-                self._files.remove((*self._folder, entry.name))
+        logs = () if isinstance(found, FileRefusal) else found
+        self._budget.spend(ENTRY_US * len(logs))
+        self._erasing = {entry.name: None for entry in logs if not entry.is_folder and entry.name != kept}
         self._shown.clear()
         self._listings.clear()
         self._transfers.clear()

@@ -49,7 +49,7 @@ class Prepared(NamedTuple):
 Prepare: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], Prepared | ParamError]
 """(changed names, all new values) -> acceptance or refusal of a change; without side effects."""
 Ready: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], bool]
-"""(changed names, all new values) -> whether `Prepare` may be called; if not, a part of its work was done beforehand."""
+"""(changed names, all new values) -> whether `Prepare` may be called; if not, a slice of its work is done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

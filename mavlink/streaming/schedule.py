@@ -62,7 +62,7 @@ class Schedule:
         self._now_us = now_us
         if not heap or heap[0][0] > now_us:
             return []
-        keys = []
+        keys: list[Key] = []
         while heap and heap[0][0] <= now_us and len(keys) < at_most:
             entry = heappop(heap)[2]
             if entry.live:

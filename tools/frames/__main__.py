@@ -115,8 +115,10 @@ def _random(count: int) -> tuple[float, float]:
 
 
 def _files(folder: Path) -> Folder:
-    for number in range(FILES):
-        (folder / f"file{number:04}").touch()
+    for name in ("file", "logs/log"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        for number in range(FILES):
+            (folder / f"{name}{number:04}").touch()
     (folder / "big").write_bytes(bytes(8 << 20))
     return Folder(folder)
 

@@ -244,6 +244,25 @@ REQUESTS: Mapping[str, Request] = {
     "8 bursts": _bursts,
     "200 lists of logs": _repeated("LOG_REQUEST_LIST", *TO, 0, 0xFFFF, count=200),
     "all logs erased": _repeated("LOG_ERASE", *TO, count=200),
+    "15 listings of generated files": _files(_LIST, b"/@PARAM", 15),
+    "15 paths of 16 folders": _files(_OPEN, b"/" + b"folder/" * 15 + b"file", 15),
+    "15 logs of 8 MB": _repeated("LOG_REQUEST_DATA", *TO, 0, 0, 0xFFFFFFFF, count=120),
+    "120 downloads of the mission": _planned("MISSION_REQUEST_LIST", *TO, 0, count=120),
+    "120 parameters read": _repeated("PARAM_REQUEST_READ", *TO, b"VEH_MASS", -1, count=120),
+    "60 setpoints": _repeated(
+        "SET_POSITION_TARGET_LOCAL_NED", 0, *TO, 1, 0xDF8, *(1.0, 0.0, -10.0), *(0.0,) * 8, count=60
+    ),
+    "70 setpoints of attitude": _repeated(
+        "SET_ATTITUDE_TARGET", 0, *TO, 7, [1.0] + [0.0] * 3, *(0.0,) * 3, 0.5, count=70
+    ),
+    "150 sticks": _repeated("MANUAL_CONTROL", SYSTEM, 100, 100, 500, 0, 0, count=150),
+    "80 gotos": _commands(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, nan, nan, 10.0),
+    "80 take-offs": _commands(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, 10.0),
+    "80 returns": _commands(mav.MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
+    "80 starts of the mission": _commands(mav.MAV_CMD_MISSION_START, 0.0, 0.0),
+    "80 failures": _commands(mav.MAV_CMD_INJECT_FAILURE, 0.0, 1.0, 0.0),
+    "80 calibrations": _commands(mav.MAV_CMD_PREFLIGHT_CALIBRATION, 1.0, 0.0),
+    "120 times": _repeated("TIMESYNC", 0, 1, count=120),
     "50 lines of the shell": _repeated("SERIAL_CONTROL", 10, 6, 0, 0, 66, _SHELL.ljust(70, b"\0"), count=45),
     "32 stations at 250 Hz": _streams,
     "200 groups of streams": _groups,

@@ -196,6 +196,9 @@ def faulty() -> tuple[Parameters, list[str]]:
 
 
 class Rigid:
+    def is_ready(self, vehicle: Vehicle) -> bool:
+        return vehicle.body.mass_kg > 0.0
+
     def try_vehicle(self, vehicle: Vehicle) -> None:
         raise SettingsError(f"nothing flies {vehicle.body.mass_kg:g} kg")
 
