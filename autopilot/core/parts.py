@@ -1,5 +1,6 @@
 """The parts of a vehicle that ground stations fly, put together around one profile."""
 
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 
 from colibri.autopilot.commander.fence import Fence
@@ -26,7 +27,7 @@ from colibri.autopilot.guidance.attitude_reference import AttitudeReference, att
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import Parameters, Value
@@ -101,7 +102,7 @@ def parts_of(
     obey_delay(flies_by)
     trial = Trial(loop, rotor_loss, planned_at)
     tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
-    if values:
+    with nullcontext() if values else suppress(ImpossibleError):  # compiles what a change in flight needs
         tuning.try_all(parameters.values)
     parameters.ask(tuning.prepare, tuning.is_ready)
     snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)

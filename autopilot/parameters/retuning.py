@@ -12,6 +12,7 @@ from colibri.autopilot.control.interface import (
     AttitudeDemand,
     Clock,
     Controller,
+    PathController,
     Preview,
     still_horizon,
 )
@@ -150,7 +151,7 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Fly two control samples near hover, and two far from it."""
+    """Fly two control samples near hover, and two far from it; by attitude and on the path, too, if the law can."""
     references = still_horizon(controller.preview.samples)
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):
@@ -162,3 +163,9 @@ def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
         level = AttitudeDemand(references.position_enu_m, references.velocity_enu_m_s, thrust_n)
         _, decision = controller.step_attitude(memory, time_us, AT_REST, level)
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+    if isinstance(controller, PathController) and controller.min_path_speed < 1.0:
+        for sample in range(2):  # the second with a plan
+            memory, decision = controller.step_on_path(
+                memory, sample * controller.control_interval_us, AT_REST, references
+            )
+            check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
