@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from colibri.autopilot.control.settings import ControlInterval
+from colibri.autopilot.control.settings import ControlInterval, current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, named_text, read_named, replaced, toml_names
 
@@ -81,7 +81,8 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def with_choices(self, controller: str | None, solver: str | None, delay_s: float | None = None) -> "Profile":
         """Return the profile with another control law, delay, and QP solver."""
         told_s = self.delay_s if delay_s is None else delay_s
-        chosen = msgspec.structs.replace(self, controller=controller or self.controller, delay_s=told_s)
+        name = current_name(controller or self.controller)
+        chosen = msgspec.structs.replace(self, controller=name, delay_s=told_s)
         if solver is None:
             return chosen
         table = chosen.table(chosen.controller)
@@ -101,6 +102,8 @@ def load_profile(given: str | Profile) -> Profile:
         return given
     tables = read_named("profile", _FOLDER, given, ProfileTables, ProfileError)
     values = {key: getattr(tables, key) for key in tables.__struct_fields__}
+    values["controller"] = current_name(tables.controller)
+    values["controllers"] = {current_name(name): table for name, table in tables.controllers.items()}
     if given.endswith(".toml"):
         path, taken = Path(given), {"", *profile_names()}
         name = next((name for name in (tables.name, path.stem) if name not in taken), path.name)

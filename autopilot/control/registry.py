@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller, Decision
+from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError, unknown
 from colibri.common.types import Array, FourRotors
@@ -67,6 +68,7 @@ def load_controller(name: str) -> Factory:
 
 
 def _entry(name: str) -> EntryPoint:
+    name = current_name(name)
     for entry in registered().select(name=name):
         return entry
     raise ControllerError(unknown("controller", name, controller_names()))

@@ -1,6 +1,8 @@
 """Settings shared by control laws: the QP solver and the control interval."""
 
+from functools import cache
 from typing import Annotated, TypeAlias
+from warnings import warn
 
 import msgspec
 
@@ -20,6 +22,18 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     def build(self) -> QpSolver:
         return QpSolver(self.solver, self.tolerance, self.max_iterations)
+
+
+RENAMED = {"whole-lpv-mpc": "lpv-mpc"}
+"""Names of 0.1, accepted until 0.3."""
+
+
+@cache
+def current_name(name: str) -> str:
+    """Return the present name of a control law, with a warning if it was renamed."""
+    if name in RENAMED:
+        warn(f'controller "{name}" is now called "{RENAMED[name]}"', FutureWarning, stacklevel=2)
+    return RENAMED.get(name, name)
 
 
 def interval_us(interval_s: float) -> int:

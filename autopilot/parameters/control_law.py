@@ -91,56 +91,33 @@ def _recovery(prefix: str) -> list[Number]:
 
 
 LPV_MPC = [
-    *_poles("LPV_POLE", ("guidance",), "position"),
+    *_poles("LPV_POLE", ("guidance",), "a large position error"),
+    Number("LPV_EXACT", ("guidance", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
     *_references("LPV"),
-    Number("LPV_THR_MARGIN", ("guidance", "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
-    *_observed("LPV"),
-    *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
-    *_axes("LPV_R_U2 LPV_R_U3 LPV_R_U4", ("attitude", "increment_weight"), "", 1e-3, 1e4, "Weight on {} changes"),
-    *_axes(
-        "LPV_DU2_MAX LPV_DU3_MAX LPV_DU4_MAX",
-        ("attitude", "max_increment_n_m"),
-        *("N m", 1e-3, 10.0, "Largest change of the {} moment"),
-        decimals=4,
-    ),
-    Number("LPV_ANGLE_MAX", ("attitude", "max_angle_deg"), "deg", 10.0, 85.0, "Soft limit of roll, pitch", 1.0, 1),
-    *_limits("LPV", "attitude"),
-    Number("LPV_FB_SHIFTED", ("fallback", "shifted_samples"), "", 1, 1000, "Without a plan: samples of the last"),
-    Number("LPV_FB_LQR", ("fallback", "lqr_samples"), "", 1, 1000, "Without a plan: then, samples of an LQR"),
+    Number("LPV_FOLLOW", ("guidance", "follow_within_m"), "m", 0.01, 10.0, "Farther references count in part"),
     Number(
-        "LPV_FB_DESCENT", ("fallback", "descent_thrust"), "norm", 0.5, 0.99, "Without a plan: then, thrust of weight"
+        "LPV_ACC_MAX", ("guidance", "max_acceleration_m_s2"), "m/s^2", 0.5, 50.0, "Acceleration of large errors' end"
     ),
+    Number("LPV_THR_MIN", ("guidance", "min_thrust"), "norm", 0.01, 0.9, "Least thrust of references, of weight"),
+    *_observed("LPV"),
+    Number("LPV_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of the tilt", decimals=1),
+    *_limits("LPV", "plan"),
+    Number("LPV_PATH_MIN", ("path", "min_speed"), "norm", 0.05, 1.0, "Least speed along the path; 1: on the clock"),
+    Number("LPV_PATH_REWARD", ("path", "reward"), "1/s", 0.01, 1e4, "Reward on path time: more is closer to it"),
+    Number("LPV_PATH_CHANGE", ("path", "change"), "", 1e-3, 1e4, "Weight on changes of the speed along it"),
+    Number("LPV_Q_POSITION", ("weights", "position"), "1/m^2", 1e-2, 1e5, "Weight on position error"),
+    Number("LPV_Q_VELOCITY", ("weights", "velocity"), "s^2/m^2", 1e-4, 1e4, "Weight on velocity error"),
+    Number("LPV_Q_HEADING", ("weights", "heading"), "1/rad^2", 1e-4, 1e3, "Weight on heading error"),
+    Number("LPV_Q_RATE", ("weights", "rate"), "s^2/rad^2", 1e-5, 1e2, "Weight on errors of the rates", decimals=4),
+    Number("LPV_Q_TILT", ("weights", "tilt"), "1/rad^2", 1e-3, 1e4, "Weight on tilt error, of demanded attitudes"),
+    Number("LPV_Q_THRUST", ("weights", "thrust"), "1/N^2", 1e-4, 1e3, "Weight on thrust error, of demanded ones"),
+    Number("LPV_R_FIRST", ("weights", "first_correction"), "", 1e-4, 1e2, "Weight on changes from the last plan"),
+    Number("LPV_R_NEXT", ("weights", "next_correction"), "", 1e-4, 1e2, "Weight on changes within a plan"),
+    Number("LPV_TERM_THRUST", ("weights", "terminal_thrust"), "norm", 0.5, 3.0, "Thrust of weight, after the plan"),
+    Number("LPV_FB_SHIFTED", ("fallback", "shifted_samples"), "", 1, 1000, "Without a plan: samples of the last"),
+    *_poles("LPV_FB_POLE", ("fallback",), "position, of recovery"),
     *_recovery("LPV"),
 ]
-"""`colibri.autopilot.control.lpv_mpc.law`, without its samples and the solver."""
-WHOLE_LPV_MPC = [
-    *_poles("WHL_POLE", ("guidance",), "a large position error"),
-    Number("WHL_EXACT", ("guidance", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
-    *_references("WHL"),
-    Number("WHL_FOLLOW", ("guidance", "follow_within_m"), "m", 0.01, 10.0, "Farther references count in part"),
-    Number(
-        "WHL_ACC_MAX", ("guidance", "max_acceleration_m_s2"), "m/s^2", 0.5, 50.0, "Acceleration of large errors' end"
-    ),
-    Number("WHL_THR_MIN", ("guidance", "min_thrust"), "norm", 0.01, 0.9, "Least thrust of references, of weight"),
-    *_observed("WHL"),
-    Number("WHL_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of the tilt", decimals=1),
-    *_limits("WHL", "plan"),
-    Number("WHL_PATH_MIN", ("path", "min_speed"), "norm", 0.05, 1.0, "Least speed along the path; 1: on the clock"),
-    Number("WHL_PATH_REWARD", ("path", "reward"), "1/s", 0.01, 1e4, "Reward on path time: more is closer to it"),
-    Number("WHL_PATH_CHANGE", ("path", "change"), "", 1e-3, 1e4, "Weight on changes of the speed along it"),
-    Number("WHL_Q_POSITION", ("weights", "position"), "1/m^2", 1e-2, 1e5, "Weight on position error"),
-    Number("WHL_Q_VELOCITY", ("weights", "velocity"), "s^2/m^2", 1e-4, 1e4, "Weight on velocity error"),
-    Number("WHL_Q_HEADING", ("weights", "heading"), "1/rad^2", 1e-4, 1e3, "Weight on heading error"),
-    Number("WHL_Q_RATE", ("weights", "rate"), "s^2/rad^2", 1e-5, 1e2, "Weight on errors of the rates", decimals=4),
-    Number("WHL_Q_TILT", ("weights", "tilt"), "1/rad^2", 1e-3, 1e4, "Weight on tilt error, of demanded attitudes"),
-    Number("WHL_Q_THRUST", ("weights", "thrust"), "1/N^2", 1e-4, 1e3, "Weight on thrust error, of demanded ones"),
-    Number("WHL_R_FIRST", ("weights", "first_correction"), "", 1e-4, 1e2, "Weight on changes from the last plan"),
-    Number("WHL_R_NEXT", ("weights", "next_correction"), "", 1e-4, 1e2, "Weight on changes within a plan"),
-    Number("WHL_TERM_THRUST", ("weights", "terminal_thrust"), "norm", 0.5, 3.0, "Thrust of weight, after the plan"),
-    Number("WHL_FB_SHIFTED", ("fallback", "shifted_samples"), "", 1, 1000, "Without a plan: samples of the last"),
-    *_poles("WHL_FB_POLE", ("fallback",), "position, of recovery"),
-    *_recovery("WHL"),
-]
-"""`colibri.autopilot.control.whole_lpv_mpc.law`, without its samples, preview and solver."""
-DESCRIBED = {"lpv-mpc": LPV_MPC, "whole-lpv-mpc": WHOLE_LPV_MPC}
+"""`colibri.autopilot.control.lpv_mpc.law`, without its samples, preview and solver."""
+DESCRIBED = {"lpv-mpc": LPV_MPC}
 """Numbers by name of the control law."""

@@ -89,8 +89,10 @@ class StateFolder:
         if self._path is None:
             return self._initial()
         path = self.parameter_path()
+        if not path.exists() and self._profile.controller == "lpv-mpc":
+            path = path.with_name(f"whole-{path.name}")  # as 0.1 named it
         try:
-            text = read_text(path)
+            text = read_text(path).replace("\tWHL_", "\tLPV_")
         except FileNotFoundError:
             return self._initial()
         except (OSError, UnicodeDecodeError) as error:

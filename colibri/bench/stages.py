@@ -13,13 +13,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from colibri.autopilot.control.lpv_mpc import planning
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc
+from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder
 from colibri.autopilot.control.parts.vehicle_tracking import VehicleTracker
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
-from colibri.autopilot.control.whole_lpv_mpc import planning
-from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
-from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_blocks
 from colibri.flights.in_process import fly_locally
@@ -58,7 +58,7 @@ STAGES = (
     Stage("estimate", VehicleTracker, "observe"),
     Stage("references", TargetBuilder, "on_clock"),
     Stage("condense", planning, "condense"),
-    Stage("QP", WholeMpc, "solve"),
+    Stage("QP", Mpc, "solve"),
     Stage("read plan", planning, "read"),
     Stage("mixer", rotor_lag, "actuate"),
     CONTROL_STEP,

@@ -11,7 +11,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 
-CONTROLLER = "whole-lpv-mpc"
+CONTROLLER = "lpv-mpc"
 TRACK = "lemniscate"
 
 

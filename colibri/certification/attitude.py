@@ -17,9 +17,12 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, M3, RATES, STATES
 from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
 
+PHI, P, THETA, Q, PSI, R, M1, M2, M3 = range(9)
+"""States of the attitude and its moments; the remembered commands follow."""
+STATES, INPUTS = 9, 3
+ANGLES, RATES = (PHI, THETA, PSI), (P, Q, R)
 _SIZE = STATES + INPUTS
 _ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS = list(range(M1, M3 + 1))

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colibri.autopilot.control.lpv_mpc.prediction import PHI, PSI, THETA, P, R
+from colibri.certification.attitude import PHI, PSI, THETA, P, R
 from colibri.certification.certificate import Certificate
 from colibri.certification.flights import Flown
 from colibri.certification.loop import AnyArray

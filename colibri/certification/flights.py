@@ -8,8 +8,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, RATES, STATES
-from colibri.certification.attitude import AttitudeNumbers
+from colibri.certification.attitude import ANGLES, INPUTS, M1, RATES, STATES, AttitudeNumbers
 from colibri.certification.certificate import CertifiedLaw, Entry
 from colibri.common.types import Array
 

@@ -7,24 +7,20 @@ import numpy as np
 from scipy.linalg import eigh
 
 from colibri.analysis.tables import print_table, write_table
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, RATES
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.certification import certificate as certificates
+from colibri.certification.attitude import ANGLES, RATES
 from colibri.certification.certificate import Certificate, Entry, RefusedError
 from colibri.certification.figure import draw
 from colibri.certification.flights import AttitudeLaw, Conditions, Flown, Plan, fly
-from colibri.certification.lqr_attitude import LqrAttitude
-from colibri.certification.whole_attitude import WholeAttitude
+from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
-LAWS: dict[str, type[LqrAttitude] | type[WholeAttitude]] = {
-    "lpv-mpc": LqrAttitude,
-    "whole-lpv-mpc": WholeAttitude,
-}
+LAW = "lpv-mpc"
 _DURATION_S = 1.0
 _STATES = 12
 _SEEN = 1e-12
@@ -82,11 +78,11 @@ def certify_profile(args: Namespace) -> int:
 
 def law_of(profile: Profile, vehicle: Vehicle, conditions: Conditions) -> AttitudeLaw:
     name = profile.controller
-    if name not in LAWS:
-        raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {' and '.join(LAWS)} can")
+    if name != LAW:
+        raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {LAW} can")
     if not profile.table(name):
         raise UncertifiableError(f"{profile.where}: has no numbers for {name}")
-    return LAWS[name](profile.table(name), vehicle, conditions)
+    return PlannedAttitude(profile.table(name), vehicle, conditions)
 
 
 def table(found: Certificate, law: AttitudeLaw, flown: Flown) -> list[tuple[str, ...]]:

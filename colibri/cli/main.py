@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
@@ -30,6 +31,7 @@ _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 def main(argv: list[str] | None = None) -> int:
     given = sys.argv[1:] if argv is None else argv
     use_streams()
+    warnings.formatwarning = lambda message, *_args: f"colibri: {message}\n"
     _check_encoding(given)
     if given and given[0] in PROCESSES:
         process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])

@@ -25,14 +25,13 @@ from colibri.studies.study_figures import Result
 from colibri.studies.study_flights import Flown, fly
 
 FORMATS = ("png", "svg")
-LPV_MPC, WHOLE, ON_PATH, SE3, THESIS = "LPV-MPC", "whole LPV-MPC", "whole, on the path", "SE(3)", "thesis"
+LPV_MPC, ON_PATH, SE3, THESIS = "LPV-MPC", "LPV-MPC on the path", "SE(3)", "thesis"
 Settings: TypeAlias = Mapping[str, Any]
 """Options and keys of one flight, as in a campaign."""
 _LAWS: dict[str, Settings] = {
     THESIS: {"profile": "thesis"},
     SE3: {"controller": "geometric-se3"},
     LPV_MPC: {"controller": "lpv-mpc"},
-    WHOLE: {"controller": "whole-lpv-mpc"},
 }
 _ON_PATH: Settings = {"profile": "path"}
 _NO_BATTERY: Settings = {"vehicle": load_vehicle("hummingbird").without(["battery"])}
@@ -132,8 +131,7 @@ def _recovery() -> Iterable[Case]:
         texts = (f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values.items())
         row = (name, ", ".join(texts))
         flight = {"track": "hover:height=20", "start": {"y": 0.0, "z": 20.0, **values}, "duration": 20.0}
-        for group in (LPV_MPC, WHOLE):
-            yield Case(row, group, {**_LAWS[group], **flight})
+        yield Case(row, "", {**_LAWS[LPV_MPC], **flight})
 
 
 def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:
@@ -162,7 +160,7 @@ _UPSETS: dict[str, Settings] = {
 def _robustness() -> Iterable[Case]:
     for upset, settings in _UPSETS.items():
         for track in (SPIRAL, LEMNISCATE):
-            for group in (SE3, LPV_MPC, WHOLE):
+            for group in (SE3, LPV_MPC):
                 yield Case((track, upset), group, {**_LAWS[group], **settings, "track": track, "duration": 60.0})
 
 
@@ -173,18 +171,6 @@ def _limits() -> Iterable[Case]:
             flight = {**_LAWS[LPV_MPC], "track": track, "vehicle.rotors.max_speed": max_speed, "duration": 40.0}
             for battery, vehicle in _BATTERY.items():
                 yield Case((track, f"{max_speed:g}", battery), "", {**flight, **vehicle})
-
-
-_SCHEDULING = "profile.controllers.lpv-mpc.attitude.scheduling"
-
-
-def _scheduling() -> Iterable[Case]:
-    for lap_s in (10.0, 8.0, 7.0, 6.0, 5.5, 5.0):
-        for yaw in ("path", "fixed"):
-            for scheduling in ("frozen", "along-plan"):
-                track = f"lemniscate:lap={lap_s:g},yaw={yaw}"
-                flight = {**_LAWS[LPV_MPC], "track": track, _SCHEDULING: scheduling, "duration": 40.0}
-                yield Case((f"{lap_s:g}",), f"yaw {yaw}, {scheduling}", flight)
 
 
 _BINDING = tuple(
@@ -227,7 +213,6 @@ STUDIES = (
         tuple(_limits()),
         study_figures.limits,
     ),
-    Study("scheduling", ("lap (s)",), (RMS,), tuple(_scheduling()), study_figures.scheduling),
 )
 
 

@@ -25,12 +25,11 @@ _CONTENDERS = {
     "thesis": "#D55E00",
     "SE(3)": "#0072B2",
     "LPV-MPC": "#000000",
-    "whole LPV-MPC": "#009E73",
-    "whole, on the path": "#CC79A7",
+    "LPV-MPC on the path": "#009E73",
 }
 _MOST_M = 50.0
 """Larger errors are drawn at this one."""
-_ALSO_WITHOUT = ("SE(3)", "LPV-MPC", "whole LPV-MPC")
+_ALSO_WITHOUT = ("SE(3)", "LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
 
@@ -108,21 +107,6 @@ def speed(results: Sequence[Result]) -> dict[str, Figure]:
     grid[-1][0].set_xlabel("top speed of the reference (m/s)")
     put_head(figure, f"Lemniscates ever faster, after {SETTLED_AFTER_S:.0f} s", columns=3)
     return {"speed": figure}
-
-
-def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
-    figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=3.0)
-    for number, group in enumerate(dict.fromkeys(result.group for result in results)):
-        shown = [result for result in results if result.group == group]
-        color, dashes = COLORS[6 if "frozen" in group else 0], ("-", "--")[number // 2]
-        laps_s, errors_m = [float(result.row[0]) for result in shown], [result.flown.rms_m for result in shown]
-        axes.plot(laps_s, errors_m, marker="o", markersize=5, label=group, **line_style(Style(color, 1.6, dashes)))
-    axes.set_yscale("log")
-    axes.invert_xaxis()
-    _dress(axes, "RMS (m)")
-    axes.set_xlabel("lap of the lemniscate (s)")
-    put_head(figure, f"Scheduling along the plan and frozen, error after {SETTLED_AFTER_S:.0f} s", columns=2)
-    return {"scheduling": figure}
 
 
 def robustness(results: Sequence[Result]) -> dict[str, Figure]:

@@ -84,7 +84,6 @@ FLIGHTS: tuple[Case | SitlCase, ...] = (
     Case("waypoints", {"track": "waypoints", "profile": "flight", "duration": 9.0}, WAYPOINTS),
     # Every control law.
     _flown("circle-by-se3", "circle:radius=3,speed=4", 6.0, "se3", **GUSTS),
-    _flown("lemniscate-by-lpv-mpc", "lemniscate:height=20", 6.0, controller="lpv-mpc"),
     _flown("tumbling-by-se3", "hover:height=20", 5.0, "se3", start=TUMBLING),
     _flown("wave-by-global-lpv-mpc", "wave", 20.0, "thesis", controller="global-lpv-mpc"),
     _flown("thesis-euler-crown", "crown", 20.0, "thesis-euler"),

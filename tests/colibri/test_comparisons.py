@@ -153,7 +153,7 @@ def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran
 ) -> None:
     monkeypatch.setattr(Pool, "each", Here().each)
-    laws = {"geometric-se3": Raises, "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
+    laws = {"geometric-se3": Raises, "lpv-mpc": load_controller("lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]
     said = ran("compare", *options, "--out", tmp_path, code=1).out
@@ -185,7 +185,7 @@ def test_a_flight_that_kills_its_process_is_lost(tmp_path: Path, monkeypatch: py
 def test_a_law_that_cannot_be_built_is_found_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
-    laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
+    laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "lpv-mpc": load_controller("lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight", "--profile", "flight:geometric-se3", "--track", "hover", "--duration", "0.5"]
     said = refused("compare", *options, "--out", tmp_path / "out")

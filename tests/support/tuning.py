@@ -10,7 +10,7 @@ from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
 from tests.support.campaigns import Here
 
-WEIGHTS = "controllers.whole-lpv-mpc.weights"
+WEIGHTS = "controllers.lpv-mpc.weights"
 POSITION, RATE = f"profile.{WEIGHTS}.position", f"profile.{WEIGHTS}.rate"
 TABLES: dict[str, Any] = {
     "name": "short",
@@ -37,8 +37,8 @@ turbulence = "moderate"
 [grid]
 track = ["hover"]
 [tune]
-"controllers.whole-lpv-mpc.weights.position" = {{ log-uniform = [1, 1000] }}
-"controllers.whole-lpv-mpc.weights.rate" = {{ log-uniform = [0.001, 1.0] }}
+"controllers.lpv-mpc.weights.position" = {{ log-uniform = [1, 1000] }}
+"controllers.lpv-mpc.weights.rate" = {{ log-uniform = [0.001, 1.0] }}
 [objectives]
 rmse_m = "mean"
 """

@@ -122,7 +122,7 @@ class Flown:
                 "COMMAND_LONG", flight.system, AUTOPILOT_COMPONENT, mav.MAV_CMD_REQUEST_MESSAGE, 0, 148.0, *(0.0,) * 6
             )
         if n == 3:
-            flight.send("PARAM_SET", flight.system, AUTOPILOT_COMPONENT, b"WHL_POLE1", -7.1, mav.MAV_PARAM_TYPE_REAL32)
+            flight.send("PARAM_SET", flight.system, AUTOPILOT_COMPONENT, b"LPV_POLE1", -7.1, mav.MAV_PARAM_TYPE_REAL32)
         if n % 10 == 0 and self._situation == "offboard":
             flight.setpoint(velocity=(3.0, 1.0, 0.0))
         flight.step()

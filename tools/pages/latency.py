@@ -18,7 +18,7 @@ from colibri.flights.spec import FlightSpec
 from colibri.mavlink.ulog.log import MemoryLog
 from tools.pages.tables import with_tables
 
-LAWS = ("whole-lpv-mpc", "lpv-mpc", "geometric-se3")
+LAWS = ("lpv-mpc", "geometric-se3")
 ROUND_TRIPS_MS = (0, 4, 8, 12, 16, 20, 24, 30, 40, 50, 60, 80, 100)
 LOST_M = 5.0
 _WRONG_MS = 5.0

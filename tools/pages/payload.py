@@ -31,7 +31,7 @@ class Laden(NamedTuple):
 def fly(track: str | None, *, learns: bool, seconds: tuple[float, float, float]) -> Laden:
     """Fly a track, `None` for hover; `seconds` are the times of pick-up, drop and end."""
     picked_up_s, dropped_s, end_s = seconds
-    params = {} if learns else {"WHL_MASS_RATE": 0.0}
+    params = {} if learns else {"LPV_MASS_RATE": 0.0}
     with Flights(Setting(airborne=HEIGHT_M, track=track, params=params), None) as flights:
         sitl = flights.begin()
         sitl.run(picked_up_s)

@@ -1,245 +1,339 @@
-"""The QP of the attitude MPC, condensed to the increments and two slacks, as compiled kernels.
+"""The QP, condensed to changes of the corrections, as compiled kernels.
 
-    z = [Δu at each move, angle slack, rate slack]
+    z = changes of the corrections: of each rotor in each block, then two slacks if limits are soft
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-The cost is [3.13-3.20] with a full terminal weight on state and input. Arguments: `prediction.respond`'s responses and
-schedule, the moments u last commanded, N m, (3,), and U1 at each step, N, (N,).
+With b blocks: nominal motion, (N + 1, 13), and squared speeds, (N + 1, 4), responses, (N + 1, 12, 4 b).
 """
 
-from math import sqrt
-from typing import NamedTuple
+from math import floor, pi, sqrt
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, STATES, Integers, P, Q, R
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
+from colibri.autopilot.control.lpv_mpc.feed_forward import rate_between
+from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp
-from colibri.common.jit import Packed, compiled
-from colibri.common.kernels import atan2, cos, sin
-from colibri.common.matrices import matmul
+from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
+from colibri.common.jit import compiled, inlined
+from colibri.common.kernels import atan2
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
+Integers: TypeAlias = NDArray[np.int64]
+
+STATES = DEVIATIONS + ROTORS  # of the terminal cost: position, velocity, rotation, rates, body axes; squared speeds
 SLACKS = 2
-ANGLE_SLACK, RATE_SLACK = 0, 1
-ROTORS = 4
-LIMITED = 5  # phi and theta share a slack with the tilt; p, q and r share the other
-_TWO_SIDES = 2
-MOTION_ROWS = 1 + _TWO_SIDES * LIMITED  # of each checked step: tilt, then both sides of phi, theta, p, q and r
-_ANGLE_ROWS = 1 + _TWO_SIDES * 2
-_NO_TILT = 1e-9
+TILT_SLACK, RATE_SLACK = 0, 1
+MOTION_ROWS = 7  # of each checked step: tilt, and both sides of p, q and r
+PREDICTED = 16  # position and velocity, ENU; phi, theta, psi; p, q, r; squared rotor speeds
+
+
+class Weights(NamedTuple):
+    """Weights of errors and corrections."""
+
+    position: float  # 1/m²
+    velocity: float  # s²/m²
+    tilt: float  # of a demanded attitude, 1/rad²
+    heading: float  # 1/rad²
+    rate: float  # s²/rad²
+    thrust: float  # of a demanded thrust, 1/N²
+    first: float  # change from the previous plan
+    next: float  # change from block to block
 
 
 class Problem(NamedTuple):
-    """Constants of all QPs."""
+    """Constants of all QPs of one kind."""
 
-    starts: Integers  # step of each move, (b,)
-    checked: Integers  # steps with soft limits, (c,)
-    output_weight: Array  # diagonal of Q, (3,)
-    increment_weight: Array  # diagonal of R, (3,)
-    terminal_weight: Array  # S on state and input, (12, 12), symmetric
-    max_increment: Array  # of the first move, N m, (3,)
-    limits: Array  # of tilt and |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,)
-    from_thrust: Array  # U1 to squared rotor speeds, (4,)
-    from_moments: Array  # U2, U3, U4 to squared rotor speeds, (4, 3)
-    min_squared: float
+    starts: Integers  # step of each block, and N, (b + 1,)
+    counted: Integers  # steps with errors in the cost, (c,)
+    checked: Integers  # steps with soft limits, (d,)
+    weights: Weights
+    terminal: Array  # S on the error at the end, (16, 16), symmetric
+    allocation: Array  # thrust of each rotor at its largest speed, N, (4,)
+    levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
+    min_cos_tilt: float
+    max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
 
 
 class Target(NamedTuple):
-    """The references of a plan."""
+    """References from now to one sample past the horizon, n = N + 2."""
 
-    angles: Array  # phi, theta, psi after each step, rad, (N, 3)
-    end: Array  # state and moments at the end of the horizon, (12,)
-    thrust_n: Array  # U1 commanded at each step, N, (N,)
+    position: Array  # m, ENU, (n, 3)
+    velocity: Array  # m/s, ENU, (n, 3)
+    acceleration: Array  # m/s², ENU, (n, 3)
+    forces: Array  # of the thrust, N, ENU, (n, 3)
+    attitudes: Array  # body to earth, (n, 3, 3)
+    yaw_rad: Array  # in any turn, (n,)
+    rates: Array  # rad/s, FLU, at samples 1 to N, (N, 3)
+    squared: Array  # rotor speeds at samples 0 to N, (N + 1, 4)
+    thrusts_n: Array  # U1, (n,)
+    end_squared: Array  # rotor speeds at the end, (4,)
 
 
-@compiled
-def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem, H: Array, f: Array) -> None:
-    steps = responses.shape[0] - 1
-    moved = responses.shape[2] - 1
-    H[:moved, :moved] = 0.0
-    f[:moved] = 0.0
-    for step in range(1, steps + 1):
-        for j in range(INPUTS):
-            row = responses[step, ANGLES[j]]
-            weight = problem.output_weight[j]
-            error = weight * (row[0] - target.angles[step - 1, j])
-            for k in range(moved):
-                f[k] += error * row[1 + k]
-                weighted = weight * row[1 + k]
-                for i in range(k + 1):
-                    H[k, i] += weighted * row[1 + i]
-    _add_terminal(responses[steps], target.end, u, problem.terminal_weight, H, f)
+@inlined
+def cost(
+    motion: Array,
+    speeds: Array,
+    responses: Array,
+    target: Target,
+    corrections: Array,  # the last one flown, then the nominal ones, (b + 1, 4)
+    problem: Problem,
+    qp: Qp,
+) -> None:
+    moved = responses.shape[2]
+    inputs = moved // (problem.starts.shape[0] - 1)
+    H, f, row = qp.H, qp.f, np.empty(moved)
+    H[:, :] = 0.0
+    f[:] = 0.0
+    for step in problem.counted:
+        used = inputs * _blocks(problem.starts, step)
+        _add_motion(motion, responses, step, target, problem.weights, used, row, H, f)
+        if problem.weights.tilt > 0.0 or problem.weights.thrust > 0.0:
+            _add_demand(motion[step], speeds[step], responses[step], step, target, problem, used, row, H, f)
+    _add_terminal(motion[-1], speeds[-1], responses[-1], target, problem, H, f)
+    _add_changes(corrections, problem, inputs, H, f)
     for k in range(moved):
-        H[k, k] += problem.increment_weight[k % INPUTS]
         for i in range(k):
             H[i, k] = H[k, i]
 
 
 @compiled
-def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f: Array) -> None:
-    """Add ½ eᵀSe of the final error to the lower triangle of H."""
-    moved = last.shape[1] - 1
-    E = np.zeros((STATES + INPUTS, moved + 1))
-    E[:STATES] = last
-    for i in range(INPUTS):
-        E[STATES + i, 0] = u[i]
-        for k in range(i, moved, INPUTS):
-            E[STATES + i, 1 + k] = 1.0
-    E[:, 0] -= terminal
-    weighted = matmul(S, E)
-    for k in range(moved):
-        for row in range(STATES + INPUTS):
-            f[k] += E[row, 1 + k] * weighted[row, 0]
-        for i in range(k + 1):
-            for row in range(STATES + INPUTS):
-                H[k, i] += E[row, 1 + k] * weighted[row, 1 + i]
+def _blocks(starts: Integers, step: int) -> int:
+    blocks = 0
+    while blocks < starts.shape[0] - 1 and starts[blocks] < step:
+        blocks += 1
+    return blocks
 
 
-@compiled
-def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
-    """Fill the rows of the rotor limits from row 0 on; return their number.
-
-    Moments are constant between two moves: one row a side, at the tightest thrust, suffices.
-    """
-    starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
-    count = 0
-    for move in range(starts.shape[0]):
-        end = starts[move + 1] if move + 1 < starts.shape[0] else thrust_n.shape[0]
-        minimum, maximum = thrust_n[starts[move]], thrust_n[starts[move]]
-        for step in range(starts[move], end):
-            minimum, maximum = min(minimum, thrust_n[step]), max(maximum, thrust_n[step])
-        for rotor in range(ROTORS):
-            turned = 0.0
-            for i in range(INPUTS):
-                turned += from_moments[rotor, i] * u[i]
-                for j in range(move + 1):
-                    G[count, INPUTS * j + i] = from_moments[rotor, i]
-                    G[count + 1, INPUTS * j + i] = -from_moments[rotor, i]
-            h[count] = max_squared - from_thrust[rotor] * maximum - turned
-            h[count + 1] = turned + from_thrust[rotor] * minimum - problem.min_squared
-            count += _TWO_SIDES
-    return count
-
-
-@compiled
-def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
-    """Write the normal, (2,), of a tangent to the tilt limit; return its distance, rad.
-
-    The convex set cos(phi) cos(theta) >= cos(max_tilt) touches it in the direction of (`phi`, `theta`); without tilt
-    the normal is zero.
-    """
-    x, y = sin(theta) * cos(phi), sin(phi)
-    across = sqrt(x * x + y * y)
-    normal[:] = 0.0
-    if across < _NO_TILT:
-        return 1.0
-    x, y, z = x / across * sin(max_tilt), y / across * sin(max_tilt), cos(max_tilt)
-    xz = sqrt(x * x + z * z)
-    normal[0], normal[1] = y / xz, x / z
-    distance: float = normal[0] * atan2(y, xz) + normal[1] * atan2(x, z)
-    return distance
-
-
-@compiled
-def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int, G: Array, h: Array) -> int:
-    """Fill the soft rows of angles, rates and tilt, by its tangent, from row `first` on."""
-    states = (ANGLES[0], ANGLES[1], P, Q, R)
-    limits = problem.limits
-    moved = responses.shape[2] - 1
-    normal = np.empty(2)
-    count = first
-    for step in problem.checked:
-        phi, theta = responses[step, ANGLES[0]], responses[step, ANGLES[1]]
-        distance = tilt_tangent(schedule[step - 1, 0], schedule[step - 1, 1], limits[0], normal)
-        for k in range(moved):
-            G[count, k] = (normal[0] * phi[1 + k] + normal[1] * theta[1 + k]) / distance
-        G[count, moved + ANGLE_SLACK] = -1.0
-        h[count] = 1.0 - (normal[0] * phi[0] + normal[1] * theta[0]) / distance
-        count += 1
-        for i in range(LIMITED):
-            row = responses[step, states[i]]
-            slack = moved + (ANGLE_SLACK if i < 2 else RATE_SLACK)
-            for k in range(moved):
-                G[count, k] = row[1 + k] / limits[i]
-                G[count + 1, k] = -row[1 + k] / limits[i]
-            G[count, slack] = -1.0
-            G[count + 1, slack] = -1.0
-            h[count] = 1.0 - row[0] / limits[i]
-            h[count + 1] = 1.0 + row[0] / limits[i]
-            count += _TWO_SIDES
-    return count
-
-
-@compiled
-def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
-    problem = packed[0]
-    starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
-    steps = responses.shape[0] - 1
-    moved = responses.shape[2] - 1
-    states, moments, squared = np.empty((steps + 1, STATES)), np.empty((steps, INPUTS)), np.empty((steps, ROTORS))
-    for step in range(steps + 1):
-        for state in range(STATES):
-            total = responses[step, state, 0]
-            for k in range(moved):
-                total += responses[step, state, 1 + k] * z[k]
-            states[step, state] = total
-    held = u.copy()
-    move = 0
-    for step in range(steps):
-        if move < starts.shape[0] and starts[move] == step:
-            held += z[INPUTS * move : INPUTS * move + INPUTS]
-            move += 1
-        moments[step] = held
-        for rotor in range(ROTORS):
-            total = from_thrust[rotor] * thrust_n[step]
-            for i in range(INPUTS):
-                total += from_moments[rotor, i] * held[i]
-            squared[step, rotor] = total
-    return states, moments, squared
-
-
-@compiled
-def count_active(
-    G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
-) -> tuple[int, int, int, int]:
-    """Return the numbers of active limits of rotors, increments, angles and rates at z."""
-    increments = 0
-    for k in range(z.shape[0] - SLACKS):
-        if z[k] - lower[k] < binding or upper[k] - z[k] < binding:
-            increments += 1
-    rotors, angles, rates = 0, 0, 0
-    for row in range(G.shape[0]):
-        left = h[row]
-        for k in range(z.shape[0]):
-            left -= G[row, k] * z[k]
-        if left < binding:
-            if row < rotor_rows:
-                rotors += 1
-            elif (row - rotor_rows) % MOTION_ROWS < _ANGLE_ROWS:
-                angles += 1
-            else:
-                rates += 1
-    return rotors, increments, angles, rates
-
-
-@compiled
-def condense(
-    responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
+@inlined
+def _add_motion(
+    motion: Array, responses: Array, n: int, target: Target, weights: Weights, used: int, row: Array, H: Array, f: Array
 ) -> None:
-    problem = packed[0]
-    for i in range(INPUTS):  # the first increments may always cancel u
-        qp.lower[i] = min(-problem.max_increment[i], -u[i])
-        qp.upper[i] = max(problem.max_increment[i], -u[i])
-    quadratic_cost(responses, target, u, problem, qp.H, qp.f)
-    row = limit_rotors(problem, target.thrust_n, u, max_squared, qp.G, qp.h)
-    limit_motion(responses, schedule, problem, row, qp.G, qp.h)
+    """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n.
+
+    One loop over all rows: loading an element of H takes as long as adding one row.
+    """
+    on_place, on_velocity, on_rate, on_heading = weights.position, weights.velocity, weights.rate, weights.heading
+    x, X = motion[n], responses[n]
+    p0, p1, p2 = x[0] - target.position[n, 0], x[1] - target.position[n, 1], x[2] - target.position[n, 2]
+    v0, v1, v2 = x[3] - target.velocity[n, 0], x[4] - target.velocity[n, 1], x[5] - target.velocity[n, 2]
+    w0, w1, w2 = x[10] - target.rates[n - 1, 0], x[11] - target.rates[n - 1, 1], x[12] - target.rates[n - 1, 2]
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
+    s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
+    heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
+    for k in range(used):
+        row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
+    for k in range(used):
+        P0, P1, P2 = on_place * X[POSITION, k], on_place * X[POSITION + 1, k], on_place * X[POSITION + 2, k]
+        V0, V1, V2 = on_velocity * X[VELOCITY, k], on_velocity * X[VELOCITY + 1, k], on_velocity * X[VELOCITY + 2, k]
+        W0, W1, W2 = on_rate * X[RATE, k], on_rate * X[RATE + 1, k], on_rate * X[RATE + 2, k]
+        turned = on_heading * row[k]
+        first = f[k] + p0 * P0 + v0 * V0 + w0 * W0
+        second = first + p1 * P1 + v1 * V1 + w1 * W1
+        f[k] = second + p2 * P2 + v2 * V2 + w2 * W2 + heading * turned
+        for i in range(k + 1):
+            first = H[k, i] + P0 * X[POSITION, i] + V0 * X[VELOCITY, i] + W0 * X[RATE, i]
+            second = first + P1 * X[POSITION + 1, i] + V1 * X[VELOCITY + 1, i] + W1 * X[RATE + 1, i]
+            third = second + P2 * X[POSITION + 2, i] + V2 * X[VELOCITY + 2, i] + W2 * X[RATE + 2, i]
+            H[k, i] = third + turned * row[i]
 
 
 @compiled
-def objective(H: Array, f: Array, z: Array) -> float:
-    total = 0.0
-    for i in range(z.shape[0]):
-        total += f[i] * z[i]
-        for k in range(z.shape[0]):
-            total += 0.5 * z[i] * H[i, k] * z[k]
-    return total
+def _add_demand(
+    x: Array, squared: Array, X: Array, step: int, target: Target, problem: Problem, used: int, row: Array, H: Array,
+    f: Array,
+) -> None:  # fmt: skip
+    weights = problem.weights
+    away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])))
+    for i in range(2):
+        _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
+    thrust = -target.thrusts_n[step]
+    for rotor in range(ROTORS):
+        thrust += problem.allocation[rotor] * squared[rotor]
+    for k in range(used):
+        row[k] = problem.allocation[k % ROTORS] * problem.levels[k // ROTORS, step]
+    _add(weights.thrust, thrust, row, used, H, f)
+
+
+@compiled
+def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array) -> None:
+    for k in range(used):
+        weighted = weight * row[k]
+        f[k] += error * weighted
+        for i in range(k + 1):
+            H[k, i] += weighted * row[i]
+
+
+@compiled
+def _nearest(angle: float) -> float:
+    return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+
+
+@compiled
+def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
+    error = np.empty(3)
+    rate_between(wanted, np.array(R), 1.0, error)
+    return error
+
+
+@inlined
+def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
+    """Add ½ eᵀ S e of the final error in body axes; four rows in a loop, as in `_add_motion`."""
+    S = problem.terminal
+    steps, moved = target.rates.shape[0], X.shape[1]
+    inputs = moved // problem.levels.shape[0]
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    away = _rotation_error(target.attitudes[steps], R)
+    error, E = np.zeros(STATES), np.zeros((STATES, moved))
+    for i in range(3):
+        for j in range(3):
+            turned = R[j][i]
+            error[i] += turned * (x[POSITION + j] - target.position[steps, j])
+            error[VELOCITY + i] += turned * (x[VELOCITY + j] - target.velocity[steps, j])
+            for k in range(moved):
+                E[i, k] += turned * X[POSITION + j, k]
+            for k in range(moved):
+                E[VELOCITY + i, k] += turned * X[VELOCITY + j, k]
+        error[ROTATION + i] = away[i]
+        error[RATE + i] = x[10 + i] - target.rates[steps - 1, i]
+        put(X[ROTATION + i], E[ROTATION + i])
+        put(X[RATE + i], E[RATE + i])
+    for rotor in range(ROTORS):
+        error[DEVIATIONS + rotor] = squared[rotor] - target.end_squared[rotor]
+        for block in range(problem.levels.shape[0]):
+            E[DEVIATIONS + rotor, inputs * block + rotor] = problem.levels[block, steps]
+    weighted, W = np.zeros(STATES), np.zeros((STATES, moved))
+    for i in range(STATES):
+        for j in range(STATES):
+            weighted[i] += S[i, j] * error[j]
+        for j in range(0, STATES, 4):
+            s, t, u, v = S[i, j], S[i, j + 1], S[i, j + 2], S[i, j + 3]
+            for k in range(moved):
+                W[i, k] = W[i, k] + s * E[j, k] + t * E[j + 1, k] + u * E[j + 2, k] + v * E[j + 3, k]
+    for i in range(0, STATES, 4):
+        for k in range(moved):
+            s, t, u, v = E[i, k], E[i + 1, k], E[i + 2, k], E[i + 3, k]
+            f[k] = f[k] + s * weighted[i] + t * weighted[i + 1] + u * weighted[i + 2] + v * weighted[i + 3]
+            for j in range(k + 1):
+                H[k, j] = H[k, j] + s * W[i, j] + t * W[i + 1, j] + u * W[i + 2, j] + v * W[i + 3, j]
+
+
+@compiled
+def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
+    for block in range(problem.starts.shape[0] - 1):
+        weight = problem.weights.first if block == 0 else problem.weights.next
+        for rotor in range(ROTORS):
+            here = inputs * block + rotor
+            change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
+            H[here, here] += weight
+            f[here] += change
+            if block > 0:
+                H[here - inputs, here - inputs] += weight
+                H[here, here - inputs] -= weight
+                f[here - inputs] -= change
+
+
+@compiled
+def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
+    """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
+
+    `commands` of the references, (N, 4); `limits` (N, 2); `corrections` of each block, (b, 4).
+    """
+    inputs = lower.shape[0] // corrections.shape[0]
+    for block in range(corrections.shape[0]):
+        for rotor in range(ROTORS):
+            least, most = -np.inf, np.inf
+            for step in range(starts[block], starts[block + 1]):
+                least = max(least, limits[step, 0] - commands[step, rotor])
+                most = min(most, limits[step, 1] - commands[step, rotor])
+            corrections[block, rotor] = min(max(corrections[block, rotor], least), most)
+            lower[inputs * block + rotor] = least - corrections[block, rotor]
+            upper[inputs * block + rotor] = most - corrections[block, rotor]
+
+
+@compiled
+def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
+    rates, turned = np.empty(3), np.empty(2)
+    for step in problem.checked:
+        x, X = motion[step], responses[step]
+        R = rotation_matrix((x[6], x[7], x[8], x[9]))
+        for i in range(3):
+            rates[i] = x[10 + i]
+            for k in range(z.shape[0]):
+                rates[i] += X[RATE + i, k] * z[k]
+            if abs(rates[i]) > problem.max_rate[i]:
+                return True
+        turned[:] = 0.0
+        for i in range(2):
+            for k in range(z.shape[0]):
+                turned[i] += X[ROTATION + i, k] * z[k]
+        if R[2][2] + R[2][0] * turned[1] - R[2][1] * turned[0] < problem.min_cos_tilt:
+            return True
+    return False
+
+
+@compiled
+def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h: Array) -> None:
+    """Fill the soft rows of tilt and rates, each in parts of its limit."""
+    moved = responses.shape[2]
+    count = 0
+    G[:, :] = 0.0
+    for step in problem.checked:
+        x, X = motion[step], responses[step]
+        R = rotation_matrix((x[6], x[7], x[8], x[9]))
+        for k in range(moved):
+            G[count, k] = R[2][1] * X[ROTATION, k] - R[2][0] * X[ROTATION + 1, k]
+        G[count, moved + TILT_SLACK] = -1.0
+        h[count] = R[2][2] - problem.min_cos_tilt
+        for i in range(3):
+            limit = problem.max_rate[i]
+            for side in range(2):
+                sign, at = 1.0 - 2.0 * side, count + 1 + 2 * i + side
+                for k in range(moved):
+                    G[at, k] = sign * X[RATE + i, k] / limit
+                G[at, moved + RATE_SLACK] = -1.0
+                h[at] = 1.0 - sign * x[10 + i] / limit
+        count += MOTION_ROWS
+
+
+@inlined
+def read_plan(
+    motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
+) -> None:
+    """Write the `PREDICTED` states by z, yaw unwrapped from `psi` on."""
+    inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
+    for step in range(motion.shape[0]):
+        x, X, state = motion[step], responses[step], states[step]
+        for part in range(0, DEVIATIONS, 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for block in range(levels.shape[0]):
+                for k in range(inputs * block, inputs * block + ROTORS):  # four sums: none waits for another
+                    a += X[part, k] * z[k]
+                    b += X[part + 1, k] * z[k]
+                    c += X[part + 2, k] * z[k]
+                    d += X[part + 3, k] * z[k]
+            change[part], change[part + 1], change[part + 2], change[part + 3] = a, b, c, d
+        for i in range(6):
+            state[i] = x[i] + change[i]
+        a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
+        length = sqrt(1.0 + a * a + b * b + c * c)
+        w, x_, y, z_ = x[6] / length, x[7] / length, x[8] / length, x[9] / length
+        turned = (
+            w - a * x_ - b * y - c * z_,
+            x_ + a * w + c * y - b * z_,
+            y + b * w + a * z_ - c * x_,
+            z_ + c * w + b * x_ - a * y,
+        )
+        phi, theta, yaw = euler_from_quaternion(turned)
+        psi += _nearest(yaw - psi)
+        state[6], state[7], state[8] = phi, theta, psi
+        for i in range(3):
+            state[9 + i] = x[10 + i] + change[RATE + i]
+        for rotor in range(ROTORS):
+            state[12 + rotor] = speeds[step, rotor]
+            for block in range(levels.shape[0]):
+                state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]

@@ -1,7 +1,7 @@
-"""The `lpv-mpc` control law: position by feedback linearisation, attitude by LPV-MPC."""
+"""The LPV-MPC as a control law: references, observers and fallbacks."""
 
 from collections.abc import Mapping
-from math import radians
+from math import ceil, nan, radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -18,38 +18,61 @@ from colibri.autopilot.control.interface import (
     Preview,
     VehicleState,
 )
-from colibri.autopilot.control.lpv_mpc import prediction
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, AttitudeSettings, Plan
-from colibri.autopilot.control.lpv_mpc.condensing import Target
-from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
-from colibri.autopilot.control.lpv_mpc.position_loop import Motion
-from colibri.autopilot.control.lpv_mpc.prediction import InitialState
-from colibri.autopilot.control.parts.recovery import RecoverySettings, mix_with_priority
+from colibri.autopilot.control.lpv_mpc import planning
+from colibri.autopilot.control.lpv_mpc.feed_forward import Guidance
+from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
+from colibri.autopilot.control.lpv_mpc.path import PathSettings
+from colibri.autopilot.control.lpv_mpc.planning import Now
+from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
+from colibri.autopilot.control.parts.error_dynamics import gains
+from colibri.autopilot.control.parts.recovery import RecoverySettings
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked
-from colibri.common.config import Count, read_settings
-from colibri.common.elementary import square
-from colibri.common.kernels import cos
-from colibri.common.matrices import dot, matvec
+from colibri.common.config import Degrees, Negative, Positive, Table, read_settings
+from colibri.common.elementary import cos, square, tan
+from colibri.common.jit import opened, packed
+from colibri.common.matrices import dot
+from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis, or a steeper pitch
-_NO_YAW = np.empty(0)
+_RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
+_AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
+_SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
+"""In the first steps each rotor is limited to `_SHARES` times its share of the required thrust, but at least `_ALWAYS`
+times its hover thrust: at low thrust, moments against a supposed disturbance would tip over a standing vehicle."""
+
+_NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
+
+
+class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Tracking of the references."""
+
+    poles: tuple[Negative, Negative]
+    approach_speed_m_s: Positive
+    follow_within_m: Positive
+    max_acceleration_m_s2: Positive
+    exact_within_m: Positive
+    max_tilt_deg: Degrees
+    min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+    """Part of the weight."""
 
 
 class FallbackSettings(RecoverySettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fallbacks without a plan: the previous plan, then an LQR, then a descent."""
+    """Fallbacks without a plan."""
 
-    lqr_samples: Count
-    descent_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+    poles: tuple[Negative, Negative]
 
 
 class LpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The control law."""
 
     guidance: GuidanceSettings
-    attitude: AttitudeSettings
+    plan: PlanSettings
+    path: PathSettings
+    weights: WeightSettings
     fallback: FallbackSettings
 
 
@@ -57,124 +80,167 @@ class Memory(NamedTuple):
     """State of the law between two control samples."""
 
     tracked: Tracked
-    moments: Array  # U2..U4 last commanded, N m, (3,)
     plan: Plan | None  # previous plan, if usable
     age: int  # samples since that plan
+    lag_us: int  # of path time behind the clock
 
 
-class LawInputs(NamedTuple):
+class Inputs(NamedTuple):
     """Inputs of a decision."""
 
     observed: Observed
-    now: InitialState  # for the attitude MPC
-    motion: Motion  # for the outer loop
-
-
-class Choice(NamedTuple):
-    """A plan or a fallback."""
-
-    squared: Array  # rotor speeds, parts of the largest, (4,)
-    moments: Array
-    plan: Plan | None
-    age: int
-    diagnostics: Diagnostics
+    psi: float  # yaw, rad, unwrapped
+    max_n: float  # largest thrust
 
 
 class LpvMpc(TrackingLaw[Memory]):
-    """The control law; its predicted outputs are the states of `prediction`."""
+    """The control law; its predicted outputs are `condensing.PREDICTED`."""
 
-    plan_columns = PlanColumns(prediction.PHI, prediction.THETA, prediction.PSI, prediction.R)
+    plan_columns = PlanColumns(6, 7, 8, 11)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(table, LpvMpcSettings)
         super().__init__(settings, settings.fallback, vehicle)
-        self._lqr_samples, self._descent_thrust = settings.fallback.lqr_samples, settings.fallback.descent_thrust
-        interval_s, lag = self._interval_s, self.tracker.lag
-        self._attitude = AttitudeMpc(settings.attitude, vehicle, lag, settings.qp.build(), interval_s, clock)
-        self.preview = Preview(self.control_interval_us, self._attitude.horizon + 2)
-        self._outer_loop = OuterLoop(settings.guidance, vehicle, lag, interval_s, self._attitude.horizon)
+        h = self._interval_s
+        self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock)
+        self.min_path_speed = settings.path.min_speed
+        samples = self._mpc.horizon + 2
+        self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
+        self._span_n = float(self.tracker.allocation[0].sum())
+        self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
+        k1_s2, k2_s = gains(settings.guidance.poles)
+        guidance = Guidance(
+            k1_s2,
+            k2_s,
+            settings.guidance.approach_speed_m_s * k2_s / k1_s2,
+            settings.guidance.follow_within_m,
+            settings.guidance.max_acceleration_m_s2,
+            settings.guidance.exact_within_m,
+            h,
+            *gains(settings.fallback.poles),
+            self._mpc.from_wrench,
+        )
+        self._targets = TargetBuilder(guidance, settings.path, self._mpc)
+        self._min_squared = square(self.tracker.lag.min_speed)
+        min_n = self._span_n * self._min_squared
+        min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
+        tilt_tangent = tan(radians(settings.guidance.max_tilt_deg))
+        self._force = ForceLimits(tilt_tangent, min_n, min_n, min_up_n)
+        limits = np.empty((self._mpc.horizon, 2))
+        self._now = packed(Now(np.empty(RIGID), np.empty(ROTORS), _NO_DISTURBANCE, limits, self._force))
+        arrays = opened(self._now, Now)
+        self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
+        self._model_kg = self._mpc.model["airframe"]["mass_kg"]
+
+    def warm_up(self) -> None:
+        super().warm_up()
+        self._mpc.warm_up()
 
     def initial(self, rotor_speed: float) -> Memory:
-        tracked = self.tracker.initial(rotor_speed)
-        return Memory(tracked, tracked.wrench[1:].copy(), None, 0)
+        return Memory(self.tracker.initial(rotor_speed), None, 0, 0)
+
+    def lag_us(self, memory: Memory) -> int:
+        return memory.lag_us
+
+    def path_speed(self, memory: Memory) -> float:
+        plan = memory.plan
+        return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
+
+    def with_lag(self, memory: Memory, lag_us: int) -> Memory:
+        return memory._replace(lag_us=lag_us)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
-        planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
-        max_speed = self.tracker.battery.max_common_speed(memory.tracked.charge_ah)
-        disturbances = inputs.observed.estimate[6:]
-        setpoint = self._outer_loop.track(inputs.motion, references, planned_yaw, disturbances, max_speed)
-        return self._decide(memory, inputs, setpoint)
+        return self._decide(memory, inputs, self._targets.on_clock(self._now, references))
+
+    def step_on_path(
+        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[Memory, Decision]:
+        del time_us
+        inputs = self._inputs(memory, state)
+        kept = memory.plan.speeds if memory.plan else None
+        last = None if kept is None else kept[memory.age :]
+        wanted = self._targets.on_path(self._filled(inputs), references, last, memory.lag_us * 1e-6)
+        return self._decide(memory, inputs, wanted)
 
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
-        max_speed = self.tracker.battery.max_common_speed(memory.tracked.charge_ah)
-        setpoint = self._outer_loop.hold(inputs.motion, demand, inputs.now.disturbance_n_m, max_speed)
-        return self._decide(memory, inputs, setpoint)
+        wanted = self._targets.of_demand(self._filled(inputs), demand)
+        return self._decide(memory, inputs, wanted, on_track=False)
 
-    def _inputs(self, memory: Memory, state: VehicleState) -> LawInputs:
-        tracked, tracker = memory.tracked, self.tracker
-        observed = tracker.observe(tracked, state)
-        phi, theta, psi = state.euler
-        p, q, r = state.rate_flu_rad_s
-        thrust_n, *moments_n_m = tracked.wrench.tolist()
-        x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
-        momentum = dot(tracker.momentum, tracked.speeds)
-        _, _, measured, estimate, mass_kg, max_speed, _ = observed
-        now = InitialState(x, memory.moments, estimate[9:], momentum, max_speed)
-        motion = Motion(np.array(state.position_enu_m), measured[:3], measured[6:], float(psi), thrust_n, mass_kg)
-        return LawInputs(observed, now, motion)
-
-    def _decide(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> tuple[Memory, Decision]:
-        squared, moments, plan, age, diagnostics = self._choose(memory, inputs, setpoint)
-        observed = inputs.observed
-        commands, tracked = self.tracker.actuate(memory.tracked, observed, squared)
-        phi, theta, psi = setpoint.target.angles[0].tolist()
-        how = diagnostics._replace(mass_kg=observed.mass_kg)
-        return Memory(tracked, moments, plan, age), Decision(commands, (phi, theta, psi), how)
-
-    def _choose(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> Choice:
-        target, now, rotation = setpoint.target, inputs.now, inputs.observed.rotation
-        steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
-        if steep or setpoint.aligned < _RECOVER_BEYOND:
-            from_wrench, least = self._attitude.from_wrench, self._attitude.problem.min_squared
-            squared = self.recovered(setpoint.force, inputs.observed, from_wrench, least, square(now.max_speed))
-            moments = matvec(self.tracker.allocation[1:], squared)
-            return Choice(squared, moments, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
-        ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
-        plan, diagnostics = self._attitude.plan(now, target, ahead)
-        if plan is not None:
-            assert diagnostics.planned_squared is not None, "a plan has its commands"
-            return Choice(diagnostics.planned_squared[0], plan.moments[0], plan, 1, diagnostics)
-        age = memory.age + 1
-        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):
-            moments = memory.plan.moments[memory.age]
-            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
-            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, memory.plan, age, how)
-        if memory.age <= self._fallback.shifted_samples + self._lqr_samples:
-            moments = self._attitude.lqr(now, target)
-            how = diagnostics._replace(fallback=Fallback.LQR)
-            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
-        return self._descend(inputs, age, diagnostics)
-
-    def _descend(self, inputs: LawInputs, age: int, diagnostics: Diagnostics) -> Choice:
-        now = inputs.now
-        end = np.zeros(prediction.STATES + prediction.INPUTS)
-        end[prediction.PSI] = now.x[prediction.PSI]
-        end[9:] = end[6:9] = -now.disturbance_n_m
-        level = Target(end[None, [0, 2, 4]], end, np.zeros(1))
-        moments = self._attitude.lqr(now, level)
-        weight_n = inputs.observed.mass_kg * self.tracker.vehicle.gravity_m_s2
-        how = diagnostics._replace(fallback=Fallback.DESCENT)
-        squared = self._mixed(weight_n * self._descent_thrust, moments, now)
-        return Choice(squared, moments, None, age, how)
-
-    def _mixed(self, thrust_n: float, moments: Array, now: InitialState) -> Array:
-        problem, maximum = self._attitude.problem, square(now.max_speed)
-        return mix_with_priority(
-            thrust_n, moments, problem.from_thrust, problem.from_moments, problem.min_squared, maximum
+    def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
+        tracked, battery = memory.tracked, self.tracker.battery
+        observed = self.tracker.observe(tracked, state)
+        self._model_kg[0] = observed.mass_kg
+        expected = memory.plan.states[memory.age :, 12:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
+        max_n = self._span_n * square(battery.max_common_speed(tracked.charge_ah))
+        planning.begin(
+            observed.rigid,
+            tracked.speeds,
+            observed.estimate,
+            expected,
+            self._min_squared,
+            battery.open_voltage_v(tracked.charge_ah),
+            max_n,
+            battery.numbers,
+            self._now,
         )
+        return Inputs(observed, float(state.euler[2]), max_n)
+
+    def _filled(self, inputs: Inputs) -> Now:
+        return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
+
+    def _decide(
+        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool = True
+    ) -> tuple[Memory, Decision]:
+        squared, plan, age, diagnostics = self._choose(memory, inputs, wanted, on_track=on_track)
+        tracked, observed = memory.tracked, inputs.observed
+        commands, after = self.tracker.actuate(tracked, observed, squared)
+        lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
+        phi, theta, psi = planning.first_angles(wanted.target)
+        path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
+        how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
+        return Memory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
+
+    def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
+        if plan is None or plan.speeds is None:
+            return lag_us
+        passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])
+        return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
+
+    def _choose(
+        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
+    ) -> tuple[Array, Plan | None, int, Diagnostics]:
+        """Return squared rotor speeds, the plan to continue, its age, and diagnostics."""
+        target, force, path = wanted
+        along_n, force_n = planning.along(force, inputs.observed.measured)
+        if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
+            return self._recover(inputs, force, Diagnostics())
+        most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
+        planning.limit_first(self._now, most, _LIMITED_STEPS)
+        last = memory.plan.commands[memory.age :] if memory.plan else None
+        plan, diagnostics = self._mpc.plan(self._now, target, last, inputs.psi, path, on_track=on_track)
+        if plan is not None:
+            return plan.commands[0], plan, 1, diagnostics
+        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):
+            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
+            return memory.plan.commands[memory.age], memory.plan, memory.age + 1, how
+        return self._recover(inputs, force, diagnostics)
+
+    def _recover(
+        self, inputs: Inputs, force: Array, diagnostics: Diagnostics
+    ) -> tuple[Array, Plan | None, int, Diagnostics]:
+        least, most = self._arrays.limits[0].tolist()
+        squared = self.recovered(force, inputs.observed, self._mpc.from_wrench, least, most)
+        return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
+
+
+def _planned(memory: Memory, inputs: Inputs) -> bool:
+    if memory.plan is None:
+        return False
+    planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))
+    return dot(np.array([row[2] for row in planned]), inputs.observed.rotation[:, 2].copy()) > _AS_PLANNED

@@ -118,7 +118,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             "laws",
             """
             colibri check-controller geometric-se3
-            colibri check-controller whole-lpv-mpc --only memory --only limits
+            colibri check-controller lpv-mpc --only memory --only limits
             """,
         ),
         "certify": Command(

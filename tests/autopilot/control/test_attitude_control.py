@@ -16,7 +16,7 @@ from tests.support.states import turned
 VEHICLE = load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
 WEIGHT_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
-LAWS = ("lpv-mpc", "whole-lpv-mpc", "geometric-se3")
+LAWS = ("lpv-mpc", "geometric-se3")
 
 
 def build(name: str = "lpv-mpc") -> Any:
@@ -66,7 +66,7 @@ def test_full_turns_of_yaw_make_no_difference() -> None:
     controller = mpc()
     memory = controller.initial(VEHICLE.hover_speed)
     decisions = [
-        controller.step_attitude(memory, 0, turned(radians(5.0), psi=psi), held(22, 0.2, 0.1, wanted))[1]
+        controller.step_attitude(memory, 0, turned(radians(5.0), psi=psi), held(30, 0.2, 0.1, wanted))[1]
         for psi, wanted in ((0.3, 0.5), (0.3, 0.5 - 4.0 * np.pi), (0.3 + 6.0 * np.pi, 0.5))
     ]
     for decision in decisions[1:]:
@@ -79,7 +79,7 @@ def test_thrust_leaves_the_moments_their_room(thrust_n: float) -> None:
     memory, planned = controller.initial(VEHICLE.hover_speed), None
     for sample in range(30):
         memory, decision = controller.step_attitude(
-            memory, 8000 * sample, turned(0.0), held(22, 0.4, -0.3, 0.5, thrust_n)
+            memory, 8000 * sample, turned(0.0), held(30, 0.4, -0.3, 0.5, thrust_n)
         )
         planned = decision.diagnostics.planned_squared
         assert planned is not None
@@ -95,9 +95,9 @@ def test_far_from_the_demand_the_recovery_law_flies() -> None:
     controller = mpc()
     memory = controller.initial(VEHICLE.hover_speed)
     for state in (turned(radians(170.0)), turned(0.0, radians(80.0)), turned(radians(80.0))):
-        _, decision = controller.step_attitude(memory, 0, state, held(22, 0.0, 0.0, 0.0))
+        _, decision = controller.step_attitude(memory, 0, state, held(30, 0.0, 0.0, 0.0))
         assert decision.diagnostics.fallback is Fallback.RECOVERY
-    _, decision = controller.step_attitude(memory, 0, turned(radians(50.0)), held(22, 0.0, 0.0, 0.0))
+    _, decision = controller.step_attitude(memory, 0, turned(radians(50.0)), held(30, 0.0, 0.0, 0.0))
     assert decision.diagnostics.fallback is None
-    _, decision = controller.step_attitude(memory, 0, turned(radians(40.0)), held(22, radians(-40.0), 0.0, 0.0))
+    _, decision = controller.step_attitude(memory, 0, turned(radians(40.0)), held(30, radians(-40.0), 0.0, 0.0))
     assert decision.diagnostics.fallback is Fallback.RECOVERY

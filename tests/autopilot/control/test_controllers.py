@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.interface import Controller
-from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.autopilot.control.registry import (
     ControllerError,
     DecisionError,
@@ -16,6 +16,7 @@ from colibri.autopilot.control.registry import (
     check_rotor_speeds,
     load_controller,
 )
+from colibri.autopilot.control.settings import current_name
 from colibri.common.config import SettingsError
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.foreign import LAW, FlyTheirs, example, fly_as_a_user
@@ -162,3 +163,12 @@ def test_what_a_foreign_law_prints_is_shown(fly_theirs: FlyTheirs) -> None:
     prints = EXAMPLE.replace("        error =", "        time_us or print('now', time_us)\n        error =")
     done = fly_theirs(prints, *THEIRS, "udp", "--duration", "0.5")
     assert (done.returncode, done.stderr) == (0, "now 0\n")
+
+
+def test_a_former_name_is_accepted_with_a_warning(tmp_path: Path) -> None:
+    old = tmp_path / "old.toml"
+    old.write_text(profile_text("flight").replace("lpv-mpc", "whole-lpv-mpc"), encoding="utf-8")
+    current_name.cache_clear()
+    with pytest.warns(FutureWarning, match='"whole-lpv-mpc" is now called "lpv-mpc"'):
+        profile = load_profile(str(old)).with_choices("whole-lpv-mpc", None)
+    assert (profile.controller, profile.controllers) == ("lpv-mpc", load_profile("flight").controllers)

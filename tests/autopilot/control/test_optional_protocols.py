@@ -23,7 +23,6 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.loop import ControlLoop
-from colibri.autopilot.control.lpv_mpc import prediction
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.ground.forecast import POINTS, Forecaster
@@ -36,10 +35,8 @@ HUMMINGBIRD = load_vehicle("hummingbird")
 NOTHING = (0.0, 0.0, 0.0)
 LEVEL = turned(0.0)
 STAYING = staying(8)
-OF_FLIGHT = ("lpv-mpc", "whole-lpv-mpc")
 LAWS = {
     "lpv-mpc": "flight",
-    "whole-lpv-mpc": "flight",
     "cascade": "thesis",
     "global-lpv-mpc": "thesis",
     "geometric-se3": "se3",
@@ -53,10 +50,10 @@ def law(name: str) -> Controller[Any]:
 @pytest.mark.parametrize("name", LAWS)
 def test_one_built_in_law_has_charge_mass_and_plan(name: str) -> None:
     controller = law(name)
-    assert isinstance(controller, ChargeController) is (name in OF_FLIGHT)
-    assert isinstance(controller, PlanController) is (name in OF_FLIGHT)
-    assert isinstance(controller, MassController) is (name in OF_FLIGHT)
-    assert isinstance(controller, PathController) is (name == "whole-lpv-mpc")
+    assert isinstance(controller, ChargeController) is (name == "lpv-mpc")
+    assert isinstance(controller, PlanController) is (name == "lpv-mpc")
+    assert isinstance(controller, MassController) is (name == "lpv-mpc")
+    assert isinstance(controller, PathController) is (name == "lpv-mpc")
 
 
 def test_the_flight_law_remembers_the_reported_charge() -> None:
@@ -66,7 +63,6 @@ def test_the_flight_law_remembers_the_reported_charge() -> None:
     assert controller.charge_ah(memory) == 0.0
     assert controller.charge_ah(controller.with_charge(memory, 0.3)) == 0.3
     assert isinstance(controller, PlanController)
-    assert controller.plan_columns[:3] == prediction.ANGLES
 
 
 class Counted(NamedTuple):

@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
-from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
@@ -62,8 +62,8 @@ def test_yaw_is_unwrapped_by_continuity() -> None:
     assert last is not None
     predicted = last.diagnostics.predicted
     assert predicted is not None
-    assert predicted[0, WholeLpvMpc.plan_columns.psi] == pytest.approx(1.57 + 0.05 * 250)
-    assert abs(last.attitude_reference[2] - predicted[0, WholeLpvMpc.plan_columns.psi]) <= np.pi
+    assert predicted[0, LpvMpc.plan_columns.psi] == pytest.approx(1.57 + 0.05 * 250)
+    assert abs(last.attitude_reference[2] - predicted[0, LpvMpc.plan_columns.psi]) <= np.pi
 
 
 @pytest.mark.parametrize(

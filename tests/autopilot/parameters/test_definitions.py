@@ -24,10 +24,6 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
 NOT_IN_FLIGHT = {
     "lpv-mpc": {
-        *("control_interval_s", "qp.tolerance", "attitude.check_every"),
-        *(f"attitude.moves[{place}]" for place in range(6)),
-    },
-    "whole-lpv-mpc": {
         *("control_interval_s", "qp.tolerance", "plan.check_every", "plan.count_every", "path.max_speed"),
         *(f"plan.blocks[{place}]" for place in range(6)),
     },
@@ -44,7 +40,7 @@ def differences(before: Any, after: Any) -> set[str]:
     return {described(path) for path in numbers if read(before, path) != read(after, path)}
 
 
-@pytest.mark.parametrize("controller", ["lpv-mpc", "whole-lpv-mpc", "geometric-se3", "cascade", "global-lpv-mpc"])
+@pytest.mark.parametrize("controller", ["lpv-mpc", "geometric-se3", "cascade", "global-lpv-mpc"])
 @pytest.mark.parametrize("vehicle", ["hummingbird", "hummingbird-thesis"])
 def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle: str) -> None:
     profile = load_profile("flight" if controller in FLIGHT.controllers else "thesis").with_choices(controller, None)

@@ -62,7 +62,7 @@ def test_a_retuned_law_keeps_the_memory_of_the_old_one(flight: Flight) -> None:
     assert tuned is not None
     assert made(flight.parameters) is None
     assert tuned.vehicle.body.mass_kg == 0.75
-    assert tuned.profile.table("lpv-mpc")["guidance"]["poles"] == [-8.0, -6.0]
+    assert tuned.profile.table("lpv-mpc")["guidance"]["poles"] == [-8.0, -8.0]
     memory, before = flight.memory, flight.step()
     flight.law, flight.memory = tuned.controller, memory
     after = flight.step()

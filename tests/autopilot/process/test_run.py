@@ -1,20 +1,24 @@
 """The autopilot's process with ground stations: what it refuses to start with, and how it says so."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, SOCK_STREAM, socket
 
 import pytest
 
 from colibri.autopilot.__main__ import command_line
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.process.run import run
+from colibri.autopilot.process.state_folder import StateFolder
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
 from colibri.common.spec import from_namespace
 from colibri.mavlink.links.open import open_link
+from colibri.plant.vehicle.description import load_vehicle
 
-PARAMETERS = "whole-lpv-mpc-asctec-hummingbird.params"
+PARAMETERS = "lpv-mpc-asctec-hummingbird.params"
 
 
 class AtOnce(Stop):
@@ -114,6 +118,14 @@ def test_a_parameter_file_that_is_none(
     said = refused(capsys, "--gcs", "udpin:127.0.0.1:0", "--state", str(tmp_path))
     assert str(path) in said
     assert line in said
+
+
+def test_the_parameters_that_the_former_name_kept(tmp_path: Path) -> None:
+    former = tmp_path / f"whole-{PARAMETERS}"
+    former.write_text("1\t1\tWHL_POLE1\t-6\t9\n", encoding="utf-8")
+    profile, vehicle = load_profile("flight"), load_vehicle("hummingbird")
+    with closing(StateFolder(tmp_path, profile, vehicle, system_id=1, signing_key=None, tick=0)) as folder:
+        assert folder.parameters() == {"LPV_POLE1": -6.0}
 
 
 def test_a_state_folder_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -57,7 +57,7 @@ def test_each_message_of_the_mcap_is_a_row_of_its_topic(folder: Path, log: ULog)
             content = json.loads(message.data)
             assert content.keys() == json.loads(schema.data)["properties"].keys()
             if channel.topic == "logged_messages":
-                assert (schema.name, content["message"]) == ("foxglove.Log", "spiral, profile flight, whole-lpv-mpc")
+                assert (schema.name, content["message"]) == ("foxglove.Log", "spiral, profile flight, lpv-mpc")
                 continue
             assert message.log_time == 1000 * content["timestamp"]
             found.setdefault(channel.topic, []).append(flat(content, ""))

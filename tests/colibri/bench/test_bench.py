@@ -118,5 +118,5 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
-    blocks = load_profile(run.PROFILE).table("whole-lpv-mpc")["plan"]["blocks"]
+    blocks = load_profile(run.PROFILE).table("lpv-mpc")["plan"]["blocks"]
     assert tuple(msgspec.convert(blocks, list[int])) == stages.BLOCKS[stages.PROFILE_HORIZON]

@@ -113,7 +113,7 @@ def test_keys_are_changed_over_udp_too() -> None:
         ({"grid": {"track": ["hover"], "profile": ["fligt"]}}, 'unknown profile "fligt" (did you mean "flight"?)'),
         ({"grid": {"track": ["hover", "hovr"]}}, "hovr"),
         ({"grid": {"track": ["hover"], "plant-vehicle.body.mas_kg": [1.0]}}, 'did you mean "mass_kg"?)'),
-        ({"grid": {"track": ["hover"], "controllers.whole-lpv-mpc.weights.rat": [1.0]}}, 'did you mean "rate"?)'),
+        ({"grid": {"track": ["hover"], "controllers.lpv-mpc.weights.rat": [1.0]}}, 'did you mean "rate"?)'),
         ({"draw": {MASS: {"normal": [0.7, 0.8]}}}, "Expected `float` > 0.0"),
         ({"grid": {"track": ["hover"], "profile.references*": [2.0]}}, "leave the * out"),
         ({"fly": {"duration": -1.0}}, "duration: must be a number above 0 s"),

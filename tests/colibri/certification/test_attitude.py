@@ -10,20 +10,17 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.certification.attitude import AttitudeNumbers, Kinematics, box_of
 from colibri.certification.certificate import Entry
 from colibri.certification.exact import exactly
-from colibri.certification.flights import AttitudeLaw, Conditions, Interval, integrate
+from colibri.certification.flights import Conditions, Interval, integrate
 from colibri.certification.loop import RangeError, UncertainLoop
-from colibri.certification.lqr_attitude import LqrAttitude, of_euler_angles
 from colibri.certification.lyapunov import Proof
-from colibri.certification.whole_attitude import WholeAttitude, of_error
-from colibri.common.rotations import euler_rates
+from colibri.certification.planned_attitude import PlannedAttitude, of_error
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 
 PROFILE, VEHICLE, CONDITIONS = load_profile("flight"), load_vehicle("hummingbird"), Conditions(0.01, 0.5)
-LAW = LqrAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
-WHOLE = WholeAttitude(PROFILE.table("whole-lpv-mpc"), VEHICLE, CONDITIONS)
+LAW = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
 INERTIA = [0.003, 0.004, 0.006]
-UNEQUAL, WHOLE_UNEQUAL = (law.numbers_at(0.5)._replace(inertia_kg_m2=INERTIA) for law in (LAW, WHOLE))
+UNEQUAL = LAW.numbers_at(0.5)._replace(inertia_kg_m2=INERTIA)
 NOTHING = Proof(np.eye(12), np.ones(1), np.ones(1), 1.0)
 MARGIN = 1.0 + 1e-9
 
@@ -38,56 +35,37 @@ def directions(rng: np.random.Generator, kinematics: Kinematics, numbers: Attitu
     return side, np.einsum("ij,vij->v", side, box_of(arrays(numbers), kinematics).kinematic)
 
 
-def test_the_kinematic_hull_covers_the_attitude_box() -> None:
-    phi_end, theta_end = 2.0 * np.arctan(UNEQUAL.angles)
-    rng = np.random.default_rng(1)
-    for _ in range(500):
-        phi, theta = rng.uniform(-1.0, 1.0, 2) * (phi_end, theta_end)
-        T = np.array([euler_rates(phi, theta, tuple(rate)) for rate in np.eye(3)]).T
-        side, vertices = directions(rng, of_euler_angles, UNEQUAL)
-        assert np.sum(side * T) <= vertices.max() + 1e-12
-
-
 def test_the_error_hull_covers_the_error_box() -> None:
     rng = np.random.default_rng(1)
     for _ in range(500):
-        error = rng.uniform(-1.0, 1.0, 3) * WHOLE_UNEQUAL.angles[:3]
+        error = rng.uniform(-1.0, 1.0, 3) * UNEQUAL.angles[:3]
         eta = np.sqrt(1.0 - 0.25 * error @ error)
         T = np.array([eta * rate + 0.5 * np.cross(error, rate) for rate in np.eye(3)]).T
-        side, vertices = directions(rng, of_error, WHOLE_UNEQUAL)
+        side, vertices = directions(rng, of_error, UNEQUAL)
         assert np.sum(side * T) <= vertices.max() + 1e-12
 
 
-@pytest.mark.parametrize(
-    ("law", "numbers"),
-    [(LAW, LAW.numbers_at(0.6)), (LAW, UNEQUAL), (WHOLE, WHOLE.numbers_at(0.5)), (WHOLE, WHOLE_UNEQUAL)],
-    ids=["LQR", "LQR, unequal", "whole", "whole, unequal"],
-)
-def test_what_the_plant_does_in_an_interval_lies_within_the_loop(law: AttitudeLaw, numbers: AttitudeNumbers) -> None:
-    loop, rng, flights = law.loop(numbers, float), np.random.default_rng(2), 400
-    z, interval = somewhere(law, numbers, rng, flights)
+@pytest.mark.parametrize("numbers", [LAW.numbers_at(0.5), UNEQUAL], ids=["as it is", "unequal"])
+def test_what_the_plant_does_in_an_interval_lies_within_the_loop(numbers: AttitudeNumbers) -> None:
+    loop, rng, flights = LAW.loop(numbers, float), np.random.default_rng(2), 400
+    z, interval = somewhere(numbers, rng, flights)
     remembered = z @ np.array(numbers.commanded[1]).T
     after = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), remembered])
     sides = rng.normal(size=(flights, 12)) / np.abs(after).max(axis=0)
     assert (np.sum(sides * after, axis=1) <= supports(loop, z, sides) * MARGIN).all()
 
 
-def somewhere(
-    law: AttitudeLaw, numbers: AttitudeNumbers, rng: np.random.Generator, flights: int
-) -> tuple[Array, Interval]:
+def somewhere(numbers: AttitudeNumbers, rng: np.random.Generator, flights: int) -> tuple[Array, Interval]:
     rates = np.array(numbers.rates_rad_s)
     held = np.zeros((flights, 2))
     z = np.zeros((flights, 12))
-    if law is LAW:
-        held = rng.uniform(-0.9, 0.9, (flights, 2)) * 2.0 * np.arctan(numbers.angles)
-    else:
-        z[:, [0, 2, 4]] = rng.uniform(-0.8, 0.8, (flights, 3)) * numbers.angles[:3]
+    z[:, [0, 2, 4]] = rng.uniform(-0.8, 0.8, (flights, 3)) * numbers.angles[:3]
     z[:, [1, 3, 5]] = rng.uniform(-0.8, 0.8, (flights, 3)) * rates
     z[:, 6:] = rng.uniform(-0.02, 0.02, (flights, 6))
     disturbance = rng.normal(size=(flights, 3))
     disturbance *= numbers.disturbance_n_m / np.linalg.norm(disturbance, axis=1)[:, None]
     commands = z @ np.array(numbers.commanded[0]).T
-    flyer = law.flyer(Entry(0.5, numbers, NOTHING, {}), held, rng)
+    flyer = LAW.flyer(Entry(0.5, numbers, NOTHING, {}), held, rng)
     inertia = np.array(numbers.inertia_kg_m2)
     return z, Interval(commands, disturbance, inertia, numbers.lag_s, flyer.turn, flyer.momentum())
 
@@ -102,17 +80,15 @@ def supports(loop: UncertainLoop, z: Array, sides: Array) -> Array:
     return total
 
 
-@pytest.mark.parametrize(("law", "numbers"), [(LAW, UNEQUAL), (WHOLE, WHOLE_UNEQUAL)], ids=["LQR", "whole"])
-def test_fractions_and_floats_make_the_same_loop(law: AttitudeLaw, numbers: AttitudeNumbers) -> None:
-    floats, fractions = law.loop(numbers, float), law.loop(numbers, exactly)
+def test_fractions_and_floats_make_the_same_loop() -> None:
+    floats, fractions = LAW.loop(UNEQUAL, float), LAW.loop(UNEQUAL, exactly)
     for one, other in zip(floats, fractions, strict=True):
         assert np.asarray(other, dtype=float) == pytest.approx(one, rel=1e-12, abs=1e-15)
     assert isinstance(fractions.vertices[0, 0, 0], Fraction)
 
 
-@pytest.mark.parametrize(("law", "numbers"), [(LAW, UNEQUAL), (WHOLE, WHOLE_UNEQUAL)], ids=["LQR", "whole"])
-def test_symmetry_leaves_a_quarter_of_the_vertices(law: AttitudeLaw, numbers: AttitudeNumbers) -> None:
-    loop = law.loop(numbers, float)
+def test_symmetry_leaves_a_quarter_of_the_vertices() -> None:
+    loop = LAW.loop(UNEQUAL, float)
     assert len(loop.vertices) == 4 * len(loop.distinct().vertices) == 128
     assert loop.blocks() == [[0, 1, 6, 9], [2, 3, 7, 10], [4, 5, 8, 11]]
 
@@ -132,33 +108,33 @@ def test_ranges_that_an_interval_leaves_are_refused() -> None:
 
 
 def test_errors_and_gains_that_cannot_be_bounded_are_refused() -> None:
-    numbers = WHOLE.numbers_at(0.3)
+    numbers = LAW.numbers_at(0.3)
     with pytest.raises(RangeError, match="too large together"):
-        WHOLE.loop(numbers._replace(angles=[1.2, 1.2, 1.2, 0.1]), float)
+        LAW.loop(numbers._replace(angles=[1.2, 1.2, 1.2, 0.1]), float)
     with pytest.raises(RangeError, match="more than the rotors can do"):
-        WHOLE.loop(numbers._replace(unsure=np.ones((2, 3, 12)).tolist()), float)
+        LAW.loop(numbers._replace(unsure=np.ones((2, 3, 12)).tolist()), float)
 
 
 def test_the_gain_is_that_of_the_laws_own_steps() -> None:
     """A state that is small, held level in hover: what is of second order in it does not count."""
     z = 1e-4 * np.random.default_rng(5).normal(size=12)
-    commanded, plan = WHOLE.decide(z, (0.0, 0.0, 0.0), sum(WHOLE.thrusts_n(0.0)) / 2.0, None)
-    assert commanded == pytest.approx(WHOLE.commanded @ z, abs=1e-7)
+    commanded, plan = LAW.decide(z, (0.0, 0.0, 0.0), sum(LAW.thrusts_n(0.0)) / 2.0, None)
+    assert commanded == pytest.approx(LAW.commanded @ z, abs=1e-7)
     assert plan.commands.shape == (28, 4)
 
 
 def test_later_samples_of_the_last_plan_hardly_count() -> None:
     """It moves the nominal motion, about which deviations are linear, but by another integrator."""
-    hover_n, level = sum(WHOLE.thrusts_n(0.0)) / 2.0, (0.0, 0.0, 0.0)
+    hover_n, level = sum(LAW.thrusts_n(0.0)) / 2.0, (0.0, 0.0, 0.0)
     z = 1e-4 * np.random.default_rng(6).normal(size=12)
-    _, plan = WHOLE.decide(z, level, hover_n, None)
-    _, other = WHOLE.decide(-z, level, hover_n, None)
+    _, plan = LAW.decide(z, level, hover_n, None)
+    _, other = LAW.decide(-z, level, hover_n, None)
     mixed = plan._replace(commands=np.vstack([plan.commands[:3], other.commands[3:]]))
-    one, two = (WHOLE.decide(z, level, hover_n, each)[0] for each in (plan, mixed))
+    one, two = (LAW.decide(z, level, hover_n, each)[0] for each in (plan, mixed))
     assert np.abs(one - two).max() < 2e-3 * np.abs(one).max()
 
 
 def test_the_gain_hardly_depends_on_the_attitude() -> None:
-    unsure = np.array(WHOLE.numbers_at(0.43).unsure)
-    largest = np.abs(WHOLE.commanded).max(axis=2)
+    unsure = np.array(LAW.numbers_at(0.43).unsure)
+    largest = np.abs(LAW.commanded).max(axis=2)
     assert (unsure.max(axis=2)[:, :2] < 0.02 * largest[:, :2]).all()

@@ -12,10 +12,9 @@ from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
 from colibri.certification.certificate import Certificate, Entry
 from colibri.certification.flights import AttitudeLaw, Conditions, Interval, Plan, fly, integrate
-from colibri.certification.lqr_attitude import LqrAttitude
-from colibri.certification.lyapunov import Proof, spectral_radius
+from colibri.certification.lyapunov import Proof
+from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.certification.report import CERTIFICATE, FIGURE
-from colibri.certification.whole_attitude import WholeAttitude
 from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
@@ -24,33 +23,20 @@ from tests.support.commands import Refused
 HERE = Path(__file__).parent
 CONDITIONS, VEHICLE = Conditions(0.01, 0.5), load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
-FLIGHT = WholeAttitude(PROFILE.table("whole-lpv-mpc"), VEHICLE, CONDITIONS)
-LQR = LqrAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
-LAWS: dict[str, AttitudeLaw] = {"whole-lpv-mpc": FLIGHT, "lpv-mpc": LQR}
-CERTIFICATES = {name: certificates.read(HERE / f"{name}.json", AttitudeNumbers) for name in LAWS}
-"""Those of profile flight that `colibri certify` wrote."""
-REFUSED = 0.6
-"""Part of the ranges of the LQR made unstable: 52.8 degrees."""
-
-both = pytest.mark.parametrize("name", LAWS)
+FLIGHT = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
+CERTIFIED = certificates.read(HERE / "lpv-mpc.json", AttitudeNumbers)
+"""Of profile flight, as `colibri certify` wrote it."""
 
 
-@pytest.fixture(scope="module")
-def certified() -> Certificate:
-    return CERTIFICATES[PROFILE.controller]
-
-
-@both
-def test_the_certificate_is_of_what_flies(name: str) -> None:
-    for entry in CERTIFICATES[name]:
-        for one, other in zip(entry.numbers, LAWS[name].numbers_at(entry.scale), strict=True):
+def test_the_certificate_is_of_what_flies() -> None:
+    for entry in CERTIFIED:
+        for one, other in zip(entry.numbers, FLIGHT.numbers_at(entry.scale), strict=True):
             assert np.array(one) == pytest.approx(np.array(other), rel=1e-7, abs=2e-8)
 
 
-@both
-def test_the_certificate_is_confirmed_in_exact_arithmetic(name: str) -> None:
-    _, numbers, proof, margins = CERTIFICATES[name].invariant
-    assert certificates.margins_of(LAWS[name], "invariant", numbers, proof) == pytest.approx(margins, rel=0.01)
+def test_the_certificate_is_confirmed_in_exact_arithmetic() -> None:
+    _, numbers, proof, margins = CERTIFIED.invariant
+    assert certificates.margins_of(FLIGHT, "invariant", numbers, proof) == pytest.approx(margins, rel=0.01)
     assert min(margins.values()) > 0.0
 
 
@@ -70,51 +56,45 @@ def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
     ],
     ids=["P unlike", "P not symmetric", "larger multipliers", "larger set"],
 )
-def test_a_certificate_that_was_tampered_with_is_not_confirmed(
-    certified: Certificate, what: str, spoil: Callable[[Proof], Proof]
-) -> None:
-    _, numbers, proof, _ = certified.invariant
+def test_a_certificate_that_was_tampered_with_is_not_confirmed(what: str, spoil: Callable[[Proof], Proof]) -> None:
+    _, numbers, proof, _ = CERTIFIED.invariant
     assert certificates.margins_of(FLIGHT, "invariant", numbers, spoil(proof))[what] <= 0.0
 
 
 @pytest.mark.parametrize(("name", "factor"), [("commanded", 0.8), ("unsure", 4.0)])
-def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(certified: Certificate, name: str, factor: float) -> None:
-    _, numbers, proof, _ = certified.invariant
+def test_a_weaker_gain_or_a_lower_bound_is_not_confirmed(name: str, factor: float) -> None:
+    _, numbers, proof, _ = CERTIFIED.invariant
     other = numbers._replace(**{name: (factor * np.array(getattr(numbers, name))).tolist()})
     assert certificates.margins_of(FLIGHT, "invariant", other, proof)["decrease"] == 0.0
 
 
 @pytest.mark.long
-@both
 @pytest.mark.parametrize("part", Certificate._fields)
-def test_every_part_of_it_is_confirmed(name: str, part: str) -> None:
-    _, numbers, proof, _ = getattr(CERTIFICATES[name], part)
-    assert min(certificates.margins_of(LAWS[name], part, numbers, proof).values()) > 0.0
+def test_every_part_of_it_is_confirmed(part: str) -> None:
+    _, numbers, proof, _ = getattr(CERTIFIED, part)
+    assert min(certificates.margins_of(FLIGHT, part, numbers, proof).values()) > 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "flights"), [("lpv-mpc", 1000), pytest.param("whole-lpv-mpc", 1000, marks=pytest.mark.long)]
-)
-def test_of_flights_from_its_border_none_leaves_it(name: str, flights: int) -> None:
-    flown = fly(LAWS[name], CERTIFICATES[name].invariant, Plan(flights, 1.0, seed=1))
+@pytest.mark.parametrize("flights", [100, pytest.param(1000, marks=pytest.mark.long)])
+def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
+    flown = fly(FLIGHT, CERTIFIED.invariant, Plan(flights, 1.0, seed=1))
     assert flown.values.shape[1] == flights
     assert flown.values[0] == pytest.approx(np.ones(flights))
     assert flown.values.max() <= 1.0
 
 
-@both
-def test_flights_tend_to_what_is_certified_at_least_as_fast(name: str) -> None:
+def test_flights_tend_to_what_is_certified_at_least_as_fast() -> None:
     states, proof = (
-        fly(LAWS[name], CERTIFICATES[name].invariant, Plan(50, 0.5, seed=2)).states,
-        CERTIFICATES[name].attractor.proof,
+        fly(FLIGHT, CERTIFIED.invariant, Plan(50, 0.5, seed=2)).states,
+        CERTIFIED.attractor.proof,
     )
     values = np.einsum("tfi,ij,tfj->tf", states, proof.P, states)
     assert (values[1:] <= proof.ratio * values[:-1] + 1.0 - proof.ratio + 1e-9).all()
 
 
-def test_in_the_set_the_law_commands_little_beyond_its_gain(certified: Certificate) -> None:
+def test_in_the_set_the_law_commands_little_beyond_its_gain() -> None:
     """Of second order in the errors: at half of them a quarter. It is not proven, so it is measured."""
-    entry, rng = certified.invariant, np.random.default_rng(7)
+    entry, rng = CERTIFIED.invariant, np.random.default_rng(7)
     border = np.linalg.solve(np.linalg.cholesky(entry.proof.P).T, directions(rng, 300).T).T
     largest = {part: np.abs([beyond(part * z, rng, entry) for z in border]).max(axis=0) for part in (1.0, 0.5)}
     assert (largest[1.0] < 0.1 * np.abs(border @ FLIGHT.commanded[0].T).max(axis=0)[:3]).all()
@@ -135,15 +115,8 @@ def beyond(z: Array, rng: np.random.Generator, entry: Entry) -> Array:
 
 
 def test_the_sets_hold_attitudes_within_the_profile() -> None:
-    for name, least in (("lpv-mpc", 0.6), ("whole-lpv-mpc", 0.85)):
-        assert (np.degrees(LAWS[name].held(CERTIFICATES[name].invariant)) > 5.0).all()
-        assert CERTIFICATES[name].largest.scale > least
-
-
-def test_the_lqr_is_unstable_beyond_the_largest_ranges() -> None:
-    """So whatever kind of Lyapunov function were tried, it could not reach much further."""
-    assert spectral_radius(LQR.loop(LQR.numbers_at(0.66), float)) < 1.0
-    assert spectral_radius(LQR.loop(LQR.numbers_at(0.69), float)) > 1.0
+    assert (np.degrees(FLIGHT.held(CERTIFIED.invariant)) > 5.0).all()
+    assert CERTIFIED.largest.scale > 0.85
 
 
 def made(tmp_path: Path, changes: dict[str, str]) -> str:
@@ -164,24 +137,9 @@ def sluggish(tmp_path: Path) -> str:
     )
 
 
-@pytest.fixture
-def steep(tmp_path: Path) -> str:
-    """Return profile flight whose LQR is unstable: it may tilt further than its gain, that of hover, is stable."""
-    return made(tmp_path, {"max_angle_deg = 70.0": "max_angle_deg = 88.0"})
-
-
-@pytest.mark.parametrize(
-    ("profile", "options"),
-    [
-        pytest.param("sluggish", (), marks=pytest.mark.long),  # its kernels are compiled for it alone
-        ("steep", ("--controller", "lpv-mpc", "--least", REFUSED)),
-    ],
-)
-def test_a_profile_that_is_unstable_is_refused(
-    profile: str, options: tuple[object, ...], request: pytest.FixtureRequest, tmp_path: Path, refused: Refused
-) -> None:
-    file = request.getfixturevalue(profile)
-    said = refused("certify", file, *options, "--out", tmp_path, "--quiet", code=1)
+@pytest.mark.long  # its kernels are compiled for it alone
+def test_a_profile_that_is_unstable_is_refused(sluggish: str, tmp_path: Path, refused: Refused) -> None:
+    said = refused("certify", sluggish, "--out", tmp_path, "--quiet", code=1)
     assert re.search("refused.*unstable by itself", said)
     assert not (tmp_path / CERTIFICATE).exists()
 
@@ -189,7 +147,7 @@ def test_a_profile_that_is_unstable_is_refused(
 @pytest.mark.long
 def test_what_is_refused_is_unstable_indeed(sluggish: str) -> None:
     """By the law's own steps an error of a thousandth grows threefold; with the profile as it is it dies out."""
-    unstable = WholeAttitude(load_profile(sluggish).table("whole-lpv-mpc"), VEHICLE, CONDITIONS)
+    unstable = PlannedAttitude(load_profile(sluggish).table("lpv-mpc"), VEHICLE, CONDITIONS)
     assert left_after(unstable, 0.001) > 0.003
     assert left_after(FLIGHT, 0.001) < 0.001
 
@@ -197,7 +155,7 @@ def test_what_is_refused_is_unstable_indeed(sluggish: str) -> None:
 def left_after(law: AttitudeLaw, error: float) -> float:
     """Return the largest error of the attitude after 6 s that began so large about all axes."""
     numbers = law.numbers_at(0.1)
-    entry = Entry(0.1, numbers, CERTIFICATES["whole-lpv-mpc"].invariant.proof, {})
+    entry = Entry(0.1, numbers, CERTIFIED.invariant.proof, {})
     flyer = law.flyer(entry, np.zeros((1, 2)), np.random.default_rng(0))
     z, nothing, inertia = np.zeros((1, 12)), np.zeros((1, 3)), np.array(numbers.inertia_kg_m2)
     z[0, [0, 2, 4]] = error
@@ -208,29 +166,13 @@ def left_after(law: AttitudeLaw, error: float) -> float:
     return float(np.abs(z[0, [0, 2, 4]]).max())
 
 
-@pytest.mark.parametrize(("scale", "grows"), [pytest.param(0.5, False, marks=pytest.mark.long), (REFUSED, True)])
-def test_what_is_refused_of_the_lqr_is_unstable_indeed(steep: str, scale: float, grows: bool) -> None:
-    """An error far too small for what is not linear, where phi and theta are at the ends of their ranges."""
-    law = LqrAttitude(load_profile(steep).table("lpv-mpc"), VEHICLE, CONDITIONS)
-    numbers = law.numbers_at(scale)
-    entry = Entry(scale, numbers, CERTIFICATES["lpv-mpc"].invariant.proof, {})
-    flyer = law.flyer(entry, 2.0 * np.arctan([numbers.angles]), np.random.default_rng(0))
-    z, nothing, inertia = np.full((1, 12), 1e-9), np.zeros((1, 3)), np.array(numbers.inertia_kg_m2)
-    for _ in range(2000):
-        commands, remembered = flyer.commands(z)
-        interval = Interval(commands, nothing, inertia, numbers.lag_s, flyer.turn, lambda m, _: (0.0 * m[:, 0],) * 2)
-        z = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), remembered])
-    assert bool(abs(z).max() > 1e-6) == grows
-
-
 @pytest.mark.long
-@both
-def test_profile_flight_is_certified(name: str, tmp_path: Path) -> None:
-    arguments = ["certify", "flight", "--controller", name, "--flights", "100", "--out", str(tmp_path), "--quiet"]
+def test_profile_flight_is_certified(tmp_path: Path) -> None:
+    arguments = ["certify", "flight", "--flights", "100", "--out", str(tmp_path), "--quiet"]
     assert main(arguments) == 0
-    again, certified = certificates.read(tmp_path / CERTIFICATE, AttitudeNumbers), CERTIFICATES[name]
-    assert again.largest.scale == pytest.approx(certified.largest.scale, abs=0.02)
+    again = certificates.read(tmp_path / CERTIFICATE, AttitudeNumbers)
+    assert again.largest.scale == pytest.approx(CERTIFIED.largest.scale, abs=0.02)
     for part in ("invariant", "attractor"):
-        then, now = (getattr(each, part).proof.reach(np.eye(12)) for each in (certified, again))
+        then, now = (getattr(each, part).proof.reach(np.eye(12)) for each in (CERTIFIED, again))
         assert now == pytest.approx(then, rel=0.05)
     assert (tmp_path / FIGURE).stat().st_size > 10_000

@@ -1,32 +1,26 @@
-"""Certified laws in the whole plant: rotors, drag, battery and a disturbing moment, unlike the certificate's model.
+"""The certified law in the whole plant: rotors, drag, battery and a disturbing moment, unlike the certificate's model.
 
-The laws' own code decides: the LQR with every QP failing and its observer held at nothing, so that it flies all the
-time; and both as they fly, of which nothing is proven.
+The law's own code decides, as it flies.
 """
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Diagnostics, VehicleState
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
-from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, VehicleState
+from colibri.autopilot.control.lpv_mpc import law as lpv_mpc
+from colibri.autopilot.control.lpv_mpc.mpc import Plan as QpPlan
 from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.qp import QpStatus
-from colibri.autopilot.control.whole_lpv_mpc import law as whole_lpv_mpc
-from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
-from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan as QpPlan
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.flights import AttitudeLaw, Conditions, Plan, fly
-from colibri.certification.lqr_attitude import LqrAttitude
-from colibri.certification.whole_attitude import WholeAttitude
+from colibri.certification.flights import Conditions, Plan, fly
+from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.jit import packed
-from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Array, Quaternion
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.integrators import fixed_step
@@ -45,63 +39,34 @@ def table(name: str) -> dict[str, Any]:
     return load_profile("flight").table(name)
 
 
-class Lqr:
-    name = "lpv-mpc"
-    certified: AttitudeLaw = LqrAttitude(table(name), VEHICLE, CONDITIONS)
-    begun = LpvMpc(table(name), VEHICLE, lambda: 0.0).initial(VEHICLE.hover_speed)
-
-    def attitude(self, angles: Array) -> Quaternion:
-        return quaternion_from_euler(*angles.tolist())
-
-    def angles(self, attitude: Quaternion) -> Array:
-        return np.array(euler_from_quaternion(attitude))
-
-    def memory(self, tracked: Tracked, remembered: Array) -> Any:
-        return self.begun._replace(tracked=tracked, moments=remembered)
-
-    def remembered(self, memory: Any) -> Array:
-        moments: Array = memory.moments
-        return moments
+NAME = "lpv-mpc"
+CERTIFIED = PlannedAttitude(table(NAME), VEHICLE, CONDITIONS)
 
 
-class Whole:
-    name = "whole-lpv-mpc"
-    certified: AttitudeLaw = WholeAttitude(table(name), VEHICLE, CONDITIONS)
-
-    def attitude(self, angles: Array) -> Quaternion:
-        x, y, z = (0.5 * angles).tolist()
-        return float(np.sqrt(1.0 - x * x - y * y - z * z)), x, y, z
-
-    def angles(self, attitude: Quaternion) -> Array:
-        errors: Array = 2.0 * np.copysign(1.0, attitude[0]) * np.array(attitude[1:])
-        return errors
-
-    def memory(self, tracked: Tracked, remembered: Array) -> Any:
-        commands, level = (np.linalg.solve(ALLOCATION, [HOVER_N, *moments]) for moments in (remembered, np.zeros(3)))
-        states = np.tile(np.concatenate([np.zeros(12), level]), (29, 1))
-        return whole_lpv_mpc.Memory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
-
-    def remembered(self, memory: Any) -> Array:
-        assert memory.plan
-        moments: Array = ALLOCATION[1:] @ memory.plan.commands[memory.age]
-        return moments
+def attitude_from(errors: Array) -> Quaternion:
+    x, y, z = (0.5 * errors).tolist()
+    return float(np.sqrt(1.0 - x * x - y * y - z * z)), x, y, z
 
 
-LQR, WHOLE = Lqr(), Whole()
-Case: TypeAlias = Lqr | Whole
-"""A certified law, and what its errors are in the plant."""
+def errors_of(attitude: Quaternion) -> Array:
+    errors: Array = 2.0 * np.copysign(1.0, attitude[0]) * np.array(attitude[1:])
+    return errors
 
 
-def invariant(case: Case) -> certificates.Entry:
-    return certificates.read(Path(__file__).parent / f"{case.name}.json", AttitudeNumbers).invariant
+def memory_of(tracked: Tracked, remembered: Array) -> lpv_mpc.Memory:
+    commands, level = (np.linalg.solve(ALLOCATION, [HOVER_N, *moments]) for moments in (remembered, np.zeros(3)))
+    states = np.tile(np.concatenate([np.zeros(12), level]), (29, 1))
+    return lpv_mpc.Memory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
 
 
-def law() -> LpvMpc:
-    """Return the law with observers that observe next to nothing, and an LQR that never ends."""
-    numbers = table("lpv-mpc")
-    observer = {**numbers["observer"], "max_moment_n_m": 1e-12, "max_acceleration_m_s2": 1e-12}
-    fallback = {**numbers["fallback"], "lqr_samples": 1000}
-    return LpvMpc({**numbers, "observer": observer, "fallback": fallback}, VEHICLE, lambda: 0.0)
+def remembered(memory: lpv_mpc.Memory) -> Array:
+    assert memory.plan
+    moments: Array = ALLOCATION[1:] @ memory.plan.commands[memory.age]
+    return moments
+
+
+def invariant() -> certificates.Entry:
+    return certificates.read(Path(__file__).parent / f"{NAME}.json", AttitudeNumbers).invariant
 
 
 def disturbances(entry: certificates.Entry, kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
@@ -125,7 +90,6 @@ def disturbances(entry: certificates.Entry, kind: int, rng: np.random.Generator)
 
 
 def values(
-    case: Case,
     entry: certificates.Entry,
     controller: AttitudeController[Any],
     start: Array,
@@ -137,18 +101,18 @@ def values(
     speeds = np.sqrt(np.linalg.solve(ALLOCATION, wrench))
     x = np.zeros(18)
     x[3:6], x[8] = start[[1, 3, 5]], 100.0
-    x[9:13] = case.attitude(start[[0, 2, 4]])
+    x[9:13] = attitude_from(start[[0, 2, 4]])
     x[13:17] = speeds * VEHICLE.rotors.max_speed
     tracked = controller.initial(VEHICLE.hover_speed).tracked
-    memory = case.memory(tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench), start[9:].copy())
+    memory = memory_of(tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench), start[9:].copy())
     count = controller.preview.samples
     demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, HOVER_N))
     found = []
     for sample in range(SAMPLES):
         attitude, (p, q, r) = attitude_of(x.tolist()), x[3:6].tolist()
         z = np.zeros(12)
-        z[[0, 2, 4]], z[[1, 3, 5]] = case.angles(attitude), (p, q, r)
-        z[6:9], z[9:] = memory.tracked.wrench[1:], case.remembered(memory)
+        z[[0, 2, 4]], z[[1, 3, 5]] = errors_of(attitude), (p, q, r)
+        z[6:9], z[9:] = memory.tracked.wrench[1:], remembered(memory)
         found.append(float(z @ entry.proof.P @ z))
         moment_n_m = disturbance(sample, z)
         u, v, w = x[:3].tolist()
@@ -160,25 +124,11 @@ def values(
     return found
 
 
-def largest_value(case: Case, controller: AttitudeController[Any], flights: int) -> float:
-    rng, largest, entry = np.random.default_rng(4), 0.0, invariant(case)
-    for i, start in enumerate(fly(case.certified, entry, Plan(flights, 0.0, seed=4)).states[0]):
-        began, *later = values(case, entry, controller, start, disturbances(entry, i % 4, rng))
+@pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
+def test_flights_of_the_law_as_it_flies_stay_in_the_set(flights: int) -> None:
+    rng, entry = np.random.default_rng(4), invariant()
+    law = lpv_mpc.LpvMpc(table(NAME), VEHICLE, lambda: 0.0)
+    for i, start in enumerate(fly(CERTIFIED, entry, Plan(flights, 0.0, seed=4)).states[0]):
+        began, *later = values(entry, law, start, disturbances(entry, i % 4, rng))
         assert began == pytest.approx(1.0)
-        largest = max(largest, *later)
-    return largest
-
-
-FLIGHTS = pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
-
-
-@FLIGHTS
-def test_flights_of_the_whole_plant_stay_in_the_set(flights: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(AttitudeMpc, "plan", lambda *_: (None, Diagnostics(QpStatus.INFEASIBLE)))
-    assert largest_value(LQR, law(), flights) <= 1.0
-
-
-@FLIGHTS
-@pytest.mark.parametrize(("case", "law"), [(LQR, LpvMpc), (WHOLE, WholeLpvMpc)], ids=["lpv-mpc", "whole-lpv-mpc"])
-def test_so_do_those_of_a_law_as_it_flies(case: Case, law: type[LpvMpc | WholeLpvMpc], flights: int) -> None:
-    assert largest_value(case, law(table(case.name), VEHICLE, lambda: 0.0), flights) <= 1.0
+        assert max(later) <= 1.0

@@ -105,12 +105,12 @@ BAD_FILES = [
     (
         "spiral --profile",
         edited(FLIGHT, "blocks = [1, 2, 3, 5, 7, 10]", "blocks = []"),
-        "controllers.whole-lpv-mpc: plan.blocks: Expected `array` of length >= 1",
+        "controllers.lpv-mpc: plan.blocks: Expected `array` of length >= 1",
     ),
     (
-        "spiral --controller=lpv-mpc --profile",
-        edited(FLIGHT, '"along-plan"', '"ahead"'),
-        "controllers.lpv-mpc: attitude.scheduling: Invalid enum value 'ahead': choose along-plan, frozen",
+        "spiral --profile",
+        edited(FLIGHT, '"by-formula"', '"by-hand"'),
+        "references: Invalid enum value 'by-hand': choose by-differences, by-formula",
     ),
 ]
 SEEN_BY_THE_AUTOPILOT = ("unknown solver", "gurobi is", "controllers.")

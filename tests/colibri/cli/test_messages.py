@@ -38,7 +38,7 @@ MESSAGES = [
     ("campaign --track hovr --out out", "hovr"),
     ("campaign --profile flight --out out", "no track: say which is flown"),
     ("campaign there-is-none.toml --out out", "there-is-none.toml: No such file or directory"),
-    ("certify thesis --out out", "profile thesis: cascade cannot be certified: only lpv-mpc and whole-lpv-mpc can"),
+    ("certify thesis --out out", "profile thesis: cascade cannot be certified: only lpv-mpc can"),
     ("certify flight --controller geometric-se3 --out out", "geometric-se3 cannot be certified"),
     ("certify thesis --controller lpv-mpc --out out", "profile thesis: has no numbers for lpv-mpc"),
     ("certify nonsense --out out", "nonsense"),
@@ -69,7 +69,7 @@ MESSAGES = [
     ),
     (
         "compare --profile thesis:pid --out out",
-        'unknown controller "pid" (choose cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc)',
+        'unknown controller "pid" (choose cascade, geometric-se3, global-lpv-mpc, lpv-mpc)',
     ),
     ("compare --track loop --out out", 'unknown track "loop" (choose spiral'),
     ("compare --seeds=5-1", "argument --seeds: expected FIRST-LAST, 1-50 say, not 5-1"),

@@ -74,7 +74,7 @@ def test_nothing_stays_unless_it_is_saved(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_profile_and_vehicles_are_changed_by_their_keys(hover: colibri.Flight) -> None:
     heavier = colibri.load_vehicle("hummingbird").replace("body.mass_kg", 0.8)
-    profile = colibri.load_profile("flight").replace("controllers.whole-lpv-mpc.weights.rate", 0.02)
+    profile = colibri.load_profile("flight").replace("controllers.lpv-mpc.weights.rate", 0.02)
     flight = colibri.fly("hover", profile=profile, plant_vehicle=heavier, **HOVER)
     assert (flight.report["profile"], flight.plan.plant_vehicle.body.mass_kg) == ("flight*", 0.8)
     assert flight.plan.vehicle.body.mass_kg == hover.plan.vehicle.body.mass_kg

@@ -55,7 +55,7 @@ def flown(flight: Flight[Any]) -> list[Sample]:
         if frame % 100 == 0:
             inbox.append(codec.encode("HEARTBEAT", mav.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         if frame == 50:
-            inbox.append(codec.encode("PARAM_SET", 1, 1, b"WHL_POLE1", -7.1, mav.MAV_PARAM_TYPE_REAL32))
+            inbox.append(codec.encode("PARAM_SET", 1, 1, b"LPV_POLE1", -7.1, mav.MAV_PARAM_TYPE_REAL32))
         if frame == 120:
             flight.plant.inject([Fault(GPS, OFF, 1)])
         samples.append(flight.step([Received(datagram, 0, STATION) for datagram in inbox]))

@@ -21,7 +21,7 @@ def range_of(**given: Any) -> dict[str, Any]:
     ("tables", "said"),
     [
         ({"tune": {}}, "tune: say which numbers,"),
-        ({"tune": {"controllers.whole-lpv-mpc.weights.positon": {"uniform": [1, 200]}}}, 'did you mean "position"'),
+        ({"tune": {"controllers.lpv-mpc.weights.positon": {"uniform": [1, 200]}}}, 'did you mean "position"'),
         ({"tune": {"track": {"choice": ["hover", "spiral"]}}}, "tune: track is no number of a profile"),
         ({"tune": {"vehicle.body.mass_kg": {"uniform": [0.6, 0.8]}}}, "vehicle.body.mass_kg is no number of a profile"),
         ({"tune": {f"{WEIGHTS}": {"uniform": [1, 2]}}}, f"{WEIGHTS}: the profile has "),
@@ -38,7 +38,7 @@ def range_of(**given: Any) -> dict[str, Any]:
         (range_of(choice=[10.0, 20.0]), "position: the profile has 100.0: put it among 10.0, 20.0"),
         (range_of(uniform=[-5, 200]), rf"{POSITION} = -5.0: .*position: Expected `float` >"),
         (
-            {"tune": {"controllers.whole-lpv-mpc.qp.max_iterations": {"uniform": [1, 900]}}},
+            {"tune": {"controllers.lpv-mpc.qp.max_iterations": {"uniform": [1, 900]}}},
             "max_iterations = 1.0: .*`int`",
         ),
         ({"fly": TABLES["fly"] | {f"{WEIGHTS}.rate": 0.02}}, f"{RATE} is said twice: what is tuned is not in"),
@@ -98,13 +98,13 @@ def test_it_begins_with_the_profile_as_it_is() -> None:
     tune = {
         f"{WEIGHTS}.position": {"uniform": [1, 200]},
         f"{WEIGHTS}.rate*": {"log-uniform": [0.1, 10]},
-        "controllers.whole-lpv-mpc.plan.blocks.5": {"integers": [8, 12]},
-        "controllers.whole-lpv-mpc.qp.solver": {"choice": ["daqp", "clarabel"]},
+        "controllers.lpv-mpc.plan.blocks.5": {"integers": [8, 12]},
+        "controllers.lpv-mpc.qp.solver": {"choice": ["daqp", "clarabel"]},
     }
     tuning = planned(tune=tune)
     assert list(tuning.begins.values()) == [100.0, 1.0, 10, "daqp"]
     profile = tuning.tuned(dict(zip(tuning.space, (50.0, 2.0, 9, "clarabel"), strict=True)))
-    law = profile.controllers["whole-lpv-mpc"]
+    law = profile.controllers["lpv-mpc"]
     assert (law["weights"]["position"], law["weights"]["rate"]) == (50.0, 0.03)
     assert (law["plan"]["blocks"], law["qp"]["solver"]) == ([1, 2, 3, 5, 7, 9], "clarabel")
 

@@ -9,8 +9,8 @@ from colibri.autopilot.control.profile import profile_names, profile_text
 from colibri.tuning.profile_file import profile_file, tuned_name
 from tests.support.tuning import POSITION, WEIGHTS
 
-BLOCK = "profile.controllers.whole-lpv-mpc.plan.blocks.0"
-POLES = "profile.controllers.whole-lpv-mpc.guidance.poles"
+BLOCK = "profile.controllers.lpv-mpc.plan.blocks.0"
+POLES = "profile.controllers.lpv-mpc.guidance.poles"
 
 
 def read(text: str, folder: Path) -> colibri.Profile:
@@ -27,8 +27,8 @@ def test_comments_stay_and_numbers_change(tmp_path: Path) -> None:
         "# Tuned by hand.\n"
         "# Tuned, and what it was:\n"
         f"#   {WEIGHTS}.position = 250.0  # 100.0\n"
-        "#   controllers.whole-lpv-mpc.plan.blocks.0 = 2  # 1\n"
-        "#   controllers.whole-lpv-mpc.guidance.poles = [-6.5, -8.0]  # [-7.0, -8.0]\n"
+        "#   controllers.lpv-mpc.plan.blocks.0 = 2  # 1\n"
+        "#   controllers.lpv-mpc.guidance.poles = [-6.5, -8.0]  # [-7.0, -8.0]\n"
     )
     before, after = profile_text("flight").splitlines(), text.splitlines()[5:]
     changed = [(was, now) for was, now in zip(before, after, strict=True) if was != now]

@@ -125,7 +125,7 @@ def test_battery_status_and_what_is_said(on_state: Flown) -> None:
     assert 0.9 < battery["remaining"][-1] < 1.0
     status = on_state["vehicle_status"]
     assert {(a, b) for a, b in zip(status["arming_state"], status["nav_state"], strict=True)} == {(2, 23)}
-    assert [said.message for said in on_state.log.logged_messages] == ["spiral, profile flight, whole-lpv-mpc"]
+    assert [said.message for said in on_state.log.logged_messages] == ["spiral, profile flight, lpv-mpc"]
     profile = load_profile("flight")
     defined = definitions(profile, load_vehicle(profile.simulation.vehicle))
     assert on_state.log.initial_parameters == {each.name: each.default for each in defined}
@@ -165,7 +165,7 @@ def test_two_processes_write_one_file_with_the_same_numbers(on_state: Flown, tmp
     ("command", "said"),
     [
         (info.main, "vehicle_local_position_groundtruth (0, "),
-        (params.main, "WHL_"),
+        (params.main, "LPV_"),
         (messages.main, "INFO: spiral, profile flight"),
     ],
 )

@@ -177,7 +177,7 @@ def test_a_speed_parameter_acts_at_once(sitl: Sitl) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("MPC_JERK_MAX", 5.0), ("WHL_Q_POSITION", 50.0), ("WHL_POLE1", -5.0), ("VEH_MASS", 0.733), ("TRACK", 3)],
+    [("MPC_JERK_MAX", 5.0), ("LPV_Q_POSITION", 50.0), ("LPV_POLE1", -5.0), ("VEH_MASS", 0.733), ("TRACK", 3)],
 )
 @pytest.mark.wind("3@270")
 def test_a_parameter_that_changes_in_flight_jolts_nothing(sitl: Sitl, name: str, value: float) -> None:

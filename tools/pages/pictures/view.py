@@ -64,7 +64,7 @@ def compared(path: Path) -> None:
         folder = Path(held.enter_context(TemporaryDirectory()))
         saved = [flight.save(folder / str(number)) for number, flight in enumerate(both)]
         flights = read_flights(saved, held, wait=True)
-        for flight, name in zip(flights, ("whole-lpv-mpc", "geometric-se3"), strict=True):
+        for flight, name in zip(flights, ("lpv-mpc", "geometric-se3"), strict=True):
             flight.name = name
         keep(path, flights, 4.2)
 

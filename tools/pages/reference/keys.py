@@ -15,12 +15,10 @@ from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
 from colibri.autopilot.control.profile import ProfileTables, profile_names, profile_text
 from colibri.autopilot.control.thesis.cascade import CascadeSettings
 from colibri.autopilot.control.thesis.global_mpc import GlobalSettings
-from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpcSettings
 from colibri.plant.vehicle.description import Vehicle, vehicle_names, vehicle_text
 from tools.pages.tables import cell, with_body
 
 LAWS: dict[str, Any] = {
-    "whole-lpv-mpc": WholeLpvMpcSettings,
     "lpv-mpc": LpvMpcSettings,
     "geometric-se3": GeometricSettings,
     "cascade": CascadeSettings,

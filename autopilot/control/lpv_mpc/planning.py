@@ -8,10 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.parts.thrust_force import ForceLimits
-from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.vehicle_model.battery import fill_limits
-from colibri.autopilot.control.whole_lpv_mpc.condensing import (
+from colibri.autopilot.control.lpv_mpc.condensing import (
     MOTION_ROWS,
     Integers,
     Problem,
@@ -22,10 +19,13 @@ from colibri.autopilot.control.whole_lpv_mpc.condensing import (
     limit_motion,
     read_plan,
 )
-from colibri.autopilot.control.whole_lpv_mpc.deviations import Transition, respond
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
-from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
+from colibri.autopilot.control.lpv_mpc.deviations import Transition, respond
+from colibri.autopilot.control.lpv_mpc.feed_forward import lead
+from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
+from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
+from colibri.autopilot.control.qp import Qp
+from colibri.autopilot.control.vehicle_model.battery import fill_limits
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, norm, put

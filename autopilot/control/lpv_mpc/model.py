@@ -1,4 +1,4 @@
-"""The whole vehicle's model and its nominal motion, as compiled kernels.
+"""The vehicle's model and its nominal motion, as compiled kernels.
 
 The motion is a Runge-Kutta rollout of the rigid body with the expected commands. Squared rotor speeds, in parts of the
 largest, follow their commands as one linear lag.

@@ -1,4 +1,4 @@
-"""Deviations of the whole vehicle from its nominal motion, as compiled kernels.
+"""Deviations of the vehicle from its nominal motion, as compiled kernels.
 
 State, 12, driven by the squared rotor speeds:
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.whole_lpv_mpc.model import LEAST_SPEED, RIGID, ROTORS, Model
+from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, ROTORS, Model
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.types import Array

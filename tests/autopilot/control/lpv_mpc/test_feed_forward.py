@@ -6,12 +6,12 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 
+from colibri.autopilot.control.lpv_mpc import feed_forward, model
+from colibri.autopilot.control.lpv_mpc.feed_forward import Flat, Guidance
+from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
-from colibri.autopilot.control.whole_lpv_mpc import feed_forward, model
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
-from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
-from colibri.autopilot.control.whole_lpv_mpc.mpc import model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle

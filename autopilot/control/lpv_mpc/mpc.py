@@ -1,4 +1,4 @@
-"""The whole-vehicle LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
+"""The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
 from math import radians
 from typing import Annotated, NamedTuple
@@ -7,16 +7,16 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
+from colibri.autopilot.control.lpv_mpc import condensing, deviations, model, planning
+from colibri.autopilot.control.lpv_mpc.condensing import Problem, Weights
+from colibri.autopilot.control.lpv_mpc.model import ROTORS, Lag, Model
+from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
+from colibri.autopilot.control.lpv_mpc.planning import Kind, Workspace
 from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
-from colibri.autopilot.control.whole_lpv_mpc import condensing, deviations, model, planning
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Weights
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
-from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, read_speeds, speed_effects
-from colibri.autopilot.control.whole_lpv_mpc.planning import Kind, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
@@ -81,7 +81,7 @@ class _Qps(NamedTuple):
     limited: Qp
 
 
-class WholeMpc:
+class Mpc:
     """LPV-MPC of position, attitude and rotors together."""
 
     def __init__(

@@ -4,27 +4,27 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.interface import Horizon, Preview
+from colibri.autopilot.control.lpv_mpc import path, planning
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, VELOCITY
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.lpv_mpc.model import ROTORS
+from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpSolver
-from colibri.autopilot.control.whole_lpv_mpc import path, planning
-from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, POSITION, VELOCITY
-from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
-from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.config import SettingsError
 from colibri.common.types import Array
 from colibri.plant.physics.start import Start
-from tests.support.whole_mpc import TABLE, VEHICLE, Flight
+from tests.support.lpv_mpc import TABLE, VEHICLE, Flight
 
 INTERVAL_S = 0.008
 STARTS = np.array([0, 2, 6, 20])
 SAMPLES = int(STARTS[-1]) + 2
 EFFECTS = path.speed_effects(STARTS, INTERVAL_S)
 SPEEDS = np.array([1.0, 0.8, 0.5])
-ON_PATH = load_profile("path").table("whole-lpv-mpc")
+ON_PATH = load_profile("path").table("lpv-mpc")
 
 
 def horizon() -> Horizon:
@@ -91,7 +91,7 @@ def test_a_minimum_with_speeds_at_their_bounds_can_be_free(reward: float) -> Non
 def on_path(lap_s: float, seconds: float) -> tuple[Flight, Array]:
     """Fly a lemniscate from rest at its middle, on the path; return the flight and distances from the path, m."""
     flight = Flight(Start(x=0.0, y=0.0, z=20.0, psi=45.0, rotors=4740.0))
-    flight.law = WholeLpvMpc(ON_PATH, VEHICLE, lambda: 0.0)
+    flight.law = LpvMpc(ON_PATH, VEHICLE, lambda: 0.0)
     flight.memory = flight.law.initial(VEHICLE.hover_speed)
     name = f"lemniscate:lap={lap_s},height=20"
     planner = Planner(track(name), "by-formula", flight.law.preview)
@@ -124,4 +124,4 @@ def test_what_can_keep_the_time_catches_up_with_it() -> None:
 
 def test_a_speed_that_is_none_is_refused() -> None:
     with pytest.raises(SettingsError, match="min_speed"):
-        WholeLpvMpc({**TABLE, "path": {**TABLE["path"], "min_speed": 0.0}}, VEHICLE, lambda: 0.0)
+        LpvMpc({**TABLE, "path": {**TABLE["path"], "min_speed": 0.0}}, VEHICLE, lambda: 0.0)

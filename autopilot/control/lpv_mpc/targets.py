@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
-from colibri.autopilot.control.whole_lpv_mpc import feed_forward
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
-from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
-from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
-from colibri.autopilot.control.whole_lpv_mpc.planning import Now
+from colibri.autopilot.control.lpv_mpc import feed_forward
+from colibri.autopilot.control.lpv_mpc.condensing import Target
+from colibri.autopilot.control.lpv_mpc.feed_forward import Flat, Guidance
+from colibri.autopilot.control.lpv_mpc.model import ROTORS
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc
+from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
+from colibri.autopilot.control.lpv_mpc.planning import Now
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import dot, norm
 from colibri.common.types import Array
@@ -30,7 +30,7 @@ class Wanted(NamedTuple):
 class TargetBuilder:
     """Builds the targets of plans."""
 
-    def __init__(self, guidance: Guidance, path: PathSettings, mpc: WholeMpc) -> None:
+    def __init__(self, guidance: Guidance, path: PathSettings, mpc: Mpc) -> None:
         self._guidance, self._path, self._mpc = guidance, path, mpc
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2

@@ -5,11 +5,11 @@ from math import radians
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
+from colibri.autopilot.control.lpv_mpc import model
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc, Memory
+from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.whole_lpv_mpc import model
-from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc
-from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
-from colibri.autopilot.control.whole_lpv_mpc.mpc import model_of
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.compiled_rotations import euler_from_quaternion
@@ -22,12 +22,12 @@ from colibri.plant.physics.world import Physics, World, starting_world, state_fr
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 VEHICLE = load_vehicle("hummingbird")
-TABLE = load_profile("flight").table("whole-lpv-mpc")
+TABLE = load_profile("flight").table("lpv-mpc")
 STEP_US = 8_000
 
 
-def law(vehicle: Vehicle = VEHICLE) -> WholeLpvMpc:
-    return WholeLpvMpc(TABLE, vehicle, lambda: 0.0)
+def law(vehicle: Vehicle = VEHICLE) -> LpvMpc:
+    return LpvMpc(TABLE, vehicle, lambda: 0.0)
 
 
 class Flight:

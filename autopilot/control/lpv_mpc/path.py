@@ -14,10 +14,10 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon
+from colibri.autopilot.control.lpv_mpc.condensing import Integers
+from colibri.autopilot.control.lpv_mpc.deviations import POSITION, VELOCITY
+from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Integers
-from colibri.autopilot.control.whole_lpv_mpc.deviations import POSITION, VELOCITY
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.common.config import Positive, Table
 from colibri.common.jit import compiled
 from colibri.common.types import Array

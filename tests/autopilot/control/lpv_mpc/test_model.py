@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, empty_transition, respond
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Model
-from colibri.autopilot.control.whole_lpv_mpc.mpc import lagging, model_of
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, empty_transition, respond
+from colibri.autopilot.control.lpv_mpc.model import ROTORS, Model
+from colibri.autopilot.control.lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import rotation_matrix
 from colibri.plant.physics.equations import derivative
 from colibri.plant.physics.parameters import parameters_of
-from tests.support.whole_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
+from tests.support.lpv_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -1,4 +1,4 @@
-"""The attitude under `whole-lpv-mpc` without binding limits: the gain of its QP, read from the law itself.
+"""The attitude under `lpv-mpc` without binding limits: the gain of its QP, read from the law itself.
 
 The minimum of the QP is a function of attitude error, rates, rotor speeds and the last plan's correction for this
 sample. Its derivative at rest, level, in hover, is the certified gain; its small dependence on attitude and thrust is a
@@ -12,12 +12,22 @@ from typing import Any
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, M3, RATES, STATES
+from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc, LpvMpcSettings, Memory
+from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan
 from colibri.autopilot.control.qp import QpSolver
-from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, ROTATION
-from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, WholeLpvMpcSettings
-from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, WholeMpc
-from colibri.certification.attitude import MIRRORS, AttitudeNumbers, Kinematic, attitude_loop
+from colibri.certification.attitude import (
+    ANGLES,
+    INPUTS,
+    M1,
+    M3,
+    MIRRORS,
+    RATES,
+    STATES,
+    AttitudeNumbers,
+    Kinematic,
+    attitude_loop,
+)
 from colibri.certification.certificate import Entry
 from colibri.certification.flights import AttitudeLaw, Conditions, Flyer, Momentum
 from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
@@ -44,10 +54,10 @@ _ETA_SPARE = 1e-9
 _PREDICTED = 16
 
 
-class WholeAttitude(AttitudeLaw):
+class PlannedAttitude(AttitudeLaw):
     """The unconstrained attitude law of a profile; C as in `AttitudeNumbers`."""
 
-    what = "unconstrained attitude law of whole-lpv-mpc"
+    what = "unconstrained attitude law of lpv-mpc"
     axes = ("about x", "about y", "about z")
     not_proven = (
         "what its QP commands beyond its gain at rest: of second order in the errors",
@@ -58,11 +68,11 @@ class WholeAttitude(AttitudeLaw):
     thrust_part = 0.5  # the rest is the rotors' for moments
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
-        self._settings, self._vehicle, self.conditions = read_settings(table, WholeLpvMpcSettings), vehicle, conditions
-        self._law = WholeLpvMpc(table, vehicle, lambda: 0.0)
+        self._settings, self._vehicle, self.conditions = read_settings(table, LpvMpcSettings), vehicle, conditions
+        self._law = LpvMpc(table, vehicle, lambda: 0.0)
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
         solver = QpSolver(qp.solver, qp.tolerance, qp.max_iterations)
-        mpc = WholeMpc(plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0)
+        mpc = Mpc(plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0)
         self._from_wrench, self._to_wrench = mpc.from_wrench, self._law.tracker.allocation
         of_state = np.zeros((len(mpc.terminal_on_hold), STATES + INPUTS))
         of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
@@ -91,7 +101,7 @@ class WholeAttitude(AttitudeLaw):
         flights = len(held)
         thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
         headings = rng.uniform(-pi, pi, flights)
-        return _WholeFlyer(self, np.column_stack([held, headings]), thrusts_n)
+        return _PlanFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
         momentum = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed
@@ -186,10 +196,10 @@ class WholeAttitude(AttitudeLaw):
         return unsure
 
 
-class _WholeFlyer:
+class _PlanFlyer:
     """Flights by the law's own steps, each with its plan."""
 
-    def __init__(self, law: WholeAttitude, held: Array, thrusts_n: Array) -> None:
+    def __init__(self, law: PlannedAttitude, held: Array, thrusts_n: Array) -> None:
         self._law, self._held, self._thrusts_n = law, held.tolist(), thrusts_n
         self._plans: list[Plan | None] = [None] * len(held)
 

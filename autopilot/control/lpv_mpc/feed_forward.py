@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance
 from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force, overcome_drag
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, sin
 from colibri.common.matrices import norm, put

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from colibri.autopilot.control.lpv_mpc import condensing, planning
+from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp, QpSolver
-from colibri.autopilot.control.whole_lpv_mpc import condensing, planning
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 
 STARTS = np.array([0, 1, 3, 6])
 
