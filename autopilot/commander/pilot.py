@@ -288,11 +288,19 @@ class Pilot:
         now_us, vehicle = self.sensed.now_us, context.state
         if isinstance(wanted, AttitudeMotion):
             self.generator.set(wanted.reference)
-            self.ground.watch(now_us, vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
+            height_m = wanted.reference.height_m
+            if self.ground.watch(now_us, vehicle, height_m, sinks=wanted.sinks, drifts=wanted.drifts):
+                return self._fallen()
             return Guidance(attitude=wanted.demand, begins=begins)
         horizon = self.generator.lead(context, wanted)
-        self.ground.watch(now_us, vehicle, sinks=is_below(context.reference.height_m, vehicle))
+        height_m = context.reference.height_m
+        if self.ground.watch(now_us, vehicle, height_m, sinks=is_below(height_m, vehicle)):
+            return self._fallen()
         return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
+
+    def _fallen(self) -> Guidance:
+        self._stop_rotors(Event.TOUCHED_DOWN, "impact, rotors stopped")
+        return self._rest()
 
     @property
     def _comes_down(self) -> bool:

@@ -26,6 +26,9 @@ HARD_M_S, HARD_UP = 3.0, 0.5
 HARD_WITHIN_US = 4_000_000
 """A landing is detected at most so long after its contact."""
 
+HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0
+"""Height that is missing after a fall, and largest distance from where the vehicle stood last."""
+
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
 
@@ -88,9 +91,12 @@ class Hardest(NamedTuple):
         old = Hardest() if now_us - self.time_us > HARD_WITHIN_US else self
         return Hardest(now_us, max(sqrt(squared), old.speed_m_s), min(up, old.up))
 
+    def is_recent(self, now_us: int) -> bool:
+        return now_us - self.time_us <= HARD_WITHIN_US
+
     def impact(self, now_us: int) -> str:
         """Return the impact of a contact with the ground as text; empty for a landing."""
-        if now_us - self.time_us > HARD_WITHIN_US:
+        if not self.is_recent(now_us):
             return ""
         tilt_deg = degrees(acos(max(self.up, -1.0)))
         return f"impact at {self.speed_m_s:.1f} m/s" + (f", tilted {tilt_deg:.0f} degrees" if self.up < HARD_UP else "")
@@ -98,6 +104,12 @@ class Hardest(NamedTuple):
 
 def is_below(height_m: float, state: VehicleState) -> bool:
     return height_m < state.position_enu_m[2] - _BELOW_M
+
+
+def is_held_down(wanted_m: float, state: VehicleState, ground_m: float) -> bool:
+    """Whether a vehicle stays at the ground though it should be well above."""
+    z = state.position_enu_m[2]
+    return z < wanted_m - HELD_DOWN_M and abs(z - ground_m) < NEAR_GROUND_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:

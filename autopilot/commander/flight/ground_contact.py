@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.landing_detector import (
     Landing,
     is_carried,
     is_clear,
+    is_held_down,
     uncarried_s,
     watch,
 )
@@ -80,7 +81,7 @@ class GroundContact:
 
     def take_off(self, now_us: int) -> None:
         self.standing = False
-        self._landing, self._lack_s = Landing(), 0.0
+        self._landing, self._lack_s, self._hardest = Landing(), 0.0, Hardest()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "take-off")
 
@@ -93,12 +94,15 @@ class GroundContact:
         else:
             self._lines.say(NOTICE, "landing detected")
 
-    def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
+    def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
+        """Detect ground in flight; return whether the vehicle fell to it, below the height that is wanted."""
         if self._lack_s < SUSPECTED_S:
             self._hardest = self._hardest.after(now_us, vehicle)
-        self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
+        fell = not sinks and self._hardest.is_recent(now_us) and is_held_down(wanted_m, vehicle, self.height_m)
+        self._landing, stands = watch(self._landing, now_us, vehicle, sinks or fell, drifts=drifts)
         if stands:
             self.land(now_us)
+        return stands and fell
 
     def watch_lift(self, now_us: int, lift: float, interval_s: float) -> None:
         """Detect ground without trust in the estimate, while the vehicle comes down."""

@@ -95,3 +95,15 @@ def test_the_ground_is_no_payload(sitl: Sitl) -> None:
     sitl.run(1.0)
     assert mass_kg(sitl) == pytest.approx(NOMINAL_KG, rel=1e-3)
     assert sitl.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN, Mode.TRACK, Mode.ALTITUDE])
+@pytest.mark.sitl(airborne=3.0)
+def test_a_fall_is_an_impact_in_any_mode(sitl: Sitl, mode: Mode) -> None:
+    with sitl.sticks_held():
+        sitl.select(mode)
+        sitl.inject("motor", "off")
+        sitl.wait_until(lambda: sitl.position[2] < 0.01, within=2.0)
+        sitl.wait_until(lambda: not sitl.armed, within=1.0)
+    assert sitl.said("impact at 7")
+    assert sitl.texts[-1] == "impact, rotors stopped"
