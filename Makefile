@@ -5,8 +5,8 @@ OUT ?= out/spiral
 # Every command starts processes, the tests hundreds of them: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup fly test test-long lint test-clients test-peers test-view fuzz chaos scenarios scenarios-rough soak \
-  soak-clients kills golden verify-pythons bench docs pages lock clean
+.PHONY: setup fly test test-long lint test-clients test-peers test-view fuzz chaos random-flights scenarios \
+  scenarios-rough soak soak-clients kills golden verify-pythons bench docs pages lock clean
 
 setup: .venv/.ready
 
@@ -67,6 +67,10 @@ fuzz: setup
 # Exceptions thrown into every part of a flight, at 20 instants of each situation: hours. CHAOS="--instants 1", say.
 chaos: setup
 	$(BIN)/python -m tools.chaos $(CHAOS)
+
+# Flights drawn by seeds, with failures, parameters, modes and wind, in memory: half an hour. SEEDS=501-600 draws others.
+random-flights: setup
+	$(BIN)/python -m tools.random_flights $(if $(SEEDS),--seeds $(SEEDS))
 
 # Every scenario of tests/scenarios/, over UDP: SITL_LINK=memory flies them in one process each.
 SITL_LINK ?= udp

@@ -1,0 +1,47 @@
+"""Random flights: three of their cases, and what is a failure; `make random-flights` flies hundreds."""
+
+import pytest
+
+from tools.chaos.places import Thrower
+from tools.random_flights.__main__ import main
+from tools.random_flights.cases import Case, Event, case_of
+from tools.random_flights.flights import fly
+
+
+def case(*events: Event, well: bool = True) -> Case:
+    also = () if well else (Event(0.0, "silence", (0.1,)),)
+    return Case(1, "hummingbird", "state", "0@0", None, {}, 3.0, 25.0, [*events, *also])
+
+
+def test_a_seed_is_always_the_same_case() -> None:
+    assert case_of(7) == case_of(7) != case_of(8)
+
+
+@pytest.mark.parametrize(
+    ("events", "well", "violated"),
+    [
+        ([Event(4.0, "goto", (5.0, 0.0, 3.0))], True, ""),
+        ([Event(3.0, "inject", ("motor", "off", 0.0))], False, ""),
+        ([Event(3.0, "disarm")], True, "ValueError at "),
+    ],
+)
+def test_flights_are_judged(events: list[Event], well: bool, violated: str) -> None:
+    assert fly(case(*events, well=well)).violated[:14] == violated[:14]
+
+
+def test_an_exception_is_a_failure() -> None:
+    thrower = Thrower("autopilot.commander.pilot:Pilot.select", 1)
+    thrower.arm()
+    try:
+        assert fly(case()).violated.startswith("ChaosError at places.py")
+    finally:
+        thrower.disarm()
+
+
+def test_a_failing_seed_says_how_to_repeat(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("tools.random_flights.__main__.case_of", lambda _: case(Event(0.1, "disarm")))
+    monkeypatch.setattr("sys.argv", ["random_flights", "--seeds", "3"])
+    assert main() == 1
+    out = capsys.readouterr().out
+    assert out.startswith("FAILED: ValueError at ")
+    assert "repeat: python -m tools.random_flights --verbose --seeds 3\n" in out

@@ -1,0 +1,1 @@
+"""Flights drawn at random: vehicles, weather, parameters, modes, failures."""

@@ -1,0 +1,196 @@
+"""Flights of cases, and the conditions that each must keep."""
+
+from collections.abc import Callable
+from math import hypot, inf
+from pathlib import Path
+from time import thread_time
+from traceback import extract_tb
+from typing import Any, NamedTuple
+
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode
+from colibri.sitl import mission_items as items
+from colibri.sitl.backends.setting import setting_of
+from colibri.sitl.ground_station import RefusedError
+from colibri.sitl.session import Flights
+from colibri.sitl.stepping import NotInTimeError
+from colibri.sitl.vehicle import Sitl
+from tools.random_flights.cases import Case, Event
+
+MAX_IMPACT_M_S = 4.0
+"""What the vehicle calls an impact is 3 m/s, by its estimate."""
+MAX_TILT_DEG = 75.0
+AIRBORNE_M, NEAR_GROUND_M = 1.0, 0.15
+AFTER_S = 5.0
+LAND_WITHIN_S = 150.0
+
+
+class Verdict(NamedTuple):
+    """Outcome of a flight."""
+
+    violated: str  # the condition, or empty
+    frames_s: list[float]  # work of the autopilot in each frame
+    flown_s: float
+    texts: list[str]  # with their times
+
+
+def fly(case: Case) -> Verdict:
+    named = {name: getattr(case, name) for name in ("vehicle", "feedback", "wind", "seed")}
+    turbulence = {"turbulence": case.turbulence} if case.turbulence else {}
+    with Flights(setting_of([named, turbulence]), None) as flights:
+        flown = _Flown(flights.begin(), case)
+        violated = flown.judged()
+        texts = [f"{time_s:.2f} s: {text}" for time_s, text in flown.flight.timed_texts]
+        return Verdict(violated, flown.frames_s, flown.flight.time_s, texts)
+
+
+class _Flown:
+    def __init__(self, flight: Sitl, case: Case) -> None:
+        self.flight, self._case = flight, case
+        self.frames_s = _timed(flight)
+        self._feed: Callable[[], object] = _nothing
+        self._frames = 0
+        self._impact = self._breach = ""
+        self._limit_m: float | None = None  # of the distance from home, while outside the fence
+        self._keeps_fence = False
+        self._braking_m_s2 = self._reaction_s = 0.0
+
+    def judged(self) -> str:
+        """Return the violated condition, or nothing."""
+        step, self.flight.step = self.flight.step, self._step  # type: ignore[method-assign]
+        self._plain_step = step
+        try:
+            end = self._fly()
+        except Exception as error:
+            place = extract_tb(error.__traceback__)[-1]
+            at = f"{Path(place.filename).name}:{place.lineno}"
+            return f"{type(error).__name__} at {at}, t = {self.flight.time_s:.2f} s: {error}"
+        return self._unsaid() or self._breach or end
+
+    def _unsaid(self) -> str:
+        if not self._impact:
+            return ""
+        if self._case.well:
+            return f"{self._impact}, though nothing had failed"
+        said = any(text.startswith("impact") or text.endswith(": rotors stop") for text in self.flight.texts)
+        return "" if said else f"{self._impact}, unsaid"
+
+    def _fly(self) -> str:
+        flight, case = self.flight, self._case
+        for name, value in case.params.items():
+            _try(lambda name=name, value=value: flight.set_param(name, value))  # type: ignore[misc]
+        _try(lambda: flight.upload_fence(items.circle(case.radius_m)))
+        plan = ((12.0, 0.0), (0.0, 12.0), (-8.0, -8.0))
+        _try(lambda: flight.upload_mission(items.waypoint(east, north, case.height_m) for east, north in plan))
+        if not _try(lambda: flight.takeoff(case.height_m, wait=False)):
+            return ""
+        self._keeps_fence = case.well and flight.get_param("GF_ACTION") not in (0, 1)
+        self._braking_m_s2 = flight.get_param("MPC_ACC_HOR")
+        self._reaction_s = 0.5 + self._braking_m_s2 / flight.get_param("MPC_JERK_MAX")
+        for event in case.events:
+            self.flight.run(event.after_s)
+            self._limit_m = self._limit_m and inf  # a pilot may fly on outside
+            self._happen(event)
+        self.flight.run(AFTER_S)
+        return self._come_down()
+
+    def _happen(self, event: Event) -> None:
+        flight, values = self.flight, event.values
+        numbers = [value for value in values if isinstance(value, float)]
+        if event.what == "wind":
+            flight.wind = str(values[0])
+        elif event.what == "inject":
+            unit, kind, *_ = map(str, values)
+            _try(lambda: flight.inject(unit, kind, int(numbers[0]), *numbers[1:]))
+        elif event.what == "silence":
+            flight.gcs.silent = True
+            self.flight.run(numbers[0])
+            flight.gcs.silent = False
+        elif event.what == "goto":
+            east, north, up = numbers
+            _try(lambda: flight.goto(east, north, up, wait=False))
+        elif event.what == "fly":
+            _try(lambda: flight.fly_track(str(values[0])))
+        else:
+            self._select(Mode(event.what), *numbers)
+
+    def _select(self, mode: Mode, x: float, y: float) -> None:
+        flight = self.flight
+        if mode in MANUAL:
+            self._feed = lambda: flight.stick(pitch=x, roll=y)
+        elif mode is Mode.OFFBOARD:
+            self._feed = lambda: flight.setpoint(velocity=(4.0 * x, 4.0 * y, 0.0))
+        else:
+            self._feed = _nothing
+        self.flight.run(0.2)
+        _try(lambda: flight.select(mode))
+
+    def _come_down(self) -> str:
+        flight = self.flight
+        self._feed = _nothing
+        until_s = flight.time_s + LAND_WITHIN_S
+        if flight.armed:
+            _try(lambda: flight.select(Mode.LAND))
+        while flight.armed and flight.time_s < until_s:
+            self.flight.run(1.0)
+        return f"armed {LAND_WITHIN_S:g} s after mode land" if flight.armed else ""
+
+    def _step(self) -> None:
+        flight, self._frames = self.flight, self._frames + 1
+        if self._frames % 4 == 0:
+            self._feed()
+        armed, high = flight.armed, flight.position[2] > NEAR_GROUND_M
+        speed_m_s, tilt_deg = flight.speed_m_s, flight.tilt_deg
+        self._plain_step()
+        _, _, z = flight.position
+        if high and z <= NEAR_GROUND_M and (speed_m_s > MAX_IMPACT_M_S or tilt_deg > MAX_TILT_DEG):
+            self._impact = f"impact at {speed_m_s:.1f} m/s, {tilt_deg:.0f} degrees, t = {flight.time_s:.2f} s"
+        if armed and not flight.armed and z > AIRBORNE_M:
+            self._impact = f"rotors stopped at {z:.1f} m, t = {flight.time_s:.2f} s"
+        if self._keeps_fence and not self._breach:
+            self._check_fence()
+
+    def _check_fence(self) -> None:
+        flight = self.flight
+        (x, y, _), (vx, vy, _) = flight.position, flight.velocity
+        away_m = hypot(x, y)
+        if away_m < self._case.radius_m:
+            self._limit_m = None
+        elif self._limit_m is None:
+            out_m_s = max((x * vx + y * vy) / away_m, 0.0)
+            braking_m = out_m_s * self._reaction_s + 0.5 * out_m_s**2 / (0.7 * self._braking_m_s2)
+            self._limit_m = away_m + braking_m + flight.near_m + 1.0
+        elif away_m > self._limit_m:
+            self._breach = f"{away_m:.1f} m from home, beyond a fence of {self._case.radius_m:g} m and its braking"
+
+
+def _timed(flight: Sitl) -> list[float]:
+    """Time what the autopilot does in each frame, for the flight and for ground stations."""
+    autopilot, took_s = flight.inside.autopilot, list[float]()
+    step, serve = autopilot.step, autopilot.serve
+
+    def timed_step(*args: Any) -> Any:
+        began_s = thread_time()
+        answer = step(*args)
+        took_s.append(thread_time() - began_s)
+        return answer
+
+    def timed_serve(*args: Any) -> Any:
+        began_s = thread_time()
+        outbox = serve(*args)
+        took_s[-1:] = [took_s[-1] + thread_time() - began_s] if took_s else []
+        return outbox
+
+    autopilot.step, autopilot.serve = timed_step, timed_serve  # type: ignore[assignment,method-assign]
+    return took_s
+
+
+def _try(act: Callable[[], object]) -> bool:
+    """Do what the vehicle may refuse, or not hear."""
+    try:
+        act()
+    except (RefusedError, NotInTimeError):
+        return False
+    return True
+
+
+def _nothing() -> None: ...
