@@ -1,6 +1,7 @@
 """The uploaded geofence and the fence around home."""
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.wire.refusal import Refusal
 
+CHECKED_AT_ONCE = 30_000
+"""Pairs of a place and an edge of the fence; more of them do not fit into the processor's cache."""
 _LOOK_EVERY_US = 100_000
 _ITEM_US, _PAIR_US = 4.0, 0.02
 """Work to build an item of a fence, and to compare a place with one of its edges."""
@@ -59,12 +62,13 @@ class Fence:
         return self._geofence.size + 1
 
     def first_outside(self, places: Sequence[Vector]) -> tuple[int, Refusal] | None:
-        """Return the index of the first place outside, and why it is; all of them are compared at once."""
+        """Return the index of the first place outside, and why it is; many of them are compared at once."""
         if not self.exists:
             return None
         self._budget.spend(_PAIR_US * len(places) * self.size)
-        margins = self._geofence.margins_m(np.array(places)[:, :2]).tolist()
-        around = self._around_home
+        at_once, around = max(CHECKED_AT_ONCE // self.size, 1), self._around_home
+        parts = np.split(np.array(places)[:, :2], range(at_once, len(places), at_once))
+        margins = chain.from_iterable(self._geofence.margins_m(part).tolist() for part in parts)
         for i, (place, margin) in enumerate(zip(places, margins, strict=True)):
             refusal = around.refusal(place) if margin >= -EDGE_M else OUTSIDE
             if refusal is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.fence import CHECKED_AT_ONCE, Fence
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -20,9 +20,6 @@ from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
-
-CHECKED_AT_ONCE = 60_000
-"""Pairs of a place and an edge of the fence."""
 
 
 class Missions:

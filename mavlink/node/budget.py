@@ -2,7 +2,7 @@
 
 SHARE = 0.25
 """Part of simulated time: the control law needs the rest at real time."""
-MAX_SAVED_US = 4_000.0
+MAX_SAVED_US = 2_000.0
 
 
 class Budget:

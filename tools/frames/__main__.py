@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from time import thread_time
 from typing import Any
 
-from colibri.common.process.lifecycle import use_one_thread
+from colibri.common.process.lifecycle import gc_frozen, use_one_thread
 from colibri.mavlink.files.folder import Folder
 from tools.frames.requests import REQUESTS, in_the_air
 from tools.fuzz.flight import BareFlight
@@ -108,8 +108,9 @@ def _random(count: int) -> tuple[float, float]:
         timed = Timed(flight)
         names = [parameter.name for parameter in flight.copter.parameters]
         messages = Messages(random.Random(1), names, COMMANDS)
-        for _ in range(count // 40):
-            timed.send([messages.any().frame for _ in range(40)])
+        with gc_frozen():  # as processes fly
+            for _ in range(count // 40):
+                timed.send([messages.any().frame for _ in range(40)])
         files.close()
     return timed.worst_s * 1e3, timed.total_s * 1e3
 
