@@ -5,7 +5,8 @@ dead rotor i leaves -fᵢ aᵢ, with its expected thrust fᵢ and aᵢ = (1, y�
 
 Each rotor's CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood ratio of "dead" against "weak by a quarter,
 with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. One sample is
-bounded: a jump of the estimate cannot raise the alarm.
+bounded: a jump of the estimate cannot raise the alarm. Moments alone are no evidence: lift must drop with them, by part
+of the rotor's thrust below its recent mean. The ground and a failed gyroscope cause moments, but no such drop.
 """
 
 from typing import NamedTuple
@@ -27,6 +28,8 @@ MAX_EVIDENCE = 10.0  # from one sample: an alarm takes two
 _WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way from here to 1
 _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
 _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make failing sensors count less
+_USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
+_DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 """Standard deviations of the residual, in parts of a rotor's hover thrust and moments, by errors of the model (mass,
 drag, gusts, weak rotors), far above sensor noise; drag makes moments mostly about z."""
@@ -78,6 +81,7 @@ class Memory(NamedTuple):
     evidence: Array  # CUSUM of each rotor, (4,)
     residual: Array  # force and moments, N and N m, (4,)
     noise: Array  # variances of the residual's changes, (4,)
+    usual: Array  # mean of the residual force, N, (1,)
 
 
 class RotorWatch:
@@ -87,7 +91,7 @@ class RotorWatch:
         self._interval_s = interval_s
         self.lost: int | None = None  # 0..3, permanently
         self.max_evidence = 0.0
-        self._memory = packed(Memory(np.zeros(4), np.zeros(9), np.zeros(4), np.zeros(4), np.zeros(4)))
+        self._memory = packed(Memory(*map(np.zeros, (4, 9, 4, 4, 4, 1))))
         self._kept = opened(self._memory, Memory)
         self.adopt(vehicle)
         controls = (0.0, 0.0, 0.0, 0.0)
@@ -119,7 +123,7 @@ class RotorWatch:
     def begin(self, controls: FourRotors) -> None:
         kept = self._kept
         self.speeds = np.array(controls)
-        kept.evidence[:] = kept.residual[:] = kept.noise[:] = 0.0
+        kept.evidence[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
@@ -169,7 +173,7 @@ def _take_in(
     for i in range(3):
         kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
     if not counts:
-        kept.evidence[:] = 0.0
+        kept.evidence[:] = kept.usual[:] = 0.0
         return 0, 0.0
     return _add_evidence(kept, before, speeds_before, known.signature, known.interval_s)
 
@@ -212,6 +216,9 @@ def _add_evidence(
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
         last[row] = residual[row]
+    lift_n = 0.25 * rotors.mass_kg * rotors.gravity_m_s2
+    drop_n = memory.usual[0] - residual[0]
+    memory.usual[0] -= _USUAL_PART * min(max(drop_n, -lift_n), lift_n)
     likeliest = 0
     for i in range(4):
         added = 0.0
@@ -224,7 +231,8 @@ def _add_evidence(
                     minimum, maximum = maximum, minimum
                 weak -= min(max(weak, minimum), maximum)
             added += 0.5 * (weak * weak - none * none) / (rotors.variances[row] + noise[row])
-        evidence[i] = max(evidence[i] + min(added, MAX_EVIDENCE), 0.0)
+        most = MAX_EVIDENCE if drop_n > _DROP * rotors.effect[0, i] * thrust_n[i] else 0.0
+        evidence[i] = max(evidence[i] + min(added, most), 0.0)
         if evidence[i] > evidence[likeliest]:
             likeliest = i
     return likeliest, evidence[likeliest]

@@ -12,7 +12,8 @@ from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_INTERVAL_S = 0.02  # longest control interval for the landing: half a radian at four turns a second
-_CLEAR_M = 0.3  # least height for detection: touching ground looks like a rotor
+_CLEAR_M, _CLEAR_INVERTED_M = 0.3, 5.0
+"""Least height for detection. Ground presses an inverted vehicle as a lost rotor does; the estimated height may err."""
 
 Laws: TypeAlias = tuple[ReducedAttitude, ...]
 """One law for the loss of each rotor, (4,)."""
@@ -118,7 +119,9 @@ class RotorLoss:
         if self.watch.lost is not None:
             return False
         watches = self.enabled and not self.impossible
-        clear = watches and airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
+        _, x, y, _ = state.attitude
+        clear_m = _CLEAR_M if x * x + y * y < 0.5 else _CLEAR_INVERTED_M
+        clear = watches and airborne and state.position_enu_m[2] - ground_m > clear_m
         lost = self.watch.step(state, controls, charge_ah, airborne=clear)
         if lost is None:
             return False

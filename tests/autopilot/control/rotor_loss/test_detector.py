@@ -30,6 +30,14 @@ starts = st.builds(
     **dict.fromkeys(("phi", "theta", "psi"), st.floats(-180.0, 180.0)),
 )
 
+touchdowns = st.builds(
+    LEVEL._replace,
+    z=st.just(0.25),
+    vz=st.floats(-3.0, 0.0),
+    **dict.fromkeys(("vx", "vy"), st.floats(-3.0, 3.0)),
+    **dict.fromkeys(("phi", "theta"), st.floats(-35.0, 35.0)),
+)
+
 
 class Watched:
     def __init__(self, controls: FourRotors, start: Start = LEVEL) -> None:
@@ -107,6 +115,15 @@ def test_a_noisy_gyroscope_is_no_rotor(noise_rad_s: float) -> None:
         p, q, r = (noise_rad_s * random.standard_normal(3)).tolist()
         watch.step(still._replace(rate_flu_rad_s=(p, q, r)), (hover, hover, hover, hover), 0.0, airborne=True)
     assert watch.lost is None
+
+
+@settings(max_examples=30, deadline=None)
+@given(touchdowns, st.floats(0.4, 0.65))
+def test_ground_contact_is_no_lost_rotor(start: Start, speed: float) -> None:
+    """The height is estimated too high, so the detection goes on after the touchdown."""
+    flight = Watched((speed, speed, speed, speed), start)
+    assert flight.fly(WHOLE, 40) is None
+    assert flight.watch.max_evidence < 0.5 * ALARM
 
 
 def test_on_the_ground_nothing_is_lost() -> None:
