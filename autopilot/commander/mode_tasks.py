@@ -30,8 +30,11 @@ from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.mavlink.node.budget import Budget
 from colibri.plant.vehicle.description import Vehicle
 
+_TRACK_US = 6000.0
+"""Work to tabulate a track."""
 TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 """First task of a mode."""
 
@@ -79,6 +82,7 @@ class ModeTasks:
         instants: Instants,
         references: References,
         first: Track | None,
+        budget: Budget,
     ) -> None:
         """`attitude` is None for a law without attitude setpoints; `first` is a track flown from time 0."""
         self._missions = missions
@@ -86,7 +90,7 @@ class ModeTasks:
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._preview, self._instants = preview, instants
         self._references = references
-        self._first = first
+        self._first, self._budget = first, budget
         self._factories: dict[Mode, TaskFactory] = {
             Mode.HOLD: lambda _: HoldTask(),
             Mode.TAKEOFF: climb,
@@ -139,6 +143,7 @@ class ModeTasks:
             planner = self._plan(first)
             for_law = None if self._instants.rows is None else Planner(first, self._references, self._preview)
             return TrackTask(planner, first.duration_s, 0, for_law, start=_at_start(planner, context.now_us))
+        self._budget.spend(_TRACK_US)
         chosen = track(context.behaviour.track)
         return to_track(self._plan(chosen), chosen.duration_s)
 

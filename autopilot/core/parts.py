@@ -79,7 +79,7 @@ def parts_of(
     home, lines, budget = Home(settings.origin), StatusQueue(), Budget()
     fence = Fence(home, flies_by, budget)
     missions = Missions(home, fence, lines, flies_by)
-    tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first)
+    tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first, budget)
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
     defence = Defence(pilot, lines.say, strict=strict)
     stations = Stations(

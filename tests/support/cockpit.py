@@ -75,7 +75,7 @@ class Cockpit:
         self.missions = Missions(self.home, self.fence, self.lines, behaviour)
         attitude = AttitudeReference(vehicle, PREVIEW) if takes_attitude else None
         references = load_profile("flight").references
-        self.tasks = ModeTasks(self.missions, attitude, vehicle, PREVIEW, planned_at, references, first)
+        self.tasks = ModeTasks(self.missions, attitude, vehicle, PREVIEW, planned_at, references, first, Budget())
         self.pilot = Pilot(planned_at, behaviour, self.tasks.begin, self.home, self.lines)
         self.unmet: tuple[Need, ...] = (Need.CIRCLE,)
         self.engaged: list[tuple[Peer, int]] = []

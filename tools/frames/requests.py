@@ -194,6 +194,12 @@ def _tracks(flight: BareFlight) -> Iterator[list[bytes]]:
         yield [send.command(mav.MAV_CMD_NAV_LOITER_UNLIM)]
 
 
+def _modes(flight: BareFlight) -> Iterator[list[bytes]]:
+    send, modes = Sender(flight), [custom_mode(mode) for mode in (Mode.TRACK, Mode.HOLD)]
+    commands = [send.command(mav.MAV_CMD_DO_SET_MODE, 1.0, mode >> 16 & 0xFF, mode >> 24) for mode in modes]
+    yield commands * 40
+
+
 def _reset(flight: BareFlight) -> Iterator[list[bytes]]:
     send = Sender(flight)
     changed = [parameter for parameter in flight.copter.parameters if parameter.name.startswith(("WHL", "VEH", "MPC"))]
@@ -271,6 +277,7 @@ REQUESTS: Mapping[str, Request] = {
         mav.MAV_CMD_REQUEST_MESSAGE, mav.MAVLINK_MSG_ID_AVAILABLE_MODES, 0.0, count=95
     ),
     "each track": _tracks,
+    "80 changes of mode": _modes,
     "300 heartbeats": _repeated("HEARTBEAT", 6, 8, 0, 0, 4, 3, count=190),
     "4 kB of markers": _garbage(b"\xfd"),
     "4 kB of old markers": _garbage(b"\xfe"),
