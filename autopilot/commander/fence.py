@@ -24,7 +24,7 @@ class Fence:
     """The fences of one vehicle."""
 
     def __init__(self, home: Home, behaviour: Behaviour, budget: Budget) -> None:
-        self._home, self._budget = home, budget
+        self._home, self.budget = home, budget
         self._behaviour = behaviour
         self._items: tuple[MissionItem, ...] = ()
         self._geofence = Geofence((), home.origin)
@@ -39,7 +39,7 @@ class Fence:
         self.rebuild()
 
     def rebuild(self) -> None:
-        self._budget.spend(_ITEM_US * len(self._items))
+        self.budget.spend(_ITEM_US * len(self._items))
         self._geofence = Geofence(self._items, self._home.origin)
         self._breach, self._breach_due_us = None, 0
 
@@ -65,7 +65,7 @@ class Fence:
         """Return the index of the first place outside, and why it is; many of them are compared at once."""
         if not self.exists:
             return None
-        self._budget.spend(_PAIR_US * len(places) * self.size)
+        self.budget.spend(_PAIR_US * len(places) * self.size)
         at_once, around = max(CHECKED_AT_ONCE // self.size, 1), self._around_home
         parts = np.split(np.array(places)[:, :2], range(at_once, len(places), at_once))
         margins = chain.from_iterable(self._geofence.margins_m(part).tolist() for part in parts)

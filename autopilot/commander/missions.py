@@ -21,6 +21,9 @@ from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
+_PLACE_US = 2.0
+"""Work to find the place of an item."""
+
 
 class Missions:
     """The mission of one vehicle, and the plans around it.
@@ -133,6 +136,7 @@ class Missions:
     def _checked(self) -> Iterator[int]:
         """Warn of items outside the fence or below the ground; legs between items are not checked."""
         home, items, said = self._home, self._executor.items, (self.outside, self.below)
+        self._fence.budget.spend(_PLACE_US * len(items))
         found = list(places(items, home.position_enu_m, home.origin))
         at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
         outside = ""

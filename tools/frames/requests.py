@@ -241,6 +241,7 @@ REQUESTS: Mapping[str, Request] = {
     "80 new homes": _commands(mav.MAV_CMD_DO_SET_HOME, 1.0, 0.0),
     "100 new origins": _planned("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473977420, 85455940, 488000, 0, count=100),
     "80 plans cleared": _planned("MISSION_CLEAR_ALL", *TO, 255, count=80),
+    "100 fences cleared": _planned("MISSION_CLEAR_ALL", *TO, FENCE, count=100),
     "120 mission items read": _planned("MISSION_REQUEST_INT", *TO, 5, 0, count=120),
     "130 turns of the mission": _planned("MISSION_SET_CURRENT", *TO, 3, count=130),
     "15 listings of 1000 files": _files(_LIST, b"/", 15),
