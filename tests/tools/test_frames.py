@@ -12,6 +12,7 @@ from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitud
 from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.guidance.mission.geofence import Geofence
+from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.parameters import retuning
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
@@ -98,9 +99,12 @@ def test_a_frame_builds_one_control_law(name: str, counted: Counted) -> None:
     assert counted.total < 10
 
 
-def test_a_frame_designs_one_law_without_a_rotor(counted: Counted) -> None:
-    counted.at(ReducedAttitude, "__init__")
-    fly("120 parameters of the vehicle")
+@pytest.mark.parametrize(
+    ("name", "built"), [("120 parameters of the vehicle", ReducedAttitude), ("80 changes of mode", Planner)]
+)
+def test_a_frame_builds_one_thing(name: str, built: type, counted: Counted) -> None:
+    counted.at(built, "__init__")
+    fly(name)
     assert counted.most == 1
 
 

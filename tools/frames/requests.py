@@ -202,7 +202,7 @@ def _modes(flight: BareFlight) -> Iterator[list[bytes]]:
 
 def _reset(flight: BareFlight) -> Iterator[list[bytes]]:
     send = Sender(flight)
-    changed = [parameter for parameter in flight.copter.parameters if parameter.name.startswith(("WHL", "VEH", "MPC"))]
+    changed = [parameter for parameter in flight.copter.parameters if parameter.name.startswith(("LPV", "VEH", "MPC"))]
     for at in range(0, len(changed), 40):
         yield [send.sets(parameter, 0.001) for parameter in changed[at : at + 40] if not parameter.read_only]
     yield from [[]] * FRAMES_BETWEEN
@@ -227,7 +227,7 @@ def _old_frames(flight: BareFlight) -> Iterator[list[bytes]]:
 
 _SHELL = b"param\n" * 11
 REQUESTS: Mapping[str, Request] = {
-    "120 parameters of the law": _parameters("LPV", "WHL"),
+    "120 parameters of the law": _parameters("LPV"),
     "120 parameters of the vehicle": _parameters("VEH"),
     "120 parameters of the behaviour": _parameters("MPC", "MIS", "NAV"),
     "120 parameters of failsafes": _parameters("COM", "BAT", "GF"),
