@@ -130,7 +130,8 @@ class Copter:
             self.guard(table.RESTART, self._start.wake, _nothing, frame.time_us)
 
     def _know_charge(self, battery: PlantBattery) -> None:
-        self.loop.know_charge(battery.used_ah)
+        if battery.exists:
+            self.loop.know_charge(battery.used_ah)
         self.parts.battery.receive(battery)
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:

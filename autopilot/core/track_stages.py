@@ -98,7 +98,7 @@ class TrackStages:
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
         """Take in charge and delay as the plant reports them."""
         del frame
-        if plant_status.battery is not None:
+        if plant_status.battery is not None and plant_status.battery.exists:
             self.loop.know_charge(plant_status.battery.used_ah)
         if plant_status.delay_us is not None:
             self.delay.measure(plant_status.delay_us)

@@ -18,11 +18,15 @@ _SAG = 0.03
 
 
 class BatteryMonitor:
-    """Integrates the charge taken from one battery."""
+    """Integrates the charge taken from one battery.
+
+    Attributes:
+        battery: `None` if the vehicle, or the plant as it reports, has none.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._model = BatteryModel(vehicle)
-        self._battery = vehicle.battery
+        self.battery = vehicle.battery
         self._cells = 0 if vehicle.battery is None else max(1, round(vehicle.battery.full_voltage_v / _CELL_V))
         self.energy_wh = 0.0
         self._now = self._model.terminal(0.0, np.zeros(4))
@@ -32,12 +36,14 @@ class BatteryMonitor:
         self.charge_ah = 0.0
 
     def receive(self, reported: PlantBattery) -> None:
-        if self._battery is None:
+        if not reported.exists:
+            self.battery = None
+        if self.battery is None:
             return
         model_ah = self.charge_ah if self._is_reported else reported.used_ah
         self.charge_ah, self._is_reported = estimated(model_ah, reported.used_ah, self._vehicle), True
         sag_v = reported.voltage_v - self._now[0]
-        self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
+        self._sag_v = sag_v if abs(sag_v) > _SAG * self.battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:
         self.energy_wh = energy_wh
@@ -54,19 +60,19 @@ class BatteryMonitor:
 
     @property
     def left(self) -> float:
-        if self._battery is None:
+        if self.battery is None:
             return 1.0
-        return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
+        return max(0.0, 1.0 - self.charge_ah / self.battery.capacity_ah)
 
     @property
     def voltage_v(self) -> float:
         return max(0.0, self._now[0] + self._sag_v)
 
     def state(self, charge_state: int = CHARGE_OK) -> BatteryState | None:
-        if self._battery is None:
+        if self.battery is None:
             return None
         left, current_a = self.left, self._now[1]
-        left_ah = left * self._battery.capacity_ah
+        left_ah = left * self.battery.capacity_ah
         left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _MIN_CURRENT_A else nan
         taken = self.charge_ah, left, left_s, self.energy_wh
         return BatteryState(self._cells, self.voltage_v, current_a, *taken, charge_state)

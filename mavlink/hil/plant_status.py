@@ -1,6 +1,7 @@
 """The plant's messages beside a frame: battery, results of requested faults, the delay of commands."""
 
 from collections.abc import Sequence
+from math import nan
 from typing import NamedTuple
 
 from colibri.mavlink.hil import faults
@@ -17,10 +18,17 @@ _MAX_I32 = 2**31 - 1
 class PlantBattery(NamedTuple):
     """The plant's battery."""
 
-    voltage_v: float
+    voltage_v: float  # nan without a battery
     current_a: float
     used_ah: float  # since full
     remaining: float  # 0..1
+
+    @property
+    def exists(self) -> bool:
+        return self.voltage_v == self.voltage_v
+
+
+NO_BATTERY = PlantBattery(nan, 0.0, 0.0, 1.0)
 
 
 class FaultResult(NamedTuple):
@@ -50,8 +58,9 @@ class ReceivedFrame(NamedTuple):
 
 
 def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
-    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell."""
-    voltages = (min(round(1e3 * battery.voltage_v), _MAX_MV), *(_NO_CELL,) * 9)
+    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell; no cell without a battery."""
+    voltage_mv = min(round(1e3 * battery.voltage_v), _MAX_MV) if battery.exists else _NO_CELL
+    voltages = (voltage_mv, *(_NO_CELL,) * 9)
     kind = (0, mav.MAV_BATTERY_FUNCTION_ALL, mav.MAV_BATTERY_TYPE_LIPO, _UNKNOWN_TEMPERATURE)
     current = min(round(100.0 * battery.current_a), 32767)
     return codec.encode(
@@ -62,8 +71,10 @@ def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
 def decode_battery(message: Message) -> PlantBattery | None:
     fields = message.fields
     cells_mv = [cell for cell in fields.voltages if cell != _NO_CELL]
-    if not cells_mv or fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:
+    if fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:
         return None
+    if not cells_mv:
+        return NO_BATTERY if fields.current_battery == 0 else None
     current_a = max(0.0, fields.current_battery / 100.0)
     return PlantBattery(sum(cells_mv) / 1e3, current_a, fields.current_consumed / 1e3, fields.battery_remaining / 100.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, FourRotors, Vector
-from colibri.mavlink.hil.plant_status import PlantBattery
+from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import Eddies
@@ -92,9 +92,9 @@ class Physics:
         force: Vector = specific_force(self._vector(world), self._parameters)
         return force
 
-    def battery(self, world: World) -> PlantBattery | None:
+    def battery(self, world: World) -> PlantBattery:
         if self._battery is None:
-            return None
+            return NO_BATTERY
         (a, b, c, d), (i, j, k, m) = self._power, world.rotor_speeds
         power_w = a * i * i * i + b * j * j * j + c * k * k * k + d * m * m * m
         voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v

@@ -65,6 +65,15 @@ def test_a_low_voltage_counts_as_a_low_charge(sitl: Sitl) -> None:
     assert sitl.said("battery critical: land")
 
 
+@pytest.mark.sitl(
+    without=["battery"], airborne=2.0, params={"COM_LOW_BAT_ACT": 2, "BAT_LOW_T": 0.1, "BAT_CRIT_VOLT": 30.0}
+)
+def test_a_plant_without_battery_has_none_that_is_low(sitl: Sitl) -> None:
+    sitl.run(1.5)
+    assert sitl.mode is Mode.HOLD
+    assert not sitl.said("battery critical: land")
+
+
 @pytest.mark.sitl(airborne=5.0, params={"COM_TEL_LOSS_ACT": 1, "COM_TEL_LOSS_T": 0.1})
 def test_missed_frames_lead_to_what_is_set(sitl: Sitl) -> None:
     sitl.inside.skip(5)

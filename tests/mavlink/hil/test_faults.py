@@ -23,7 +23,7 @@ from colibri.mavlink.hil.faults import (
     fault_from,
     judged,
 )
-from colibri.mavlink.hil.plant_status import PlantBattery, decode_battery, encode_battery
+from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery, decode_battery, encode_battery
 from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -87,11 +87,13 @@ def test_any_numbers_are_a_fault_within_limits_or_none(
             assert abs(value) <= 1.0001 * max(abs(it.minimum), abs(it.maximum))
 
 
-@pytest.mark.parametrize("battery", [PlantBattery(16.8, 0.0, 0.0, 1.0), PlantBattery(9.61, 21.34, 1.234, 0.25)])
+@pytest.mark.parametrize(
+    "battery", [PlantBattery(16.8, 0.0, 0.0, 1.0), PlantBattery(9.61, 21.34, 1.234, 0.25), NO_BATTERY]
+)
 def test_a_battery_goes_over_the_wire(battery: PlantBattery) -> None:
     codec = Codec(1, 2)
     (message,) = codec.decode(encode_battery(codec, battery))
-    assert decode_battery(message) == pytest.approx(battery)
+    assert decode_battery(message) == pytest.approx(battery, nan_ok=True)
 
 
 def test_a_battery_that_tells_nothing_is_none() -> None:

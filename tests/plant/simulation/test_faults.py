@@ -25,7 +25,7 @@ from colibri.mavlink.hil.faults import (
     Fault,
 )
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.plant_status import FaultResult
+from colibri.mavlink.hil.plant_status import NO_BATTERY, FaultResult
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED
@@ -249,4 +249,4 @@ def test_it_tells_the_battery_of_its_world() -> None:
     used_a = (flown.world.charge_used_ah - before) * 3600.0 / (FRAME_US * 1e-6)
     assert battery.current_a == pytest.approx(used_a, rel=1e-3)
     bare = VEHICLE.without(["battery"])
-    assert Physics(bare, "rk4").battery(flown.world) is None
+    assert Physics(bare, "rk4").battery(flown.world) is NO_BATTERY
