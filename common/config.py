@@ -15,6 +15,8 @@ NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)
 """Raised for content that is not valid: `RecursionError` for nesting, a `ValueError` for text that is not UTF-8."""
 T = TypeVar("T")
+_MOST = 1e12
+"""Products of a few numbers up to there, and quotients, are finite."""
 
 
 def toml_names(folder: Path) -> list[str]:
@@ -75,12 +77,14 @@ class SettingsError(Error):
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of finite numbers."""
+    """A table of numbers that can be computed with."""
 
     def __post_init__(self) -> None:
         for key in self.__struct_fields__:
-            if not all(map(isfinite, _numbers(getattr(self, key)))):
-                raise ValueError(f"{key}: must be finite")
+            for number in _numbers(getattr(self, key)):
+                if number and not 1.0 / _MOST <= abs(number) <= _MOST:
+                    limits = "be finite" if not isfinite(number) else f"be 0, or from {1.0 / _MOST:g} to {_MOST:g}"
+                    raise ValueError(f"{key}: must {limits}")
 
 
 def _numbers(value: Any) -> Iterator[float]:

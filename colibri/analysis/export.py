@@ -5,7 +5,9 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from heapq import merge
+from io import BufferedReader, FileIO
 from itertools import chain
+from os import fstat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from pyulog import ULog
 
 _NS_PER_US = 1000
+_MOST_READS = 10_000
 _LOG_SCHEMA = {
     "type": "object",
     "properties": {
@@ -39,12 +42,24 @@ class ExportError(Error):
     """A log cannot be exported."""
 
 
+class _Bounded(BufferedReader):
+    """A file with fewer reads than bytes: at the end of a damaged one, pyulog goes back again and again."""
+
+    _reads = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        self._reads += 1
+        if self._reads > _MOST_READS and self._reads > fstat(self.fileno()).st_size:
+            raise ExportError("damaged")
+        return super().read(size)
+
+
 def read_log(log: Path) -> "ULog":
     with _needed("pyulog", "export"):
         from pyulog import ULog
     try:
-        with open(log, "rb", opener=regular) as file:
-            return ULog(file)
+        with FileIO(log, opener=regular) as file:
+            return ULog(_Bounded(file))
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error
     except Exception as error:  # pyulog raises many kinds for an invalid file

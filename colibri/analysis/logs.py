@@ -14,7 +14,7 @@ from colibri.mavlink.ulog.log import TopicReader
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 
 _AT_ONCE = 4096
-_MOST = 1e100
+_MOST = 1e30
 """Powers of the values that analysis takes are finite up to there."""
 _FINITE = {TRUTH.name: list(range(18)), DECISION.name: [*range(6), *range(10, 14)]}
 """Columns that are finite in every flight: states and rotor speeds, references and codes."""

@@ -154,7 +154,10 @@ def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
             assert true is not None
             if true.time_us > time_us:
                 return
-            datagram = b"".join(encode_state(codec, true))
+            try:
+                datagram = b"".join(encode_state(codec, true))
+            except OverflowError as error:
+                raise ReplayError(f"{flight.path}: state at t = {time_s:.3f} s: {error}: the log is damaged") from error
         yield time_us, datagram, ActuatorCommand(time_us, (c1, c2, c3, c4), bool(armed))
 
 

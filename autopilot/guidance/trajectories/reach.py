@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.profile import Profile, ProfileError
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, position
@@ -93,9 +93,12 @@ class Reach:
         self._battery = BatteryModel(vehicle)
         self._mixed = np.abs(inverse(vehicle.allocation())) * vehicle.rotors.thrust_coefficient
         law = profile.table(profile.controller)
-        self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))
-        predicted = law.get("plan", law.get("attitude", {}))
-        self._max_rate = float(min(predicted.get("max_rate_rad_s", (inf,))[:2]))
+        try:
+            self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))
+            predicted = law.get("plan", law.get("attitude", {}))
+            self._max_rate = float(min(predicted.get("max_rate_rad_s", (inf,))[:2]))
+        except (AttributeError, TypeError, ValueError) as error:
+            raise ProfileError(f"controllers.{profile.controller}: max_tilt_deg, max_rate_rad_s: {error}") from error
 
     def charge_of_hover(self, duration_s: float) -> float:
         rotors = self._vehicle.rotors
