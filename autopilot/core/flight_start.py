@@ -64,8 +64,7 @@ class FlightStart:
         parts.stations.say(INFO, parts.stations.system.banner)
         if not pilot.state.armed:
             return
-        if parts.state_source.estimate is not None and not parts.state_source.rests:
-            parts.lines.say(WARNING, FALLS)
+        self._catch(frame.time_us)
         self.resumed = goes_on(pilot.state.mode, parts.stations.missions.progress().seq)
         parts.lines.say(WARNING, self.resumed)
 
@@ -82,6 +81,10 @@ class FlightStart:
         parts.rotor_loss.forget()
         parts.actuation.begin(STILL if parts.pilot.ground.standing else loop.controls)
         parts.pilot.readiness.trust_rotors()
-        if parts.state_source.estimate is not None and not rests:
-            parts.lines.say(WARNING, FALLS)
+        self._catch(frame.time_us)
         parts.stations.say(INFO, parts.stations.system.banner)
+
+    def _catch(self, now_us: int) -> None:
+        if self._parts.state_source.estimate is not None and not self._parts.state_source.rests:
+            self._parts.lines.say(WARNING, FALLS)
+            self._supervision.catch(now_us)

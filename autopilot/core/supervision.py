@@ -9,6 +9,8 @@ from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
 
 _EVER_US = 10**15
+_KNOWN_TILT_RAD, _CATCHING_US = 0.035, 3_000_000
+"""A vehicle caught in a fall drifts until its tilt is known so well, or for so long."""
 
 
 class Supervision:
@@ -19,10 +21,15 @@ class Supervision:
         self._missed_us: int | None = None
         self._listening_us = NEVER_US
         self._doubts = False
+        self._caught_us: int | None = None
 
     def listen(self, now_us: int) -> None:
         """Count the loss of clients from `now_us` on: the restart."""
         self._listening_us = now_us
+
+    def catch(self, now_us: int) -> None:
+        """Have a vehicle found falling drift at first: to brake, its attitude must be known."""
+        self._caught_us = now_us
 
     def miss(self, since_us: int | None) -> None:
         """Note that frames were missed since `since_us`; None before the first frame."""
@@ -39,7 +46,16 @@ class Supervision:
         lift = parts.rotor_loss.watch.expected[0] / parts.loop.vehicle.gravity_m_s2 if self._doubts else None
         parts.pilot.sense(Sensed(now_us, state, steered, position_known, delay_us, waited_us, path_speed, lift))
         guard(table.FAILSAFES, self._execute, _nothing, now_us, state)
+        if self._caught_us is not None:
+            self._drift(now_us, self._caught_us, state)
         self._missed_us = None
+
+    def _drift(self, now_us: int, caught_us: int, state: VehicleState) -> None:
+        self._parts.pilot.generator.drift(state)
+        estimate = self._parts.state_source.estimate
+        known = estimate is None or max(estimate.attitude_std_rad[:2]) < _KNOWN_TILT_RAD
+        if known or now_us - caught_us > _CATCHING_US:
+            self._caught_us = None
 
     def _execute(self, now_us: int, state: VehicleState) -> None:
         """Have the pilot execute the failsafe that is due."""

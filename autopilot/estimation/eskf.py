@@ -40,8 +40,8 @@ from colibri.plant.vehicle.sensors import Sensors
 
 _FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
-_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
-"""Standard deviations at the start in a fall: the vehicle need not have been level."""
+_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD, _CAUGHT_YAW_RAD = 3.0, 1.0, 0.4, 1.0
+"""Standard deviations at the start in a fall: the vehicle need not have been level; the heading takes it to be."""
 _ITERATIONS = 4
 _UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
 """Upper triangle of position, velocity and attitude in P."""
@@ -136,6 +136,7 @@ class Filter:
         for first, sigma in ((POSITION, _CAUGHT_M), (VELOCITY, _CAUGHT_M_S), (ATTITUDE, _CAUGHT_RAD)):
             for i in range(first, first + 3):
                 P[i, i] = sigma * sigma
+        P[ATTITUDE + 2, ATTITUDE + 2] = square(_CAUGHT_YAW_RAD)
         if caught.pressure_height_m is not None:
             x[19] = caught.pressure_height_m - x[2]
         for kind in self.kinds:

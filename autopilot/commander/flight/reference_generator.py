@@ -57,6 +57,13 @@ class ReferenceGenerator:
     def follow(self, vehicle: VehicleState) -> None:
         self.set(moving_with(vehicle))
 
+    def drift(self, vehicle: VehicleState) -> None:
+        """Follow the horizontal motion and yaw; the height goes on."""
+        before, after = self.reference, moving_with(vehicle)
+        if before is not None:
+            after.motion[:, 2] = before.motion[:, 2]
+        self.set(after)
+
     def rest(self, vehicle: VehicleState) -> None:
         self.set(at_rest(vehicle))
 
