@@ -5,11 +5,15 @@ from functools import cache
 from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 from numba.core.event import Event, Listener, register
 from numpy.typing import NDArray
 
+from colibri.common.errors import Error
 from colibri.common.machine_code.on_disk import MachineCode
+
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    raise Error("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
 
 Packed: TypeAlias = NDArray[np.void]
 

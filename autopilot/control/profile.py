@@ -124,7 +124,7 @@ def profile_names() -> list[str]:
 def _check_frames(profile: Profile) -> None:
     frame_s = profile.simulation.frame_interval_s
     control_s = profile.table(profile.controller).get("control_interval_s")
-    if frame_s is None or not isinstance(control_s, float):
+    if frame_s is None or not isinstance(control_s, float) or not 0.0 < control_s <= 1.0:
         return
     frame_us, control_us = round(frame_s * 1e6), round(control_s * 1e6)
     if frame_us % 1000 or control_us % frame_us:

@@ -34,10 +34,14 @@ def main(argv: list[str] | None = None) -> int:
     warnings.formatwarning = lambda message, *_args: f"colibri: {message}\n"
     _check_encoding(given)
     if given and given[0] in PROCESSES:
-        process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
-        return process_code
+        try:
+            process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
+            return process_code
+        except Error as error:
+            fail(str(error), EXIT_FAILED)
     use_one_thread()
     use_safe_path()
+    os.environ["MPLBACKEND"] = "agg"  # figures are files
     end_quickly()
     if threading.current_thread() is threading.main_thread():
         handle_endings(interrupt)  # so that what was started is ended, too
@@ -46,6 +50,8 @@ def main(argv: list[str] | None = None) -> int:
             args, unknown = parser_for(given).parse_known_args(given)
         if unknown:
             fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            fail("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
         use_writable_folders()
         code = subcommand(args.command).run(args)
         sys.stdout.flush()

@@ -22,6 +22,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.process.recorded_inputs import Inputs, InputsError, Setup, read_inputs
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
+from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.rotations import earth_from_body, euler_from_quaternion
 from colibri.common.serialization import of_bytes
@@ -250,7 +251,7 @@ class _Ended(msgspec.Struct):
 def _ended_us(flight: _Flight) -> int:
     ended_s = max((float(block[-1, 0]) for block in flight.log.blocks(TRUTH)), default=0.0)
     with suppress(OSError, *UNREADABLE):
-        content = (flight.path.parent / "report.json").read_bytes()
+        content = read_bytes(flight.path.parent / "report.json")
         ended_s = max(ended_s, msgspec.json.decode(content, type=_Ended).sim_time_s)
     return round(1e6 * ended_s)
 

@@ -17,6 +17,7 @@ from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.values import CampaignError, shown
 from colibri.common.config import UNREADABLE
+from colibri.common.files import read_bytes
 from colibri.common.spec import keywords_of
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.provenance import provenance_of
@@ -91,7 +92,7 @@ def _keep_settings(path: Path, planned: Campaign, *, resume: bool) -> None:
     now = {name: shown(value) for name, value in planned.fly.items()}
     if resume and path.exists():
         try:
-            was = msgspec.json.decode(path.read_bytes(), type=dict[str, str])
+            was = msgspec.json.decode(read_bytes(path), type=dict[str, str])
         except UNREADABLE as error:
             raise CampaignError(f"cannot read {path}: {error}; leave --resume out") from error
         changed = ", ".join(f"{name}={was.get(name)}, now {now[name]}" for name in now if was.get(name) != now[name])

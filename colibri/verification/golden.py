@@ -11,6 +11,7 @@ import msgspec
 
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
+from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.folder import make_folder
 from colibri.verification.cases import Case, SitlCase
@@ -77,7 +78,7 @@ def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
 
 def read_hashes(path: Path) -> dict[str, str]:
     try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, _Hash])
+        return msgspec.json.decode(read_bytes(path), type=dict[str, _Hash])
     except FileNotFoundError:
         fail(f"there are no golden hashes in {path}: say which FILE has them, or write them with --renew")
     except OSError as error:

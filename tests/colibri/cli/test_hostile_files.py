@@ -1,6 +1,9 @@
 """Files of any content: one clear line, an exit code, no traceback and no control characters."""
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -122,6 +125,13 @@ def test_a_log_that_ends_in_a_long_message_is_not_read_forever(flown: Path, caps
             "mass_kg: must be 0, or from 1e-12 to 1e+12",
         ),
         ("--vehicle", VEHICLE, "mass_kg = 0.698", "mass_kg = inf", "mass_kg: must be finite"),
+        (
+            "--profile",
+            FLIGHT,
+            "control_interval_s = 0.008  #",
+            "control_interval_s = -1e308  #",
+            "control_interval_s",
+        ),
         ("--profile", FLIGHT, "max_tilt_deg = 70.0    #", "max_tilt_deg = []    #", "max_tilt_deg"),
     ],
 )
@@ -142,6 +152,17 @@ def test_a_nudge_is_a_short_distance(
     assert f'COLIBRI_NUDGE_M must be a number from -100 to 100, not "{offset}"' in line
     monkeypatch.setenv("COLIBRI_NUDGE_M", "1e-9")
     assert nudge_m() == 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "line"), [("NUMBA_DISABLE_JIT", "1", "must be unset"), ("MPLBACKEND", "nonsense", "")]
+)
+def test_variables_of_other_packages(name: str, value: str, line: str, tmp_path: Path) -> None:
+    words = f"fly hover {FLOWN}".format(folder=tmp_path).split()
+    command = [sys.executable, "-m", "colibri", *words]
+    done = subprocess.run(command, env=os.environ | {name: value}, capture_output=True, text=True, check=False)
+    expected = (2, f"colibri: error: {name} {line}: kernels are compiled\n") if line else (0, "")
+    assert (done.returncode, done.stderr) == expected
 
 
 @pytest.mark.parametrize("columns", ["0", "1", "-1", "text"])
