@@ -36,6 +36,7 @@ def report(
     return {
         "track": plan.spec.track,
         "track_note": plan.track_note,
+        "without_effect": plan.without_effect,
         "profile": plan.profile.name,
         "controller": plan.profile.controller,
         "link": plan.spec.link,
@@ -66,6 +67,7 @@ def report(
         "effort_n_m": rms(flight.moment_n_m),
         "solve_time_us": _quantiles(flight.solve_time_us),
         "control_step_us": _quantiles(flight.control_step_us),
+        "control_interval_us": round(1e6 * float(t[1] - t[0])),
         "qp_iterations": _iterations(flight.qp_iterations),
         "frames": frames,
         "resent": resent,
@@ -113,18 +115,22 @@ def report_rows(figures: Report) -> dict[str, str]:
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
     lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
     lost |= {} if figures["impact"] is None else {"impact": figures["impact"]}
+    has_qp = figures["solver"] is not None or figures["solve_time_us"]["max"] > 0.0
+    step_us, interval_us = figures["control_step_us"]["p50"], figures["control_interval_us"]
+    slow = f"{step_us / 1e3:.1f} ms a control step, every {interval_us / 1e3:g} ms" if step_us > interval_us else ""
     return lost | {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
         **_estimation_rows(figures),
         "position error, maximum": length(figures["max_error_m"]),
         **({} if figures["path_lag_s"] is None else {"behind the clock at the end": f"{figures['path_lag_s']:.2f} s"}),
-        "QP solve time, p50 / p99": times("solve_time_us"),
+        **({"QP solve time, p50 / p99": times("solve_time_us")} if has_qp else {}),
         "control step, p50 / p99": times("control_step_us"),
+        **({"slower than real time": slow} if slow else {}),
         "flown": f"{figures['sim_time_s']:.1f} s in {figures['wall_time_s']:.2f} s",
         "real-time factor": f"{figures['real_time_factor']:.0f}",
         "frames, sent again": f"{figures['frames']}, {figures['resent']}",
-        "QPs not solved": f"{figures['qp_failures']}",
+        **({"QPs not solved": f"{figures['qp_failures']}"} if has_qp else {}),
         "samples flown by a fallback": ", ".join(fallbacks) or "0",
         "trajectory": figures["trajectory_sha256"][:16],
     }

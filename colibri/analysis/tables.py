@@ -11,9 +11,10 @@ Row: TypeAlias = tuple[str, ...]
 _MAX_WIDTH = 400
 
 
-def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -> list[Path]:
-    """Write `path` with suffixes md and csv."""
-    texts = {"md": markdown(headings, rows, names=names), "csv": comma_separated(headings, rows)}
+def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int, notes: Sequence[str] = ()) -> list[Path]:
+    """Write `path` with suffixes md, which has the notes, and csv."""
+    below = "".join(f"\n{note}\n" for note in notes)
+    texts = {"md": markdown(headings, rows, names=names) + below, "csv": comma_separated(headings, rows)}
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in texts]
     for written, text in zip(paths, texts.values(), strict=True):
         written.write_text(text, encoding="utf-8")

@@ -124,8 +124,8 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Yield flights that test each value of each factor, of numbers the ends."""
-        first = next(self.points())
+        """Yield flights that test each value of each factor, of numbers the ends, by the last seed."""
+        first = next(self.points())._replace(seed=self.seeds[-1])
         yield first
         for factor, values in self.grid.items():
             ends = (values[0], values[-1]) if all(map(is_number, values)) else values
@@ -139,7 +139,7 @@ class Campaign(NamedTuple):
         """Yield the values of an option, without continuous draws."""
         draw = self.draw.get(option)
         yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
-        yield from self.grid.get(option, ())
+        yield from (each for each in self.grid.get(option, ()) if not isinstance(each, Level))
         yield from draw.values if isinstance(draw, Choice) else ()
 
     def _levels(self) -> Iterator[dict[str, Any]]:
@@ -226,7 +226,7 @@ def _check_names(planned: Campaign) -> None:
     said = [*planned.fly, *planned.draw]
     for name, values in planned.grid.items():
         levels = [each.settings for each in values if isinstance(each, Level)]
-        if levels and name in keywords_of(FlightSpec):
+        if any(name not in settings for settings in levels) and name in keywords_of(FlightSpec):
             raise CampaignError(f"{name}: a factor with levels needs a name of its own")
         said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
     if twice := first_twice(said):

@@ -20,8 +20,10 @@ _QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
 class FlightTable:
     """The results of a campaign's flights, in its order."""
 
-    def __init__(self, campaign: Campaign, flown: Mapping[int, Flown]) -> None:
+    def __init__(self, campaign: Campaign, flown: Mapping[int, Flown], notes: Sequence[str] = ()) -> None:
+        """`notes` are lines on options without effect."""
         self.campaign = campaign
+        self.notes = [*notes]
         self.flown = [flown[flight] for flight in sorted(flown)]
         self._points = {point.flight: point for point in campaign.points() if point.flight in flown}
 
@@ -87,6 +89,21 @@ class FlightTable:
             factors = self._points[each.flight].factors
             found.setdefault(tuple(shown(factors[name]) for name in self.campaign.grid), []).append(place)
         return found
+
+    def without_effect(self) -> list[str]:
+        """Return the factors of the grid whose values all give the same flights."""
+        return [] if self.campaign.draw else [name for name in self.campaign.grid if self._is_idle(name)]
+
+    def _is_idle(self, factor: str) -> bool:
+        found: dict[tuple[Any, ...], list[str]] = {}
+        for each in self.flown:
+            point = self._points[each.flight]
+            others = (shown(value) for name, value in point.factors.items() if name != factor)
+            found.setdefault((point.seed, *others), []).append(each.sha256)
+        values = len(self.campaign.grid[factor])
+        return values > 1 and all(
+            len(flights) == values and all(flights) and len(set(flights)) == 1 for flights in found.values()
+        )
 
     def summary(self) -> tuple[Row, list[Row]]:
         """Return headings and one row per combination: share lost, quantiles of metrics."""

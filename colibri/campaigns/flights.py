@@ -1,6 +1,7 @@
 """Fly one flight of a campaign."""
 
-from collections.abc import Generator, Iterable, Mapping
+from collections import Counter
+from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
 from enum import StrEnum
@@ -19,6 +20,7 @@ from colibri.common.errors import Error, ForeignError
 from colibri.common.process.failure_file import FAILURE
 from colibri.common.spec import from_values
 from colibri.experiments.flight import Flight
+from colibri.flights.effects import in_words
 from colibri.flights.plan import Contents, FlightPlan
 from colibri.flights.provenance import provenance_of
 from colibri.flights.spec import FlightSpec, OptionError
@@ -96,10 +98,17 @@ def common_of(campaign: Campaign) -> Common:
     )
 
 
-def check(points: Iterable[Point], common: Common) -> None:
+def check(points: Iterable[Point], common: Common, *, ignored: Collection[str] = ()) -> list[str]:
+    """Check that flights can begin; return lines on options without effect, but for those `ignored`."""
+    plans = []
     for point in points:
         plan = plan_point(common, point)
         build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.spec.law)
+        plans.append(plan.without_effect)
+    found = Counter(each for plan in plans for each in plan.items() if each[0] not in ignored)
+    on_all = in_words(each for each, times in found.items() if times == len(plans))
+    on_some = in_words((each for each, times in found.items() if times < len(plans)), "no effect on some flights")
+    return [line for line in (on_all, on_some) if line]
 
 
 def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
@@ -139,10 +148,11 @@ def plan_point(common: Common, point: Point) -> FlightPlan:
     assumed = _object(spec.vehicle or profile.simulation.vehicle, common.vehicles)
     vehicle = with_keys(factors, "vehicle", assumed)
     flown = _object(spec.plant_vehicle, common.vehicles) if spec.plant_vehicle else vehicle
-    plant_vehicle = with_keys(factors, "plant-vehicle", flown).without(spec.without)
+    whole = with_keys(factors, "plant-vehicle", flown)
+    plant_vehicle = whole.without(spec.without)
     if spec.link == "udp":  # its processes know neither `common` nor the keys
         spec = replace(spec, profile=profile, vehicle=vehicle, plant_vehicle=plant_vehicle)
-    return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track)))
+    return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track), whole))
 
 
 def _killed(point: Point, common: Common) -> Flown:

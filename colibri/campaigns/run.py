@@ -1,9 +1,10 @@
 """`colibri.campaign`: fly a campaign."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
+from warnings import warn
 
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.engines.engine import Engine
@@ -13,6 +14,7 @@ from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journ
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
 from colibri.common.process.folder_lock import FolderLock
+from colibri.flights.effects import NoEffectWarning
 
 MAX_UNASKED = 1_000_000
 
@@ -50,7 +52,10 @@ def campaign(
     planned = campaign_of(tables_of(CampaignTables, file, tables))
     engine = engine_of(workers, executor)
     folder = Path(out) if out else None
-    return fly_campaign(planned, engine, folder, resume=resume, yes=yes, parquet=parquet, progress=progress)
+    results = fly_campaign(planned, engine, folder, resume=resume, yes=yes, parquet=parquet, progress=progress)
+    for note in results.notes:
+        warn(note, NoEffectWarning, stacklevel=2)
+    return results
 
 
 def engine_of(workers: int | None, executor: Any) -> Engine:
@@ -82,9 +87,9 @@ def fly_campaign(
     if parquet:
         parquet_writer()
     common = common_of(planned)
-    check(planned.samples(), common)
+    notes = check(planned.samples(), common, ignored=("seed",) if planned.draw else ())
     if out is None:
-        return _fly(planned, common, engine, None, progress)
+        return _fly(planned, common, engine, None, progress, notes)
     try:
         lock = FolderLock(out, "--out")
     except OSError as error:
@@ -92,7 +97,7 @@ def fly_campaign(
     with closing(lock), open_journal(out, planned, common, resume=resume) as journal:
         begun(len(journal.kept))
         try:
-            return _fly(planned, common, engine, journal, progress)
+            return _fly(planned, common, engine, journal, progress, notes)
         finally:
             kept = {each.flight: each for each in read_journal(out / JOURNAL)}
             CampaignResults(planned, kept).save(out, parquet=parquet)
@@ -104,6 +109,7 @@ def _fly(
     engine: Engine,
     journal: Journal | None,
     progress: Callable[[Flown], object],
+    notes: Sequence[str],
 ) -> CampaignResults:
     flown: dict[int, Flown] = {} if journal is None else journal.kept
     done = frozenset(flown)
@@ -115,4 +121,7 @@ def _fly(
             else:
                 journal.add(each)
             progress(each)
-    return CampaignResults(planned, flown)
+    results = CampaignResults(planned, flown, notes)
+    if factors := results.without_effect():
+        results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ in nothing else are the same)")
+    return results

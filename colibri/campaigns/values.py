@@ -86,6 +86,7 @@ class Choice(NamedTuple):
 
 
 _PAIRS: dict[str, Any] = {"uniform": Uniform, "log-uniform": LogUniform, "normal": Normal}
+_PLAIN = (str, int, float, Mapping, list, tuple)
 _DISTRIBUTIONS = (*_PAIRS, "choice")
 _SPANS = ("linspace", "logspace")
 
@@ -130,7 +131,10 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
     if not values:
         raise CampaignError(f"{key}: no values: give at least one")
     if twice := first_twice(map(shown, values)):
-        raise CampaignError(f"{key}: {twice} is there twice")
+        objects = [value for value in values if shown(value) == twice]
+        if isinstance(objects[0], _PLAIN) or any(objects[0] == other for other in objects[1:]):
+            raise CampaignError(f"{key}: {twice} is there twice")
+        return tuple(Level(f"{shown(value)} ({place})", {key: value}) for place, value in enumerate(values, 1))
     return values
 
 

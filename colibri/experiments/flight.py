@@ -3,6 +3,7 @@
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from warnings import warn
 
 from colibri.analysis.outcome import files_of, fly_to_its_end
 from colibri.analysis.recording import COLUMNS, FlightReader
@@ -12,6 +13,7 @@ from colibri.common.errors import unknown
 from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
 from colibri.experiments.table import Table, table_of
+from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec, OptionError
 from colibri.mavlink.hil.feedback import Feedback
@@ -124,6 +126,8 @@ def fly(track: str, **options: Any) -> Flight:
     """
     spec = from_values(FlightSpec, {"track": track, **options}, OptionError, keywords_of(FlightSpec))
     plan = FlightPlan.of(spec)
+    if plan.without_effect:
+        warn(in_words(plan.without_effect.items()), NoEffectWarning, stacklevel=2)
     outcome = fly_to_its_end(plan, for_viewers=True)
     if outcome.error is not None:
         raise outcome.error

@@ -14,6 +14,7 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.common.process.log_files import set_aside
 from colibri.common.spec import part_of
+from colibri.flights.effects import Setting, in_words, without_effect
 from colibri.flights.fleet_spec import PLANT_PORT, FleetSpec
 from colibri.flights.fleet_status import StatusLines
 from colibri.flights.folder import LOGS, occupied, prepare
@@ -55,7 +56,7 @@ class Member:
 
 
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
-    _check(spec)
+    note = _check(spec)
     instances = range(spec.instance, spec.instance + spec.count)
     fleet = [Member(it, number * spec.spacing, spec.links(it)) for number, it in enumerate(instances)]
     with ExitStack() as held:
@@ -64,7 +65,7 @@ def sitl(spec: FleetSpec, *, quiet: bool) -> int:
             prepare(folder)
         stop = Stop()
         lines = StatusLines(quiet=quiet)
-        lines.begin(spec.count)
+        lines.begin(spec.count, note)
         try:
             for member in fleet:
                 _start_plant(member, spec)
@@ -75,11 +76,13 @@ def sitl(spec: FleetSpec, *, quiet: bool) -> int:
     return EXIT_FAILED if any(child.code() == EXIT_FAILED for member in fleet for child in member.children) else 0
 
 
-def _check(spec: FleetSpec) -> None:
+def _check(spec: FleetSpec) -> str:
+    """Return a line on options without effect."""
     try:
         profile, assumed = spec.load()
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
-        vehicle = (load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed).without(spec.without)
+        whole = load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed
+        vehicle = whole.without(spec.without)
         check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
     except Error as error:
         fail(str(error))
@@ -96,6 +99,7 @@ def _check(spec: FleetSpec) -> None:
             open_link(_plant_url(spec, instance)).close()
     except LinkError as error:
         fail(str(error))
+    return in_words(without_effect(Setting(spec, name, assumed, vehicle, whole)).items())
 
 
 def _taken_by_one(url: str) -> bool:

@@ -40,7 +40,9 @@ class StatusLines:
         self._drawn_s = 0.0
         self._live: Live | None = None
 
-    def begin(self, vehicles: int) -> None:
+    def begin(self, vehicles: int, note: str = "") -> None:
+        if note and not self._quiet:
+            self._console.print(note, markup=False)
         if self._console.is_terminal and not self._quiet:
             self._console.print("starting" + (f" {vehicles} vehicles" if vehicles > 1 else ""), markup=False)
 

@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.errors import Error
 from colibri.common.spec import part_of
+from colibri.flights.effects import Setting, without_effect
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
@@ -44,18 +45,20 @@ class Contents(NamedTuple):
         profile: With the law, solver and delay of the options.
         plant_vehicle: Without the parts left out.
         track_file: Text of the track's file, if it has one.
+        whole: The plant's vehicle with the parts left out; `None` in a recorded flight.
     """
 
     profile: Profile
     vehicle: Vehicle
     plant_vehicle: Vehicle
     track_file: str | None
+    whole: Vehicle | None = None
 
 
 def contents_of(spec: FlightSpec) -> Contents:
     profile, vehicle = spec.load()
-    plant_vehicle = load_vehicle(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
-    return Contents(profile, vehicle, plant_vehicle.without(spec.without), file_text(spec.track))
+    whole = load_vehicle(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
+    return Contents(profile, vehicle, whole.without(spec.without), file_text(spec.track), whole)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +92,7 @@ class FlightPlan:
             raise PlanError(f"--gcs needs --link udp: over {spec.link} there is no autopilot to connect to")
         check_reach(spec.gcs, signed=spec.signing_key is not None, insecure=spec.insecure)
         contents = contents or contents_of(spec)
-        profile, vehicle, plant_vehicle, track_file = contents
+        profile, vehicle, plant_vehicle, track_file, _ = contents
         names = _names(spec, profile)
         if spec.feedback is Feedback.SENSORS:
             for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
@@ -135,6 +138,12 @@ class FlightPlan:
         return _names(self.spec, self.profile)[1]
 
     @property
+    def without_effect(self) -> dict[str, str]:
+        """The options without effect on this flight, and the reason of each."""
+        name, whole = self.plant_vehicle_name, self.contents.whole
+        return without_effect(Setting(self.spec, name, self.vehicle, self.plant_vehicle, whole))
+
+    @property
     def integrator(self) -> Any:
         """The plant's integrator: `rk4` or `adaptive`."""
         return self.spec.integrator or self.profile.simulation.integrator
@@ -177,7 +186,9 @@ class FlightPlan:
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
     vehicle = name_of(spec.vehicle or profile.simulation.vehicle)
-    return vehicle, name_of(spec.plant_vehicle or vehicle)
+    plant_vehicle = name_of(spec.plant_vehicle or vehicle)
+    same = plant_vehicle != vehicle or spec.plant_vehicle in (None, spec.vehicle, vehicle)
+    return vehicle, plant_vehicle if same else f"{plant_vehicle} (2)"
 
 
 def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:

@@ -34,12 +34,13 @@ def compare(args: argparse.Namespace) -> int:
     """Compare; RMS is that after the first 20 s, the maximum includes the start."""
     table = fly_comparison(args, "compare", _METRICS, "all")
     rows = [(*names, *_cells(table.flown[place])) for names, (place,) in table.groups().items()]
-    write_table(args.out / "compare", COLUMNS, rows, names=2)
+    write_table(args.out / "compare", COLUMNS, rows, names=2, notes=table.notes)
     lost = any(row[-1] for row in rows)
     if not args.quiet:
         title = f"RMS after {SETTLED_AFTER_S:.0f} s; written to {args.out}"
         shown = len(COLUMNS) - (1 if lost else 2)
         print_table(title, COLUMNS[:shown], [row[:shown] for row in rows], names=2)
+        print(*table.notes, sep="\n", end="\n" if table.notes else "")  # noqa: T201
         for controller, track, *_, at_s, why in rows:
             if why:
                 print(f"{controller}, {track}: lost at t = {at_s} s: {why}")  # noqa: T201

@@ -22,6 +22,7 @@ from colibri.common.spec import keywords_of
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.provenance import provenance_of
 from colibri.flights.spec import FlightSpec
+from colibri.plant.vehicle.description import Vehicle
 from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_of
 
 
@@ -30,7 +31,8 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     planned = _campaign(args, name, metrics, logs)
     common = common_of(planned)
     points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
-    check(points[:: len(planned.seeds)], common)
+    last = points[len(planned.seeds) - 1 :: len(planned.seeds)]
+    notes = [*_different_vehicles(last, common), *check(last, common)]
     make_folder(args.out)
     if args.seeds:
         _keep_settings(args.out / f"{name}-settings.json", planned, resume=args.resume)
@@ -45,7 +47,18 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
         _fly(left, common, kept, args)
     for flight, _, _, folder in points:
         flown[flight] = flown[flight]._replace(why=flown[flight].why.replace(folder, str(args.out / folder)))
-    return FlightTable(planned, flown)
+    return FlightTable(planned, flown, notes)
+
+
+def _different_vehicles(points: Sequence[Point], common: Common) -> list[str]:
+    plans = {point.factors["contender"].name: point for point in points}
+    fly: dict[Vehicle, dict[str, str]] = {}
+    for contender, plan in ((name, plan_point(common, point)) for name, point in plans.items()):
+        fly.setdefault(plan.plant_vehicle, {})[contender] = plan.plant_vehicle_name
+    if len(fly) < 2:
+        return []
+    words = (f"{', '.join(names)} on {next(iter(names.values()))}" for names in fly.values())
+    return [f"different vehicles are compared: {'; '.join(words)}; --vehicle NAME is the same for all"]
 
 
 def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:

@@ -50,7 +50,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
     table = fly_comparison(args, "seeds", METRICS, "none")
     (args.out / "seeds-flights.csv").write_text(comma_separated(table.headings, table.rows()), encoding="utf-8")
     rows = [(*names, *_cells(table, places)) for names, places in table.groups().items()]
-    write_table(args.out / "seeds", HEADINGS, rows, names=2)
+    write_table(args.out / "seeds", HEADINGS, rows, names=2, notes=table.notes)
     from colibri.studies.seed_figures import draw_seeds
 
     draw_seeds(table, args.out)
@@ -59,6 +59,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
         over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
         shown = len(HEADINGS) if args.feedback is Feedback.SENSORS else _WITHOUT_ESTIMATE
         print_table(f"{over}; written to {args.out}", HEADINGS[:shown], [row[:shown] for row in rows], names=2)
+        print(*table.notes, sep="\n", end="\n" if table.notes else "")  # noqa: T201
         for flown, row in zip(table.flown, table.rows(), strict=True):
             if flown in lost:
                 print(f"{row[1]}, {row[2]}, seed {row[3]}: lost: {flown.why}")  # noqa: T201

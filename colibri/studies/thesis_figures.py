@@ -25,6 +25,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import write_provenance
 from colibri.flights.spec import FlightSpec
 
 FORMATS = ("png", "svg")
@@ -103,6 +104,7 @@ def draw(job: Job) -> list[Path]:
     plan = FlightPlan.of(
         FlightSpec.of(job.flight.track, profile="thesis", controller=job.flight.controller, link="direct", out=folder)
     )
+    write_provenance(plan)
     flown = FigureSeries(plan)
     keep_flight(plan, fly_locally(plan), flown.add)
     series = flown.over_time()

@@ -176,8 +176,9 @@ class Vehicle(Table, frozen=True, kw_only=True):
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
 
     def replace(self, key: str, value: Any) -> "Vehicle":
-        """Return the vehicle with another value at a dotted key such as `body.mass_kg`."""
-        return replaced(self, key, value, VehicleError)
+        """Return the vehicle with another value at a dotted key such as `body.mass_kg`; a star marks its name."""
+        changed = replaced(self, key, value, VehicleError)
+        return changed if key == "name" else msgspec.structs.replace(changed, name=f"{self.name.rstrip('*')}*")
 
     def without(self, parts: Iterable[str]) -> "Vehicle":
         """Return the vehicle without some of the parts `rotor-lag`, `drag`, `ground`, `battery`."""

@@ -86,6 +86,7 @@ def _print(results: CampaignResults, args: Namespace) -> None:
     cells = [tuple(_short(row[headings.index(name)]) for name in shown) for row in rows]
     title = f"{results.campaign.name}: {counts}; written to {args.out}"
     print_table(title, tuple(shown), cells, names=len(results.campaign.grid))
+    print(*results.notes, sep="\n", end="\n" if results.notes else "")  # noqa: T201
     said: dict[str, int] = {}
     for each in results.flown:
         if each.why:

@@ -10,6 +10,7 @@ from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.common.spec import from_namespace
+from colibri.flights.effects import in_words
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import occupied, prepare
 from colibri.flights.plan import FlightPlan, Summary, unseen
@@ -37,8 +38,8 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     prepare(plan.out)
     try:
         with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
-            if plan.track_note:
-                say(plan.track_note)
+            for note in filter(None, (plan.track_note, in_words(plan.without_effect.items()))):
+                say(note)
             summary = fly_plan(plan, progress, say, compiling)
     except FlightError as error:
         _keep_what_there_is(plan, str(error))

@@ -1,0 +1,88 @@
+"""Options without effect on a flight, and what they need to have one."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from colibri.common.spec import fields_of
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.vehicle.description import Vehicle
+
+
+class NoEffectWarning(UserWarning):
+    """An option has no effect on the flight."""
+
+
+class Setting(NamedTuple):
+    """Options, and the vehicles of autopilot and plant.
+
+    Attributes:
+        name: Name or file of the plant's vehicle.
+        whole: The plant's vehicle with the parts that `without` leaves out, if known.
+    """
+
+    spec: Any
+    name: str
+    vehicle: Vehicle
+    plant_vehicle: Vehicle
+    whole: Vehicle | None
+
+    @property
+    def has_drag(self) -> bool:
+        drag = self.plant_vehicle.drag
+        return drag is not None and (any(drag.linear_n_s_m) or drag.rotor_coefficient > 0.0)
+
+    @property
+    def is_random(self) -> bool:
+        return self.spec.feedback is Feedback.SENSORS or (self.spec.turbulence is not None and self.has_drag)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether the vehicle has each part that is left out."""
+        return self.whole is None or all(self.whole.without([part]) != self.whole for part in self.spec.without)
+
+
+class Need(NamedTuple):
+    """What an option needs: if it is not met, it has no effect for this reason."""
+
+    option: str
+    reason: str
+    is_met: Callable[[Setting], bool]
+
+
+_NO_DRAG = "vehicle {vehicle} has no drag"
+_NO_STATIONS = "no ground station is served"
+NEEDS = (
+    Need("wind", _NO_DRAG, lambda it: it.has_drag),
+    Need("gusts", _NO_DRAG, lambda it: it.has_drag),
+    Need("gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)),
+    Need("turbulence", _NO_DRAG, lambda it: it.has_drag),
+    Need("seed", "only sensors, and turbulence on drag, are random", lambda it: it.is_random),
+    Need("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
+    Need(
+        "start",
+        "rotors of vehicle {vehicle} follow commands at once",
+        lambda it: set(it.spec.start) != {"rotors"} or it.plant_vehicle.rotors.lag is not None or it.spec.latency > 0.0,
+    ),
+    Need("plant_vehicle", "it is the vehicle of the autopilot", lambda it: it.whole != it.vehicle),
+    Need("tlog", "link direct sends no frames", lambda it: it.spec.link != "direct"),
+    Need("signing_key", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    Need("insecure", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    Need("spacing", "one vehicle flies", lambda it: it.spec.count > 1),
+)
+
+
+def without_effect(setting: Setting) -> dict[str, str]:
+    """Return the options given without effect, and the reason of each."""
+    known = fields_of(type(setting.spec))
+    given = {name for name, field in known.items() if getattr(setting.spec, name) != field.default}
+    lacking = (need for need in NEEDS if need.option in given and not need.is_met(setting))
+    return {need.option: need.reason.format(vehicle=setting.name) for need in lacking}
+
+
+def in_words(reasons: Iterable[tuple[str, str]], title: str = "no effect") -> str:
+    """Return one line for options with reasons, empty without any."""
+    by_reason: dict[str, list[str]] = {}
+    for option, reason in reasons:
+        by_reason.setdefault(reason, []).append(option)
+    words = (f"{' and '.join(options)} ({reason})" for reason, options in by_reason.items())
+    return f"{title}: {'; '.join(words)}" if by_reason else ""
