@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from colibri.experiments import fly as fly
     from colibri.flights import FlightPlan as FlightPlan
     from colibri.flights import FlightSpec as FlightSpec
+    from colibri.flights import NoEffectWarning as NoEffectWarning
     from colibri.flights import fly_plan as fly_plan
     from colibri.mavlink import MavlinkError as MavlinkError
     from colibri.plant import PlantError as PlantError

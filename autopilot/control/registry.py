@@ -5,13 +5,14 @@ from functools import cache
 from hashlib import sha256
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from importlib.util import find_spec
+from numbers import Integral
 from pathlib import Path
 from sys import modules
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.interface import Clock, Controller, Decision
+from colibri.autopilot.control.interface import Clock, Controller, Decision, Preview
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError, unknown
@@ -20,6 +21,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 GROUP = "colibri.controllers"
 DEFAULT = "cascade"
+_MAX_PREVIEW = 10_000
 
 
 class ControllerError(AutopilotError):
@@ -103,9 +105,17 @@ def _sha256(file: str | None) -> str:
 def check_controller(name: str, controller: object) -> None:
     if not isinstance(controller, Controller):
         raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
-    interval_us = controller.control_interval_us
-    if not 1_000 <= interval_us <= 1_000_000 or interval_us % 1_000:
-        raise ControllerError(f"controller {name}: control_interval_us must be whole milliseconds up to a second")
+    interval_us, preview = controller.control_interval_us, controller.preview
+    if not isinstance(interval_us, Integral) or not 1_000 <= interval_us <= 1_000_000 or interval_us % 1_000:
+        raise ControllerError(
+            f"controller {name}: control_interval_us must be whole milliseconds up to a second, not {interval_us} µs"
+        )
+    if not isinstance(preview, Preview) or not all(isinstance(each, Integral) and each > 0 for each in preview):
+        raise ControllerError(f"controller {name}: preview must be a colibri.Preview of whole numbers, not {preview}")
+    if preview.samples > _MAX_PREVIEW:
+        raise ControllerError(
+            f"controller {name}: preview must have 1 to {_MAX_PREVIEW} samples, not {preview.samples}"
+        )
 
 
 def in_words(error: BaseException) -> str:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
+    from colibri.flights.effects import NoEffectWarning as NoEffectWarning
     from colibri.flights.fly import fly_plan as fly_plan
     from colibri.flights.folder import prepare as prepare
     from colibri.flights.plan import FlightPlan as FlightPlan

@@ -19,10 +19,11 @@ from tests.support.commands import Refused
 SHIPPED = Path(colibri.__file__).parent
 PACKAGES = {"autopilot": "AutopilotError", "mavlink": "MavlinkError", "plant": "PlantError", "sitl": "SitlError"}
 INSIDE = {
+    "NoEffectWarning": "a warning, which ends nothing",
     "Refused": "a setpoint that is not flown is counted",
     "_RefusedError": "a file operation's way out, answered in the same file",
 }
-"""Exceptions that never leave their file's callers: no user sees them."""
+"""Exceptions that are no error for a user."""
 
 
 @cache
