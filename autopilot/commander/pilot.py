@@ -276,7 +276,8 @@ class Pilot:
             self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
         if self.sensed.lift is not None and self._comes_down:
-            self.ground.watch_lift(self.sensed.now_us, self.sensed.lift, self.generator.interval_s)
+            climb_m_s = context.state.velocity_enu_m_s[2]
+            self.ground.watch_lift(self.sensed.now_us, self.sensed.lift, climb_m_s, self.generator.interval_s)
         ended = _ENDS.get(self.state.mode)
         if ended is not None and self.task.arrived(context):
             self.happened(ended)

@@ -16,6 +16,8 @@ CARRIED = 0.5
 
 _MODEL_ERROR, _UNCARRIED_S = 0.2, 0.5
 """Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 5 m/s faster."""
+_UNCARRIED_STILL_S, _FALLS_M_S2 = 0.2, 4.0
+"""The same where the climb rate falls by less than this per second of weight: in the air by more than 9."""
 SUSPECTED_S = 0.1
 """Lack of lift from which on a failed sensor may take the ground for a motion."""
 
@@ -65,14 +67,24 @@ def watch(
     return landing, now_us - landing.since_us >= for_us
 
 
-def uncarried_s(before_s: float, lift: float, interval_s: float) -> float:
-    """Add a sample to the lack of lift (CUSUM), in seconds of weight; `lift` is the rotors', in parts of weight."""
-    return max(before_s + (1.0 - _MODEL_ERROR - lift) * interval_s, 0.0)
+class Lack(NamedTuple):
+    """Lack of lift by CUSUM, in seconds of weight, and the climb rate before it."""
 
+    lack_s: float = 0.0
+    climb_m_s: float = 0.0
 
-def is_carried(lack_s: float) -> bool:
-    """Whether the ground carries the vehicle, which has lacked lift for long and yet comes down on purpose."""
-    return lack_s >= _UNCARRIED_S
+    def after(self, lift: float, climb_m_s: float, interval_s: float) -> "Lack":
+        """Add a sample; `lift` is the rotors', in parts of weight."""
+        lack_s = max(self.lack_s + (1.0 - _MODEL_ERROR - lift) * interval_s, 0.0)
+        return Lack(lack_s, self.climb_m_s) if self.lack_s and lack_s else Lack(lack_s, climb_m_s)
+
+    def is_carried(self, climb_m_s: float) -> bool:
+        """Whether the ground carries the vehicle, which lacks lift for long and yet comes down on purpose.
+
+        It takes less time if the climb rate does not fall as it would in the air.
+        """
+        falls = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s
+        return self.lack_s >= (_UNCARRIED_S if falls else _UNCARRIED_STILL_S)
 
 
 class Hardest(NamedTuple):

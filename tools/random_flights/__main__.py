@@ -1,7 +1,7 @@
 """`python -m tools.random_flights`: flights drawn by seeds, each with failures, parameters, modes and wind.
 
 Each must raise no exception, report an impact, keep its fence as far as it can brake, be disarmed at its end, and take
-at most 20 ms of work for a frame. A flight in which nothing fails must not hit the ground.
+at most 20 ms of work for a frame. With at most one failed sensor it must not fall, hit the ground or overturn.
 """
 
 import argparse

@@ -49,6 +49,12 @@ class Case(NamedTuple):
         """Whether vehicle and ground station stay well."""
         return all(event.what not in ("inject", "silence") for event in self.events)
 
+    @property
+    def lands(self) -> bool:
+        """Whether the vehicle should land whatever happens: at most one of its sensors fails."""
+        failed = [str(event.values[0]) for event in self.events if event.what == "inject"]
+        return not failed or (len(failed) == 1 and failed[0].startswith("SENSOR_"))
+
     def __str__(self) -> str:
         weather = f"wind {self.wind}" + (f", turbulence {self.turbulence}" if self.turbulence else "")
         params = ", ".join(f"{name} {value:.6g}" for name, value in self.params.items())

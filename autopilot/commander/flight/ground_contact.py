@@ -9,11 +9,10 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import (
     SUSPECTED_S,
     Hardest,
+    Lack,
     Landing,
-    is_carried,
     is_clear,
     is_held_down,
-    uncarried_s,
     watch,
 )
 from colibri.mavlink.services.statustext import CRITICAL, INFO, NOTICE
@@ -48,7 +47,7 @@ class GroundContact:
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self._landing = Landing()
-        self._lack_s, self._hardest = 0.0, Hardest()
+        self._lack, self._hardest = Lack(), Hardest()
         self.impact = ""
         self.standing = self.idles = True
         self.height_m = 0.0
@@ -81,7 +80,7 @@ class GroundContact:
 
     def take_off(self, now_us: int) -> None:
         self.standing = False
-        self._landing, self._lack_s, self._hardest = Landing(), 0.0, Hardest()
+        self._landing, self._lack, self._hardest = Landing(), Lack(), Hardest()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "take-off")
 
@@ -96,7 +95,7 @@ class GroundContact:
 
     def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
         """Detect ground in flight; return whether the vehicle fell to it, below the height that is wanted."""
-        if self._lack_s < SUSPECTED_S:
+        if self._lack.lack_s < SUSPECTED_S:
             self._hardest = self._hardest.after(now_us, vehicle)
         fell = not sinks and self._hardest.is_recent(now_us) and is_held_down(wanted_m, vehicle, self.height_m)
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks or fell, drifts=drifts)
@@ -104,10 +103,10 @@ class GroundContact:
             self.land(now_us)
         return stands and fell
 
-    def watch_lift(self, now_us: int, lift: float, interval_s: float) -> None:
+    def watch_lift(self, now_us: int, lift: float, climb_m_s: float, interval_s: float) -> None:
         """Detect ground without trust in the estimate, while the vehicle comes down."""
-        self._lack_s = uncarried_s(self._lack_s, lift, interval_s)
-        if is_carried(self._lack_s) and not self.standing:
+        self._lack = self._lack.after(lift, climb_m_s, interval_s)
+        if self._lack.is_carried(climb_m_s) and not self.standing:
             self.land(now_us)
 
     def rest(self, now_us: int, vehicle: VehicleState) -> None:

@@ -103,6 +103,17 @@ def test_without_a_sensor_it_lands_softly(sitl: Sitl, unit: str, kind: str, says
     assert not any("impact" in text for text in outcome.texts)
 
 
+@pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
+def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
+    sitl.takeoff(2.0)
+    sitl.select(Mode.LAND)
+    sitl.wait_until(lambda: sitl.position[2] < 0.8, within=10.0)
+    sitl.inject("gyro", "delayed", 0, 2.0)
+    sitl.wait_until(lambda: sitl.said("landing detected"), within=3.0)
+    sitl.wait_until(lambda: not sitl.armed, within=3.0)
+    assert sitl.tilt_deg < 5.0
+
+
 @pytest.mark.long
 def test_no_failed_sensor_ends_in_an_impact() -> None:
     assert not [name for name, outcome in matrix(singles()) if outcome.bad]
