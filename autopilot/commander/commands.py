@@ -8,7 +8,7 @@ from colibri.autopilot.commander.motion_commands import MotionCommands, Needs, d
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
-from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Command, Handler
+from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -49,7 +49,7 @@ class Commands:
             return Refusal("this vehicle has no such mode", UNSUPPORTED)
         return self._pilot.select(mode, self._needs.missing())
 
-    def _arm_disarm(self, command: Command) -> Refusal | None:
+    def _arm_disarm(self, command: ReceivedCommand) -> Refusal | None:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
             return self._pilot.arm(self._needs.missing(), force=force)
@@ -57,7 +57,7 @@ class Commands:
             return self._pilot.disarm(force=force)
         return Refusal("arm with 1, disarm with 0")
 
-    def _set_mode(self, command: Command) -> Refusal | None:
+    def _set_mode(self, command: ReceivedCommand) -> Refusal | None:
         self._needs.engage(command.peer, command.now_us)
         numbers = (command.p1, command.p2, 0.0 if isnan(command.p3) else command.p3)
         if not all(0.0 <= number < 256.0 and number == int(number) for number in numbers):
@@ -70,12 +70,12 @@ class Commands:
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
         return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
 
-    def _pause_or_go_on(self, command: Command) -> Refusal | None:
+    def _pause_or_go_on(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 0.0:
             return self.select(Mode.HOLD)
         return self.select(Mode.MISSION) if command.p1 == 1.0 else Refusal("pause with 0, go on with 1")
 
-    def _change_speed(self, command: Command) -> Refusal | None:
+    def _change_speed(self, command: ReceivedCommand) -> Refusal | None:
         """Set the ground speed; -1 keeps it, -2 selects the parameters' speed."""
         kind, speed, _, relative = command[1:5]
         if kind not in _OVER_GROUND and not isnan(kind):
@@ -90,7 +90,7 @@ class Commands:
             return denied("speed", f"{speed:g} m/s")
         return None
 
-    def _set_home(self, command: Command) -> Refusal | None:
+    def _set_home(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 1.0:
             state = self._pilot.context().state
             self._home.move(state.position_enu_m, state.euler[2])
@@ -109,12 +109,12 @@ class Commands:
         self._home.move(home, self._home.yaw_rad)
         return None
 
-    def _terminate(self, command: Command) -> Refusal | None:
+    def _terminate(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 1.0:
             return self._pilot.disarm(force=True)
         return Refusal("flight terminated by 1 alone, and never undone")
 
-    def _check(self, command: Command) -> Refusal | None:
+    def _check(self, command: ReceivedCommand) -> Refusal | None:
         del command
         reasons = self._pilot.readiness.refusals()
         return Refusal("not ready: " + "; ".join(reasons), FAILED) if reasons else None

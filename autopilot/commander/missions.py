@@ -12,11 +12,11 @@ from colibri.autopilot.guidance.mission.executor import MissionExecutor, Mission
 from colibri.autopilot.guidance.mission.items import places
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
+from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, homeward, landing
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext, TaskOutput
-from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem, Plan
-from colibri.mavlink.mission.service import Progress
+from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem, StoredPlan
+from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -54,10 +54,10 @@ class Missions:
         self._behaviour = behaviour
         self._fence.adopt(behaviour)
 
-    def progress(self) -> Progress:
+    def progress(self) -> MissionProgress:
         return self._executor.progress
 
-    def load(self, plan_type: int, plan: Plan) -> None:
+    def load(self, plan_type: int, plan: StoredPlan) -> None:
         self.changes += 1
         items: Sequence[MissionItem] = plan.items
         if plan_type == MISSION:
@@ -90,7 +90,7 @@ class Missions:
     def record(self) -> MissionRecord:
         return self._executor.record()
 
-    def resume(self, plans: Mapping[int, Plan], record: MissionRecord | None) -> None:
+    def resume(self, plans: Mapping[int, StoredPlan], record: MissionRecord | None) -> None:
         self._fence.load(plans[FENCE].items)
         self._executor.load(plans[MISSION].items)
         if record is not None:
@@ -212,7 +212,7 @@ def task_of(order: Order, context: TaskContext, takeoff_speed_m_s: float | None 
     match order:
         case GoTo():
             return GoToTask(order, context)
-        case Circle():
+        case Orbit():
             return OrbitTask(order, context)
         case TakeOff():
             return TakeoffTask(order.height_enu_m, order.yaw_rad, context, takeoff_speed_m_s)

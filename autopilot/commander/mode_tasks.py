@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask,
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, Order, OrderRecord, TakeOff, order_of, record_of
+from colibri.autopilot.guidance.tasks.orders import GoTo, Land, Orbit, Order, OrderRecord, TakeOff, order_of, record_of
 from colibri.autopilot.guidance.tasks.position import (
     GoToTask,
     HoldTask,
@@ -53,7 +53,7 @@ _ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask)
 _AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
     Mode.HOLD: (GoTo, TakeOff),  # a take-off that has arrived settles in hold
     Mode.TAKEOFF: (TakeOff,),
-    Mode.ORBIT: (Circle,),
+    Mode.ORBIT: (Orbit,),
 }
 """Orders that a mode may have flown."""
 

@@ -8,14 +8,14 @@ from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
+from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.autopilot.guidance.tasks.task import FlightTask
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import TEMPORARILY_REJECTED, Command, Handler
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -76,7 +76,7 @@ class MotionCommands:
     def _fly(self, mode: Mode, task: FlightTask) -> Refusal | None:
         return self._pilot.fly(mode, task, self._needs.missing())
 
-    def _take_off(self, command: Command) -> Refusal | None:
+    def _take_off(self, command: ReceivedCommand) -> Refusal | None:
         pilot = self._pilot
         height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
@@ -90,12 +90,12 @@ class MotionCommands:
             return denied("take-off", refusal.reason)
         return self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
 
-    def _height_of_takeoff(self, command: Command) -> float:
+    def _height_of_takeoff(self, command: ReceivedCommand) -> float:
         """Return z of ENU, m: above home, but above sea level from QGC, which sends a pitch of -1."""
         above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
         return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
 
-    def _reposition(self, command: Command) -> Refusal | None:
+    def _reposition(self, command: ReceivedCommand) -> Refusal | None:
         """Fly to a place, or stop if all are nan; the mode-change flag is optional."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return denied("reposition", f"a flag of {command.p2:g} is not known")
@@ -132,7 +132,7 @@ class MotionCommands:
     def _flies(self) -> bool:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
-    def _orbit(self, command: Command) -> Refusal | None:
+    def _orbit(self, command: ReceivedCommand) -> Refusal | None:
         """Fly a circle; z is above sea level in every frame, as in MAVSDK and PX4."""
         pilot = self._pilot
         if not self._flies:
@@ -148,13 +148,13 @@ class MotionCommands:
         radius = pilot.behaviour.orbit_radius_m if isnan(command.p1) else command.p1
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
-        circle = Circle((x, y, z), radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
+        circle = Orbit((x, y, z), radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
         refusal = self._no_circle(circle)
         if refusal is not None:
             return denied("orbit", refusal.reason)
         return self._fly(Mode.ORBIT, OrbitTask(circle, context))
 
-    def _no_circle(self, circle: Circle) -> Refusal | None:
+    def _no_circle(self, circle: Orbit) -> Refusal | None:
         (x, y, z), radius, speed, yaw_behaviour = circle
         if not MIN_RADIUS_M <= abs(radius) <= MAX_DISTANCE_M:
             return Refusal(f"a radius of {radius:g} m")
@@ -166,7 +166,7 @@ class MotionCommands:
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
         return self._home.refusal(z) or self.unreachable(*around)
 
-    def _turn(self, command: Command) -> Refusal | None:
+    def _turn(self, command: ReceivedCommand) -> Refusal | None:
         """Turn clockwise from north, or from the heading if p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):

@@ -5,7 +5,7 @@ from typing import Protocol, TypeVar
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Need
-from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.autopilot.guidance.tasks.task import ClientInputs
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 
@@ -63,9 +63,9 @@ class ModeNeeds:
         }
         return tuple(need for need, there in met.items() if not there)
 
-    def steered(self, now_us: int) -> Steered:
+    def steered(self, now_us: int) -> ClientInputs:
         behaviour = self._pilot.behaviour
-        return Steered(
+        return ClientInputs(
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
             self._offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
             self._follow.latest(now_us, _TARGET_LOST_US),

@@ -8,7 +8,7 @@ from colibri.autopilot.commander.flight.readiness import Readiness
 from colibri.autopilot.commander.flight.reference_generator import ReferenceGenerator
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import MissionTask
-from colibri.autopilot.commander.rules.failsafe_rule import Flight
+from colibri.autopilot.commander.rules.failsafe_rule import FlightState
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, next_state
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -22,10 +22,10 @@ from colibri.autopilot.guidance.tasks.position import HoldTask, TrackTask
 from colibri.autopilot.guidance.tasks.task import (
     NOT_STEERED,
     AttitudeMotion,
+    ClientInputs,
     FlightTask,
-    Motion,
     PlannedMotion,
-    Steered,
+    PositionMotion,
     TaskContext,
     lifts,
 )
@@ -56,7 +56,7 @@ class Sensed(NamedTuple):
 
     now_us: int = 0
     vehicle: VehicleState | None = None
-    steered: Steered = NOT_STEERED
+    steered: ClientInputs = NOT_STEERED
     position_known: bool = True
     delay_us: int = 0
     waited_us: int = 0
@@ -194,8 +194,8 @@ class Pilot:
         )
 
     @property
-    def flight(self) -> Flight:
-        return Flight(self.state.armed, self.ground.standing, self.state.mode, self.saving)
+    def flight(self) -> FlightState:
+        return FlightState(self.state.armed, self.ground.standing, self.state.mode, self.saving)
 
     def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
         if self.state.armed:
@@ -284,7 +284,7 @@ class Pilot:
         return guidance
 
     def _guidance(
-        self, context: TaskContext, wanted: AttitudeMotion | Motion | PlannedMotion, *, begins: bool
+        self, context: TaskContext, wanted: AttitudeMotion | PositionMotion | PlannedMotion, *, begins: bool
     ) -> Guidance:
         now_us, vehicle = self.sensed.now_us, context.state
         if isinstance(wanted, AttitudeMotion):

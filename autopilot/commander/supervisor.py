@@ -2,7 +2,7 @@
 
 from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, position_known
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
-from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory, following
+from colibri.autopilot.commander.rules.failsafe_rule import FailsafeMemory, FlightState, following
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.estimation.estimate import Estimate
@@ -22,20 +22,20 @@ class Supervisor:
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
         self._lines = lines
         self._conditions = Conditions()
-        self.memory = Memory()
+        self.memory = FailsafeMemory()
         self.limits: Limits = {}
         self.adopt(parameters)
 
     def adopt(self, parameters: Parameters) -> None:
         self.limits, self._settings = limits(parameters), settings(parameters)
 
-    def resume(self, memory: Memory) -> None:
+    def resume(self, memory: FailsafeMemory) -> None:
         self.memory = memory
 
     def position_known(self, estimate: Estimate | None) -> bool:
         return position_known(estimate, self.limits)
 
-    def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
+    def step(self, inputs: FailsafeInputs, flight: FlightState) -> Action:
         """Return the action to begin, before the pilot's step."""
         since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
         self.memory, action, lines = following(self.memory, inputs.now_us, since_us, self._settings, flight)

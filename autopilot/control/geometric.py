@@ -34,7 +34,7 @@ class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
     yaw_frequency_rad_s: Positive
 
 
-class Target(NamedTuple):
+class AttitudeTarget(NamedTuple):
     """Rotation R_d (3, 3) and body rates Ω_d, rad/s, (3,)."""
 
     rotation: Array
@@ -79,7 +79,7 @@ class GeometricController:
         del memory, time_us
         phi, theta, psi = demand.angles[0].tolist()
         R = np.array(rotation_matrix(state.attitude))
-        target = Target(
+        target = AttitudeTarget(
             np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi))),
             body_rate_of(phi, theta, demand.angle_rates_rad_s[0]),
         )
@@ -110,7 +110,7 @@ class GeometricController:
         share = min((lift - floor) / max(norm(force[:2]), floor), 1.0)
         return np.array([share * force[0], share * force[1], lift])
 
-    def _moment(self, R: Array, rate: Array, target: Target) -> Array:
+    def _moment(self, R: Array, rate: Array, target: AttitudeTarget) -> Array:
         """Return the moment, N m, [16], without the target's angular acceleration."""
         difference = matmul(target.rotation.T, R)
         rotation_error = 0.5 * vee(difference - difference.T)  # [10]
@@ -122,7 +122,7 @@ class GeometricController:
         return moment
 
 
-def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
+def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> AttitudeTarget:
     """Return the attitude with body z along `force`, m/s², ENU, (3,), and its body rates."""
     heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
@@ -130,7 +130,7 @@ def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_ra
     y, y_rate = _unit(np.cross(z, heading), np.cross(z_rate, heading) + np.cross(z, heading_rate))
     x, x_rate = np.cross(y, z), np.cross(y_rate, z) + np.cross(y, z_rate)
     rotation = np.column_stack([x, y, z])
-    return Target(rotation, vee(matmul(rotation.T, np.column_stack([x_rate, y_rate, z_rate]))))
+    return AttitudeTarget(rotation, vee(matmul(rotation.T, np.column_stack([x_rate, y_rate, z_rate]))))
 
 
 def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]:

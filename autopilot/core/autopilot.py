@@ -22,7 +22,7 @@ T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
 
-class Sample(NamedTuple):
+class ControlSample(NamedTuple):
     """A control sample.
 
     Attributes:
@@ -93,7 +93,7 @@ class Stages(Protocol):
     def faults(self) -> tuple[Fault, ...]:
         """Return the faults to request of the plant."""
 
-    def sampled(self, sample: Sample, duration_s: float) -> None:
+    def sampled(self, sample: ControlSample, duration_s: float) -> None:
         """Take in a control sample that was flown, and the time of its computation, to report it in `serve`."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
@@ -136,7 +136,7 @@ class Autopilot(Generic[StagesT]):
             stages.wait(now_us)
             return nothing_known(now_us, self._clock() - started_s)
         stages.enter(known, now_us, begins=begins)
-        flown: Sample | None = None
+        flown: ControlSample | None = None
         decision = estimate = None
         if due:
             flown = stages.guard(STEP, self._sample, _nothing, known, now_us)
@@ -158,13 +158,13 @@ class Autopilot(Generic[StagesT]):
         """Do what waits until a frame is answered, while the plant integrates; return what to send ground stations."""
         return self.stages.serve(inbox)
 
-    def _sample(self, known: StateFrame, now_us: int) -> Sample:
+    def _sample(self, known: StateFrame, now_us: int) -> ControlSample:
         stages = self.stages
         state = stages.loop.observe(known)
         ahead = self._ahead(known, state)
         stages.supervise(now_us, ahead)
         guidance = stages.guide(now_us, ahead)
-        return Sample(now_us, state, guidance, stages.decide(now_us, ahead, guidance))
+        return ControlSample(now_us, state, guidance, stages.decide(now_us, ahead, guidance))
 
     def _ahead(self, known: StateFrame, state: VehicleState) -> VehicleState:
         """Return the state at which a command of now takes effect; that of now where nothing delays it."""

@@ -13,7 +13,7 @@ import msgspec
 
 from colibri.autopilot.commander.mode_tasks import TaskRecord, task_record
 from colibri.autopilot.commander.pilot import PilotRecord
-from colibri.autopilot.commander.rules.failsafe_rule import Memory
+from colibri.autopilot.commander.rules.failsafe_rule import FailsafeMemory
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.loop import LoopRecord
 from colibri.autopilot.control.profile import Profile
@@ -62,7 +62,7 @@ class Checkpoint(NamedTuple):
     state_source: bytes
     rotor_lost: int | None
     rotor_speeds: Array
-    failsafes: Memory
+    failsafes: FailsafeMemory
     had_station: bool
 
     def is_followed_by(self, time_us: int) -> bool:

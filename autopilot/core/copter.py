@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.core.autopilot import Autopilot, Sample
+from colibri.autopilot.core.autopilot import Autopilot, ControlSample
 from colibri.autopilot.core.checkpoint import Checkpoint, Checkpointer, History, fingerprint_of
 from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.defence.state_estimates import StateEstimates
@@ -97,7 +97,7 @@ class Copter:
         self._flying = Flying(parts)
         self._start = FlightStart(parts, self._supervision, checkpointer, history, start_speed)
         self._reporter = Reporter(parts)
-        self._sampled: tuple[Sample, Decision | None, float] | None = None
+        self._sampled: tuple[ControlSample, Decision | None, float] | None = None
         self._plant_status = NOTHING
         self.time_us: int | None = None
         self._waiting_us: int | None = None
@@ -189,7 +189,7 @@ class Copter:
         """Return the faults that ground stations have injected."""
         return self.guard(table.FAULTS, self.stations.failures.take, tuple)
 
-    def sampled(self, sample: Sample, duration_s: float) -> None:
+    def sampled(self, sample: ControlSample, duration_s: float) -> None:
         """Take in a sample, with the decision that is flown, to report it in `serve`."""
         self._sampled = sample, self.parts.actuation.decision, duration_s
 

@@ -17,8 +17,8 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.actuation import Actuation
 from colibri.autopilot.core.defence.errors import Defence
-from colibri.autopilot.core.subscription import Flown, Subscribers
-from colibri.autopilot.core.trial import Trial
+from colibri.autopilot.core.subscription import FlownSettings, Subscribers
+from colibri.autopilot.core.trial import VehicleTrial
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
@@ -28,7 +28,7 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
-from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
+from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import WARNING
@@ -100,8 +100,8 @@ def parts_of(
         delay.declare(profile.delay_s if flies_by.delay_s < 0.0 else flies_by.delay_s)
 
     obey_delay(flies_by)
-    trial = Trial(loop, rotor_loss, planned_at)
-    tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
+    trial = VehicleTrial(loop, rotor_loss, planned_at)
+    tuning = Retuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
     with nullcontext() if values else suppress(ImpossibleError):  # compiles what a change in flight needs
         tuning.try_all(parameters.values)
     parameters.ask(tuning.prepare, tuning.is_ready)
@@ -115,7 +115,7 @@ def parts_of(
             *(tasks.adopt, rotor_loss.adopt, actuation.adopt, delay.adopt, snapshots.adopt),
             *(part.adopt for part in leads),
         ),
-        flown=Flown(parameters.values, Tuned(flown, assumed, loop.controller)),
+        flown=FlownSettings(parameters.values, Tuned(flown, assumed, loop.controller)),
     )
     return Parts(
         parameters,

@@ -3,7 +3,7 @@
 from colibri.autopilot.commander.rules.arming import ArmingInputs, battery_fault
 from colibri.autopilot.commander.rules.modes import MANUAL
 from colibri.autopilot.control.interface import Decision, VehicleState
-from colibri.autopilot.core.autopilot import Sample
+from colibri.autopilot.core.autopilot import ControlSample
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.health import HealthWatch, not_known
@@ -27,7 +27,7 @@ class Reporter:
         self._interval_s = parts.loop.control_interval_us * 1e-6
         self.samples = 0
 
-    def report(self, sample: Sample, decision: Decision | None, duration_s: float) -> None:
+    def report(self, sample: ControlSample, decision: Decision | None, duration_s: float) -> None:
         """Report a control sample, with the decision that is flown."""
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
         now_us, state, guidance, _ = sample

@@ -13,7 +13,7 @@ from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.plant.vehicle.description import Vehicle
 
 
-class Flown(NamedTuple):
+class FlownSettings(NamedTuple):
     """What is flown by.
 
     Attributes:
@@ -39,7 +39,7 @@ class Subscribers:
         behaviour: tuple[Callable[[Behaviour], None], ...],
         law: tuple[Callable[[Controller[Any], Vehicle], None], ...],
         vehicle: tuple[Callable[[Vehicle], None], ...],
-        flown: Flown | None = None,
+        flown: FlownSettings | None = None,
     ) -> None:
         """Call these back.
 
@@ -63,7 +63,7 @@ class Subscribers:
         for call in self._calls(parameters, tuned):
             call()
         if self._flown is not None:
-            self._flown = Flown(parameters.values, tuned or self._flown.tuned)
+            self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
 
     def keep(self, parameters: Parameters) -> None:
         """Go back to what was flown before, as a subscriber could not adopt the last change."""

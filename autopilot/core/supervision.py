@@ -6,7 +6,7 @@ from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.parts import Parts
-from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
+from colibri.autopilot.guidance.tasks.task import NOT_STEERED, ClientInputs
 
 _EVER_US = 10**15
 _KNOWN_TILT_RAD, _CATCHING_US = 0.035, 3_000_000
@@ -63,7 +63,7 @@ class Supervision:
         if action is not Action.NONE:
             self._parts.pilot.save(action)
 
-    def _sensed(self, now_us: int) -> tuple[Steered, bool]:
+    def _sensed(self, now_us: int) -> tuple[ClientInputs, bool]:
         """Return the setpoints of clients, and whether the position is known."""
         parts = self._parts
         return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
@@ -114,5 +114,5 @@ def _nothing() -> None:
     """Replace what raised by nothing."""
 
 
-def _not_steered() -> tuple[Steered, bool]:
+def _not_steered() -> tuple[ClientInputs, bool]:
     return NOT_STEERED, True

@@ -8,7 +8,7 @@ from colibri.autopilot.control.interface import Clock, Decision, Pace, VehicleSt
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import Factory
-from colibri.autopilot.core.autopilot import Autopilot, Sample
+from colibri.autopilot.core.autopilot import Autopilot, ControlSample
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.guidance.guidance import Guidance
@@ -154,7 +154,7 @@ class TrackStages:
         """Return none."""
         return ()
 
-    def sampled(self, sample: Sample, duration_s: float) -> None:
+    def sampled(self, sample: ControlSample, duration_s: float) -> None:
         """Report nothing."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":

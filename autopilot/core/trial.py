@@ -24,7 +24,7 @@ class TrialError(AutopilotError):
     """A change by which a part gives no finite numbers."""
 
 
-class Trial:
+class VehicleTrial:
     """Tries the changes of one vehicle's parameters; the control law is tried by `Tuning` itself."""
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss, planned_at: Instants) -> None:

@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.estimation.measurements.barometer import Barometer
-from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.measurements.barometer import BarometerFusion
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square
@@ -52,7 +52,7 @@ _STEPS = 4
 """Least-squares iterations: the error falls by the square of the angle turned."""
 
 
-class Found(NamedTuple):
+class DetectedBias(NamedTuple):
     """Detected bias, m/s² FLU, its variance along each axis, and corrections of the filter, ENU."""
 
     bias_m_s2: Array
@@ -74,7 +74,9 @@ class AccelerometerWatch:
         self._resets = 0
         find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
-    def look(self, time_us: int, state: list[float], velocity: Kind, barometer: Barometer) -> Found | None:
+    def look(
+        self, time_us: int, state: list[float], velocity: MeasurementKind, barometer: BarometerFusion
+    ) -> DetectedBias | None:
         """Check a fix; `state` (10,) is the filter's nominal state before the test."""
         if velocity.resets != self._resets:
             self._resets = velocity.resets
@@ -90,7 +92,7 @@ class AccelerometerWatch:
             return None
         return self._judge(len(self._fixes) - 1 - self._rejected)
 
-    def _judge(self, first: int) -> Found | None:
+    def _judge(self, first: int) -> DetectedBias | None:
         if first < _FEWEST_BEFORE:
             return None
         rows = np.array(
@@ -101,7 +103,7 @@ class AccelerometerWatch:
         )
         found = np.empty((3, 3))
         variance = find_bias(rows, first, self._velocity_variance, self._height_variance, self._gravity, found)
-        return Found(found[0], variance, found[1], found[2]) if variance > 0.0 else None
+        return DetectedBias(found[0], variance, found[1], found[2]) if variance > 0.0 else None
 
 
 @compiled

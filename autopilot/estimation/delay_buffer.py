@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.autopilot.estimation.eskf_predict import BLIND_FORCE, BLIND_RATE, FORCE, RATE, SAMPLE
 from colibri.autopilot.estimation.measurements.instrument import Value
-from colibri.autopilot.estimation.sensing.inertial import Reading, sample_between
+from colibri.autopilot.estimation.sensing.inertial import InertialReading, sample_between
 from colibri.common.jit import compiled
 from colibri.common.types import Array, Vector
 
@@ -32,7 +32,7 @@ class DelayBuffer:
         self.first = 0
         self.waiting: deque[Waiting] = deque()
 
-    def put(self, before: Reading, after: Reading, interval_s: float, measured: Waiting) -> None:
+    def put(self, before: InertialReading, after: InertialReading, interval_s: float, measured: Waiting) -> None:
         if interval_s > _BRIDGED_S:
             before = before._replace(force_good=False, rate_good=False, force_modelled=False, rate_modelled=False)
         last = (self.first + len(self.waiting)) % len(self.samples)

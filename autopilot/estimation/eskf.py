@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
-from colibri.autopilot.estimation.accelerometer_bias import Found
+from colibri.autopilot.estimation.accelerometer_bias import DetectedBias
 from colibri.autopilot.estimation.eskf_predict import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -25,8 +25,8 @@ from colibri.autopilot.estimation.eskf_predict import (
     Noise,
     predict,
 )
-from colibri.autopilot.estimation.estimate import Check, Tests
-from colibri.autopilot.estimation.measurements.kind import FIVE_SIGMA, Kind, KindRecord
+from colibri.autopilot.estimation.estimate import FilterCheck, Tests
+from colibri.autopilot.estimation.measurements.kind import FIVE_SIGMA, KindRecord, MeasurementKind
 from colibri.autopilot.estimation.measurements.table import instruments_of, kinds_of
 from colibri.autopilot.estimation.sensing.alignment import Aligned
 from colibri.autopilot.estimation.sensing.free_fall import Caught
@@ -94,9 +94,9 @@ class Filter:
         self._claims = (nan, nan)
         self._fix_variances = np.array([speed, self._horizontal, self._vertical])
         self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
-        self.velocity = Kind("velocity", 3, _PATIENCE_US, (VELOCITY, 3, _INFLATED_M_S))
-        self.position = Kind("position", 2, _PATIENCE_US, (POSITION, 2, _INFLATED_M))
-        self.height = Kind("height", 1, _PATIENCE_US, (POSITION + 2, 1, _INFLATED_M))
+        self.velocity = MeasurementKind("velocity", 3, _PATIENCE_US, (VELOCITY, 3, _INFLATED_M_S))
+        self.position = MeasurementKind("position", 2, _PATIENCE_US, (POSITION, 2, _INFLATED_M))
+        self.height = MeasurementKind("height", 1, _PATIENCE_US, (POSITION + 2, 1, _INFLATED_M))
         self.magnetometer, self.barometer, self.instruments = instruments_of(sensors, field_enu_gauss)
         of_gps, of_others = (self.velocity, self.position, self.height), (one.kind for one in self.instruments)
         by_name = {kind.name: kind for kind in (*of_gps, *of_others)}
@@ -208,7 +208,7 @@ class Filter:
             accepted &= self.height.force_accept(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
         return None if accepted else Reason.INNOVATION
 
-    def reset_accel_bias(self, found: Found, time_us: int) -> None:
+    def reset_accel_bias(self, found: DetectedBias, time_us: int) -> None:
         """Correct the bias, and the position and velocity errors since its change."""
         x, P = self.x, self.P
         x[:3] += found.position_m
@@ -248,10 +248,10 @@ class Filter:
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
 
-    def check(self, time_us: int) -> Check:
+    def check(self, time_us: int) -> FilterCheck:
         upper = self.P.take(_UPPER).tolist()
         nis, accepted = tuple(kind.nis for kind in self.kinds), tuple(kind.accepted for kind in self.kinds)
-        return Check(time_us, tuple(self.x[:10].tolist()), tuple(upper), nis, accepted)
+        return FilterCheck(time_us, tuple(self.x[:10].tolist()), tuple(upper), nis, accepted)
 
     @property
     def tests(self) -> Tests:

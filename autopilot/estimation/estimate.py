@@ -84,7 +84,7 @@ def _flags(health: Health) -> int:
     return flags
 
 
-class Check(NamedTuple):
+class FilterCheck(NamedTuple):
     """The filter at its own time, for consistency checks.
 
     Attributes:
@@ -120,4 +120,4 @@ class Estimate(NamedTuple):
     rejected: Rejections
     resets: int
     smoothing_m: Vector
-    check: Check | None
+    check: FilterCheck | None

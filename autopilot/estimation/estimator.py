@@ -11,15 +11,15 @@ from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting, roughness
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
 from colibri.autopilot.estimation.eskf_predict import look_ahead
-from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
+from colibri.autopilot.estimation.estimate import Estimate, FilterCheck, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Value
 from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
-from colibri.autopilot.estimation.sensing.inertial import Expected, Inertial, Reading
+from colibri.autopilot.estimation.sensing.inertial import Expected, Inertial, InertialReading
 from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
-from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.compiled_geodesy import enu_of
 from colibri.common.earth.geodesy import Geodetic
@@ -50,7 +50,7 @@ _ROUGH_CHECKS, _ROUGH_PART = 3, 0.6
 """In a row, because a knock is rough for one."""
 _BOTH_REJECTED_US = 300_000
 """GPS velocity and barometer contradict the same way for so long: the accelerometer is their one common cause."""
-_NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
+_NOTHING = InertialReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
 class EstimatorRecord(NamedTuple):
@@ -62,7 +62,7 @@ class EstimatorRecord(NamedTuple):
     samples: Array
     first: int
     waiting: list[Waiting]
-    reading: Reading
+    reading: InertialReading
     fix_us: int | None
     position_m: Vector
     velocity_m_s: Vector
@@ -152,7 +152,7 @@ class Estimator:
     def _take_in(self, frame: SensorFrame) -> None:
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
-            self._rejected.add(Source.CLOCK, Reason.TIME)
+            self._rejected.add(RejectedSource.CLOCK, Reason.TIME)
             if not self._clock_resets.settle(frame.time_us):
                 self._unpublished = False
                 return
@@ -269,7 +269,7 @@ class Estimator:
             if value is not None:
                 self._fuse_value(instrument, value, time_us, now_us)
 
-    def _fuse_value(self, instrument: Instrument, value: Value, time_us: int, now_us: int) -> None:
+    def _fuse_value(self, instrument: FusedInstrument, value: Value, time_us: int, now_us: int) -> None:
         x = self.filter.x
         before = x[:6].tolist() if instrument.smoothed else None
         reason = instrument.fuse(x, self.filter.P, value, time_us)
@@ -281,13 +281,13 @@ class Estimator:
     def _fuse(self, fix: GpsFix, now_us: int) -> None:
         after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
         if abs(after_s) > _MAX_FIX_AGE_S:
-            self._rejected.add(Source.GPS, Reason.TIME)
+            self._rejected.add(RejectedSource.GPS, Reason.TIME)
             return
         self._tests = None
         before = self.filter.x[:10].tolist()
         reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
         if reason is not None:
-            self._rejected.add(Source.GPS, reason)
+            self._rejected.add(RejectedSource.GPS, reason)
         self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
         modelled = self._reading
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
@@ -346,14 +346,14 @@ class Estimator:
             self._tests, self._resets = self.filter.tests, self.filter.resets
         return self._tests
 
-    def _check(self, now_us: int, since_us: int) -> Check | None:
+    def _check(self, now_us: int, since_us: int) -> FilterCheck | None:
         at_us = now_us - _CHECK_AT_US
         if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
         self._check_inertial(now_us)
         return self.filter.check(self.filter_us)
 
-    def _replace(self, before: Reading) -> None:
+    def _replace(self, before: InertialReading) -> None:
         *_, force_modelled, rate_modelled = self._reading
         if force_modelled != before.force_modelled:
             self.filter.replace_force(modelled=force_modelled)
@@ -416,7 +416,7 @@ class Estimator:
         force = (0.0, 0.0, self._gravity)
         aligned = Aligned(1.0, force, (0.0, 0.0, 0.0), self._field, 50, 0.0, 50, fix, (1.0, 0.0, 0.0, 0.0))
         self.filter.start(aligned, (0.0, 0.0, 0.0), 0)
-        rest = Reading(force, (0.0, 0.0, 0.0), True, True)
+        rest = InertialReading(force, (0.0, 0.0, 0.0), True, True)
         typical: list[Value | None] = [instrument.typical() for instrument in self.filter.instruments]
         self._buffer.put(rest, self._reading, self._interval_us * 1e-6, Waiting(self._interval_us, typical))
         self._take(self._interval_us)

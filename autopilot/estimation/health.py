@@ -8,7 +8,7 @@ from typing import NamedTuple
 from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.measurements.instrument import Ratio
 from colibri.autopilot.estimation.measurements.table import RATIOS, ROWS
-from colibri.autopilot.estimation.sensing.rejection import Source
+from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import EstimatorState
 from colibri.mavlink.wire.dialect import mav
@@ -32,7 +32,7 @@ _MATTERS = (
     *(
         _Matter(partial(_is_valid, row.source), f"{row.source} not accepted", f"{row.source} accepted again")
         for row in ROWS
-        if row.source not in tuple(Source)  # the others have failsafes
+        if row.source not in tuple(RejectedSource)  # the others have failsafes
     ),
 )
 

@@ -1,6 +1,6 @@
 """Simulated calibrations with PX4's "[cal] ..." texts, which ground stations parse."""
 
-from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Command
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, ReceivedCommand
 from colibri.mavlink.wire.refusal import Refusal
 
 _STEP_US = 100_000
@@ -16,7 +16,7 @@ class Calibration:
         self._step = 0
         self._due_us = 0
 
-    def begin(self, command: Command, *, armed: bool) -> Refusal | None:
+    def begin(self, command: ReceivedCommand, *, armed: bool) -> Refusal | None:
         if armed:
             return Refusal("calibration refused: the rotors are armed")
         chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)

@@ -1,9 +1,9 @@
 """MAV_CMD_INJECT_FAILURE, forwarded to the plant and acknowledged with its result."""
 
-from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
+from colibri.mavlink.hil.faults import Equipment, Fault, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
-from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, Command
+from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -17,11 +17,11 @@ class Failures:
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
         """`relays` tells whether the plant accepts faults; sensor faults require sensor feedback."""
         self._relays = relays
-        self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
+        self._parts = [part for part in Equipment if part is not Equipment.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []
-        self._pending: tuple[Fault, Command] | None = None
+        self._pending: tuple[Fault, ReceivedCommand] | None = None
 
-    def inject(self, command: Command, *, enabled: bool) -> Refusal | None:
+    def inject(self, command: ReceivedCommand, *, enabled: bool) -> Refusal | None:
         if not enabled:
             return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
         if not self._relays:
@@ -42,7 +42,7 @@ class Failures:
         faults, self._to_send = tuple(self._to_send), []
         return faults
 
-    def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Refusal | None] | None:
+    def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[ReceivedCommand, Refusal | None] | None:
         if self._pending is None:
             return None
         fault, command = self._pending

@@ -6,7 +6,7 @@ from colibri.mavlink.files.flight_log import FlightLog
 from colibri.mavlink.files.tree import Files
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.statustext import Line
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.recorder import Recorder
 
@@ -31,14 +31,14 @@ class OnboardLog:
         self._log = FlightLog(files, (LOGS,))
         self._topics = _Topics(self._log)
         self._recorder = Recorder(self._topics, vehicle, system_id, parameters, with_battery=True)
-        self._snapshot: Snapshot | None = None
+        self._snapshot: TelemetrySnapshot | None = None
         self._armed = False
 
     @property
     def name(self) -> str | None:
         return self._log.name
 
-    def update(self, snapshot: Snapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
+    def update(self, snapshot: TelemetrySnapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
         begins, ends = armed and not self._armed, self._armed and not armed
         self._armed = armed
         if begins:

@@ -25,10 +25,10 @@ from colibri.mavlink.telemetry.snapshot import (
     NOT_SOLVED,
     NOWHERE,
     BatteryState,
-    Home,
+    HomePosition,
     Setpoint,
-    Snapshot,
     SolverState,
+    TelemetrySnapshot,
 )
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
@@ -71,7 +71,7 @@ class SnapshotBuilder:
         state_source: StateSource,
         *,
         breached: bool,
-    ) -> Snapshot:
+    ) -> TelemetrySnapshot:
         sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
         mode, armed = pilot.state
         number = custom_mode(mode)
@@ -79,7 +79,7 @@ class SnapshotBuilder:
         (ux, uy, uz), self._velocity, dt = self._velocity or velocity, velocity, self._interval_s
         speed = self._max_speed_rad_s
         c1, c2, c3, c4 = controls
-        return Snapshot(
+        return TelemetrySnapshot(
             time_us=now_us,
             armed=armed,
             base_mode=_MANUAL if sticks is not None and mode in _BY_STICKS else _AUTO,
@@ -100,7 +100,7 @@ class SnapshotBuilder:
             gps_ok=state_source.has_gps(now_us),
             fence_enabled=fence.exists,
             fence_breached=breached,
-            home=Home(home.position_enu_m, home.yaw_rad),
+            home=HomePosition(home.position_enu_m, home.yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,
             battery=battery,

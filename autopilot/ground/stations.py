@@ -20,12 +20,12 @@ from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.log_download import Logs
-from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.files.tree import Files, Tree
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
-from colibri.mavlink.mission.service import MissionService, Vehicle
+from colibri.mavlink.mission.service import MissionService, MissionVehicle
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
@@ -45,7 +45,7 @@ from colibri.mavlink.setpoints.manual_control import Manual
 from colibri.mavlink.setpoints.offboard import Offboard
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.signing import Signing
@@ -116,7 +116,7 @@ class Stations:
             pilot, missions, parameters, identity=settings.identity, system_id=settings.system_id
         )
         commands = Commands(pilot, fence, self.needs)
-        vehicle = Vehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
+        vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
         self.plans = MissionService(PLAN_RULES, vehicle, self._text)
         self._heartbeat = HeartbeatService(identity)
         self._streams = StreamService(telemetry(settings.boot_unix_us))
@@ -153,8 +153,8 @@ class Stations:
             caught=defence.caught,
             budget=budget,
         )
-        self.snapshot: Snapshot | None = None
-        self._logged: Snapshot | None = None
+        self.snapshot: TelemetrySnapshot | None = None
+        self._logged: TelemetrySnapshot | None = None
         self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
 
     def use(self, channel: int, kind: str) -> None:
@@ -168,7 +168,7 @@ class Stations:
         """Count a ground station, connected before a restart, as lost from now on."""
         self._heartbeat.station_us = now_us
 
-    def update(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: TelemetrySnapshot) -> None:
         vehicle = self._pilot.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
@@ -260,7 +260,7 @@ class Stations:
 def _files(settings: StationSettings, metadata: Metadata, parameters: Parameters) -> Files:
     pack = {"@PARAM/param.pck": lambda query: packed(parameters, query) or b""}
     mounts = {} if settings.logs is None else {LOGS: settings.logs}
-    return Tree(settings.files or Memory(), mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
+    return Tree(settings.files or MemoryFiles(), mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
 
 
 def _nothing() -> None: ...

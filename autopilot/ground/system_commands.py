@@ -10,7 +10,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.ground.calibration import Calibration
 from colibri.common.earth.geodesy import Geodetic, is_on_earth
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import Command, Handler
+from colibri.mavlink.services.command import Handler, ReceivedCommand
 from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
 from colibri.mavlink.wire.dialect import mav
@@ -58,13 +58,13 @@ class SystemCommands:
         self._missions.moved_origin()
         return None
 
-    def _set_origin(self, command: Command) -> Refusal | None:
+    def _set_origin(self, command: ReceivedCommand) -> Refusal | None:
         return self.set_origin(Geodetic(command.x, command.y, command.z))
 
-    def _calibrate(self, command: Command) -> Refusal | None:
+    def _calibrate(self, command: ReceivedCommand) -> Refusal | None:
         return self._calibration.begin(command, armed=self._pilot.state.armed)
 
-    def _restart(self, command: Command) -> Refusal | None:
+    def _restart(self, command: ReceivedCommand) -> Refusal | None:
         if self._pilot.state.armed:
             return Refusal("restart refused: the rotors are armed")
         if command.p1 not in (REBOOT, SHUT_DOWN):
@@ -72,7 +72,7 @@ class SystemCommands:
         self.restart = command.p1
         return None
 
-    def _storage(self, command: Command) -> Refusal | None:
+    def _storage(self, command: ReceivedCommand) -> Refusal | None:
         """Parameters are stored on change, so only the reset has an effect."""
         if command.p1 == 2.0:
             if self._pilot.state.armed:

@@ -23,7 +23,7 @@ _CARRIED = 1e-2
 """The same for a reference extrapolated by its derivatives."""
 
 
-class Kind(IntEnum):
+class BindingDerivative(IntEnum):
     """Binding derivative of a target's axis."""
 
     POSITION = 0
@@ -31,7 +31,7 @@ class Kind(IntEnum):
     ACCELERATION = 2
 
 
-ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
+ALL_BOUND = (BindingDerivative.POSITION, BindingDerivative.POSITION, BindingDerivative.POSITION)
 
 
 class Reference(NamedTuple):
@@ -54,7 +54,7 @@ class Target(NamedTuple):
     """
 
     motion: Array
-    kinds: tuple[Kind, Kind, Kind]
+    kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative]
     heading: Array
     turns: bool = True
 
@@ -78,7 +78,10 @@ def slowed(reference: Reference, speed: float) -> Reference:
 
 
 def still_target(
-    position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: tuple[Kind, Kind, Kind] | None = None
+    position_enu_m: Sequence[float],
+    yaw_rad: float,
+    samples: int,
+    kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative] | None = None,
 ) -> Target:
     motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
     motion[:, 0] = position_enu_m
@@ -118,7 +121,7 @@ def lead(
 
 
 @cache
-def _integers(kinds: tuple[Kind, Kind, Kind]) -> Integers:
+def _integers(kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivative]) -> Integers:
     return np.array(kinds, dtype=np.int64)
 
 

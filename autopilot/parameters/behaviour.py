@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Value
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, Value
 
 TRACKS = (*THESIS_TRACKS, "lemniscate", "circle")
 """Tracks by the number of TRACK."""
@@ -16,7 +16,7 @@ _DEG = radians(1.0)
 _YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
 
 
-class Row(NamedTuple):
+class BehaviourRow(NamedTuple):
     """A parameter for a `field`, which is `scale` times the parameter."""
 
     name: str
@@ -32,7 +32,7 @@ class Row(NamedTuple):
 
     def parameter(self) -> Parameter:
         value = _field(self.field)
-        kind = Kind.REAL if isinstance(value, float) else Kind.INT
+        kind = ParamType.REAL if isinstance(value, float) else ParamType.INT
         return Parameter(
             name=self.name,
             kind=kind,
@@ -49,25 +49,33 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    Row("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Height of a takeoff", "Above where it stands."),
-    Row("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "Of what flies by itself."),
-    Row(
+    BehaviourRow(
+        "MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Height of a takeoff", "Above where it stands."
+    ),
+    BehaviourRow("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "Of what flies by itself."),
+    BehaviourRow(
         "MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Largest horizontal speed", "No command may ask for more."
     ),
-    Row("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Speed of climbs"),
-    Row("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Speed of descents"),
-    Row("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
-    Row("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down alike."),
-    Row("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Less is smoother."),
-    Row("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Rate of turns", "", _DEG, 1),
-    Row("MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Acceleration of turns", "", _DEG, 1),
-    Row("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Speed of a takeoff"),
-    Row("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Speed of a landing", "Close to the ground."),
-    Row("MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
-    Row("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Turn rate of full sticks", "", _DEG, 1),
-    Row("MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed of full sticks", "Position mode."),
-    Row("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Height of a return", "Above home, on the way there."),
-    Row(
+    BehaviourRow("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Speed of climbs"),
+    BehaviourRow("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Speed of descents"),
+    BehaviourRow("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
+    BehaviourRow("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down alike."),
+    BehaviourRow("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Less is smoother."),
+    BehaviourRow("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Rate of turns", "", _DEG, 1),
+    BehaviourRow(
+        "MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Acceleration of turns", "", _DEG, 1
+    ),
+    BehaviourRow("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Speed of a takeoff"),
+    BehaviourRow("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Speed of a landing", "Close to the ground."),
+    BehaviourRow("MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
+    BehaviourRow("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Turn rate of full sticks", "", _DEG, 1),
+    BehaviourRow(
+        "MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed of full sticks", "Position mode."
+    ),
+    BehaviourRow(
+        "RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Height of a return", "Above home, on the way there."
+    ),
+    BehaviourRow(
         "RTL_MIN_DIST",
         "return_radius_m",
         "m",
@@ -76,10 +84,16 @@ ROWS = (
         "Radius without a climb",
         "Closer to home it does not climb.",
     ),
-    Row("NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Closer to a place than this: arrived."),
-    Row("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing", "0: never."),
-    Row("COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm if not flying so long", "0: never."),
-    Row(
+    BehaviourRow(
+        "NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Closer to a place than this: arrived."
+    ),
+    BehaviourRow(
+        "COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing", "0: never."
+    ),
+    BehaviourRow(
+        "COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm if not flying so long", "0: never."
+    ),
+    BehaviourRow(
         "COM_OF_LOSS_T",
         "setpoints_lost_s",
         "s",
@@ -88,41 +102,47 @@ ROWS = (
         "Offboard loss timeout",
         "A companion may be silent so long.",
     ),
-    Row("COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."),
-    Row("GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."),
-    Row("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
-    Row("ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."),
-    Row("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
-    Row("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
-    Row(
+    BehaviourRow(
+        "COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."
+    ),
+    BehaviourRow(
+        "GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."
+    ),
+    BehaviourRow("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
+    BehaviourRow(
+        "ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."
+    ),
+    BehaviourRow("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
+    BehaviourRow("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
+    BehaviourRow(
         *("FLW_TGT_FA", "follow_angle_deg", "deg", -180.0, 180.0, "Follow: side of the target"),
         *("Clockwise from ahead of it: 180 is behind.", 1.0, 1),
     ),
-    Row(
+    BehaviourRow(
         *("FLW_TGT_ALT_M", "follow_altitude_mode", "", 0, 2, "Follow: what the height is above"),
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
-    Row(
+    BehaviourRow(
         *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Failure of a rotor"),
         *("Whether it is noticed. Set to 0 it also forgets one that has failed.",),
         values=((0, "Ignore"), (1, "Land on three rotors")),
     ),
-    Row(
+    BehaviourRow(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
         *("Whether MAV_CMD_INJECT_FAILURE is obeyed.",),
         values=_YES_OR_NO,
     ),
-    Row(
+    BehaviourRow(
         *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
         "Simulated: what the control law decides takes effect so much later; samples due meanwhile are skipped.",
         *(1e-3, 1),
     ),
-    Row(
+    BehaviourRow(
         *("SYS_CMD_DELAY", "delay_s", "ms", -1.0, 200.0, "Delay of commands"),
         "Compensated: from a frame until its command takes effect. -1: the profile's, or measured.",
         *(1e-3, 1),
     ),
-    Row(
+    BehaviourRow(
         *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
         values=tuple(enumerate(TRACKS)),
     ),
@@ -173,7 +193,7 @@ def _answers(system_id: int) -> list[Parameter]:
 
 
 def _answer(name: str, default: Value, description: str, details: str = _ANSWERS, **others: Any) -> Parameter:
-    kind = Kind.REAL if isinstance(default, float) else Kind.INT
+    kind = ParamType.REAL if isinstance(default, float) else ParamType.INT
     fields = {"description": description, "details": details, "group": _group(name), **others}
     return Parameter(name=name, kind=kind, default=default, **fields)
 

@@ -5,7 +5,7 @@ from itertools import count
 from math import isfinite
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter, Value
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Parameter, ParamType, Value
 
 Path: TypeAlias = tuple[str | int, ...]
 """Keys and list indices, outermost first."""
@@ -44,8 +44,8 @@ class Number(NamedTuple):
     def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
         """Return the parameter; its bounds widen to include the default."""
         value = read(tree, self.path)
-        kind = Kind.INT if isinstance(value, int) else Kind.REAL
-        default = value if kind == Kind.INT else value / self.scale
+        kind = ParamType.INT if isinstance(value, int) else ParamType.REAL
+        default = value if kind == ParamType.INT else value / self.scale
         return Parameter(
             name=self.name,
             kind=kind,

@@ -42,7 +42,7 @@ class Rhythm(Protocol):
     preview: Preview
 
 
-class Trial(Protocol):
+class ParameterTrial(Protocol):
     """Other objects built from parameters; methods raise on bad values."""
 
     def is_ready(self, vehicle: Vehicle) -> bool: ...
@@ -60,7 +60,7 @@ class Tuned(NamedTuple):
     controller: Controller[Any]
 
 
-class Tuning:
+class Retuning:
     """Rejects changes with which the control law cannot be built or fly."""
 
     def __init__(
@@ -70,7 +70,7 @@ class Tuning:
         running: Rhythm,
         say: Callable[[str], None],
         parameters: Parameters | None = None,
-        trial: Trial | None = None,
+        trial: ParameterTrial | None = None,
         budget: Budget | None = None,
     ) -> None:
         self._numbers = numbers

@@ -17,7 +17,7 @@ from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED
 
 if TYPE_CHECKING:
-    from colibri.autopilot.process.ground import Ground
+    from colibri.autopilot.process.ground import GroundService
 
 
 Ts = TypeVarTuple("Ts")
@@ -34,7 +34,7 @@ def _refusal(result: int) -> str:
     return "the plant flies at another frame rate or feedback, and will not change it in mid-flight"
 
 
-class Client:
+class PlantClient:
     """Drives the autopilot's end of a link."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Client:
         status: Status,
         stop: Stop,
         log: AutopilotLog | None,
-        ground: "Ground | None" = None,
+        ground: "GroundService | None" = None,
     ) -> None:
         self._link = link
         self._end = end

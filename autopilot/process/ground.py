@@ -25,7 +25,7 @@ from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.signing import tick_at
 from colibri.plant.vehicle.description import Vehicle
 
@@ -38,7 +38,7 @@ _STANDING_SAMPLES = 50
 """A disarmed vehicle saves its state at this interval of control samples."""
 
 
-class Ground:
+class GroundService:
     """Serves ground stations; a restart replaces `autopilot`."""
 
     def __init__(
@@ -73,7 +73,7 @@ class Ground:
                 status.say("track", note)
         self.errors = ErrorLog(spec.out or spec.state, status)
         self._log: AutopilotLog | None = None
-        self._recorded_snapshot: Snapshot | None = None
+        self._recorded_snapshot: TelemetrySnapshot | None = None
         self._texts: deque[str] = deque(maxlen=MAX_SAID)
         self.autopilot = self._new_autopilot(self._state.history())
         self._kept_samples = self._kept_plans = 0

@@ -9,7 +9,7 @@ import msgspec
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback, Horizon
 from colibri.autopilot.core.step import Received, Step
-from colibri.autopilot.estimation.estimate import Check, Estimate
+from colibri.autopilot.estimation.estimate import Estimate, FilterCheck
 from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.autopilot.parameters.definitions import definitions
@@ -21,20 +21,20 @@ from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.hil.state import STATE_BYTES, StateFrame
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import INFO, WARNING
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, ESTIMATE, FILTER, MEASURED
-from colibri.mavlink.ulog.inputs import Kind, encode_input
+from colibri.mavlink.ulog.inputs import RecordKind, encode_input
 from colibri.mavlink.ulog.log import FileLog, TopicLog
 from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.recorder import STATUS_EVERY_US, Recorder
 from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
-from colibri.mavlink.ulog.status import Status, status_message
+from colibri.mavlink.ulog.status import VehicleStatus, status_message
 
-_FLYING = Status(armed=True, custom_mode=custom_mode(Mode.TRACK))
+_FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _STILL = (nan,) * 4
 _NO_REFERENCES = (nan,) * 11
 
@@ -96,7 +96,7 @@ class AutopilotLog:
             return beginning(self._setup.vehicle, {})
         return beginning(vehicle.name, Parameters(definitions(profile, vehicle, self._setup.system_id)).values)
 
-    def write_snapshot(self, snapshot: Snapshot) -> None:
+    def write_snapshot(self, snapshot: TelemetrySnapshot) -> None:
         if self._recorder is not None:
             self._recorder.update(snapshot)
 
@@ -114,7 +114,7 @@ class AutopilotLog:
             datagram, link, address, loopback = received
             entry = ReceivedDatagram(link=link, address=address, loopback=loopback, datagram=datagram)
             try:
-                self.topics.append(encode_input(self._time_us, Kind.DATAGRAM, encoded(entry)))
+                self.topics.append(encode_input(self._time_us, RecordKind.DATAGRAM, encoded(entry)))
             except LogError as error:
                 failed = error
             yield received
@@ -141,11 +141,11 @@ class AutopilotLog:
             self._begins = False
             setup = msgspec.structs.replace(self._setup, first_us=time_us)
             self.topics.begin(self.beginning())
-            self.topics.append(encode_input(time_us, Kind.SETUP, encoded(setup)))
+            self.topics.append(encode_input(time_us, RecordKind.SETUP, encoded(setup)))
         if datagram is None:
             return
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
-            self.topics.queue(encode_input(time_us, Kind.FRAME, datagram))
+            self.topics.queue(encode_input(time_us, RecordKind.FRAME, datagram))
         self.topics.add(COMMAND, (time_us / 1e6, *controls, armed))
 
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
@@ -173,7 +173,7 @@ class AutopilotLog:
         if estimate is not None and isinstance(frame, SensorFrame):
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
 
-    def _check_row(self, check: Check) -> tuple[float, ...]:
+    def _check_row(self, check: FilterCheck) -> tuple[float, ...]:
         """Return the row of `FILTER`; absent measurements are nan."""
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))

@@ -12,7 +12,7 @@ from colibri.common.config import UNREADABLE
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
-from colibri.mavlink.ulog.inputs import InputRecord, Kind
+from colibri.mavlink.ulog.inputs import InputRecord, RecordKind
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -95,7 +95,7 @@ def encoded(what: Input) -> bytes:
     return msgspec.json.encode(what)
 
 
-class Inputs(NamedTuple):
+class RecordedInputs(NamedTuple):
     """Inputs by the time of a frame; several setups after restarts."""
 
     setups: dict[int, Setup]
@@ -103,11 +103,11 @@ class Inputs(NamedTuple):
     frames: dict[int, bytes]
 
 
-def read_inputs(records: Iterable[InputRecord]) -> Inputs:
+def read_inputs(records: Iterable[InputRecord]) -> RecordedInputs:
     """Return the inputs of a log, or raise InputsError."""
-    inputs = Inputs({}, {}, {})
+    inputs = RecordedInputs({}, {}, {})
     for time_us, kind, content in records:
-        if kind == Kind.FRAME:
+        if kind == RecordKind.FRAME:
             inputs.frames.setdefault(time_us, content)
             continue
         try:

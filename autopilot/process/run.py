@@ -8,7 +8,7 @@ from colibri.autopilot.core.autopilot import Autopilot
 from colibri.autopilot.core.track_stages import TrackStages, track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
-from colibri.autopilot.process.client import Client
+from colibri.autopilot.process.client import PlantClient
 from colibri.autopilot.process.logs import log_in
 from colibri.autopilot.process.recorded_inputs import setup_of
 from colibri.autopilot.spec import TRACK, AutopilotSpec
@@ -24,7 +24,7 @@ from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
-    from colibri.autopilot.process.ground import Ground
+    from colibri.autopilot.process.ground import GroundService
 
 
 def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, stop: Stop) -> int:
@@ -43,7 +43,7 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
         link.spin_s = 0.0
     try:
         with gc_frozen():
-            Client(link, end, status, stop, log, ground).fly(autopilot)
+            PlantClient(link, end, status, stop, log, ground).fly(autopilot)
     except Error as error:
         fail(keep_failure(error, spec.out), EXIT_FAILED)
     finally:
@@ -81,9 +81,9 @@ def _alone(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Stat
     return track_autopilot(profile, vehicle, flown, perf_counter, estimator=estimator, law=spec.law)
 
 
-def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "Ground":
+def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "GroundService":
     """Load ground services only if used: they double the start-up time."""
-    from colibri.autopilot.process.ground import Ground
+    from colibri.autopilot.process.ground import GroundService
     from colibri.autopilot.process.stepped_links import UdpConductor
 
     conductor = None
@@ -91,4 +91,4 @@ def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Sta
         link = open_link(spec.stepped)
         link.spin_s = 0.0
         conductor = UdpConductor(link, lambda: stop)
-    return Ground(spec, profile, vehicle, status, conductor)
+    return GroundService(spec, profile, vehicle, status, conductor)

@@ -19,24 +19,24 @@ KEYS = (
 """Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is their sum."""
 
 
-class Limit(NamedTuple):
+class ReportLimit(NamedTuple):
     """Largest permitted value of a number in the report."""
 
     key: str
     value: float
 
 
-def limit(text: str) -> Limit:
+def limit(text: str) -> ReportLimit:
     key, equals, value = text.rpartition("=")
     if equals and key not in KEYS:
         raise ArgumentTypeError(unknown("key", key, KEYS))
     try:
-        return Limit(key or RMSE, number(value))
+        return ReportLimit(key or RMSE, number(value))
     except ValueError:
         raise ArgumentTypeError(f"must be [KEY=]VALUE, 0.1 or qp_failures=0 say, not {text}") from None
 
 
-def exceeded(limits: Iterable[Limit], report: Mapping[str, Any]) -> list[str]:
+def exceeded(limits: Iterable[ReportLimit], report: Mapping[str, Any]) -> list[str]:
     """Describe each limit that a report exceeds, or does not contain."""
     found = []
     for key, value in limits:

@@ -17,7 +17,7 @@ from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import FAILURE, failure_text
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import PROVENANCE
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, FrameCount
 from colibri.flights.provenance import encoded_provenance
 from colibri.mavlink.ulog.log import MemoryLog, TopicReader
 from colibri.mavlink.ulog.reader import FILE, LogFormatError
@@ -77,7 +77,7 @@ def _early(plan: FlightPlan, log: TopicReader, error: InFlightError, text: str) 
 def report_of(
     plan: FlightPlan,
     log: TopicReader,
-    summary: Summary | None,
+    summary: FrameCount | None,
     failure: str | None = None,
     *others: Callable[[Samples], None],
 ) -> Report:
@@ -87,7 +87,7 @@ def report_of(
 
 
 def keep_flight(
-    plan: FlightPlan, summary: Summary | None, *others: Callable[[Samples], None], failure: str | None = None
+    plan: FlightPlan, summary: FrameCount | None, *others: Callable[[Samples], None], failure: str | None = None
 ) -> Report:
     """Write `flight.csv` and `report.json` of a flight."""
     with (plan.out / TABLE).open("wb") as file:

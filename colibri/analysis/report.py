@@ -16,7 +16,7 @@ from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fa
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.elementary import acos
 from colibri.common.types import Array
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, FrameCount
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.ulog.log import TopicReader
 
@@ -26,7 +26,7 @@ _SMALL_M = 0.01
 
 
 def report(
-    plan: FlightPlan, log: TopicReader, summary: Summary | None, flight: FlightSeries, lost: Lost | None
+    plan: FlightPlan, log: TopicReader, summary: FrameCount | None, flight: FlightSeries, lost: Lost | None
 ) -> Report:
     """Return the figures of a flight; errors are at the same instant or path time, effort is the RMS of U2..U4, N m."""
     wall_time_s, frames, resent = summary or (None, None, None)

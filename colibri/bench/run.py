@@ -20,7 +20,7 @@ from colibri.bench.commands import COMMANDS, colibri_of, command_figures
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import CHANNELS, serving_figures
 from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
-from colibri.bench.speed import CONTROL_S, LINKS, Peer, Report, rate_figures
+from colibri.bench.speed import CONTROL_S, LINKS, PeerSimulator, Report, rate_figures
 from colibri.bench.stages import BLOCKS, stage_figures
 from colibri.common.files import regular
 from colibri.common.process.lifecycle import fail
@@ -30,7 +30,7 @@ MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
 _SPREAD, _QUANTILES = ("min", "median", "max"), ("p50", "p99")
 
 
-def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
+def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
     wanted = args.only or ["stages", "flights", "sensors", "simulators", "ground", "commands"]
     if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
         fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")

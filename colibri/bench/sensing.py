@@ -17,7 +17,7 @@ from colibri.flights.fly import fly_plan
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.mavlink.ulog.inputs import InputRecord, Kind
+from colibri.mavlink.ulog.inputs import InputRecord, RecordKind
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import load_vehicle
 
@@ -56,7 +56,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 def sensor_frames(inputs: Iterable[InputRecord]) -> Iterator[SensorFrame]:
     end = AutopilotEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US, now_s=0.0, feedback=Feedback.SENSORS)
     for _, kind, datagram in inputs:
-        received = end.receive(datagram, 0.0) if kind == Kind.FRAME else None
+        received = end.receive(datagram, 0.0) if kind == RecordKind.FRAME else None
         if received is not None and isinstance(received.frame, SensorFrame):
             yield received.frame
 

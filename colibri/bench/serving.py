@@ -20,7 +20,7 @@ from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
-from colibri.flights.flight import Direct, Flight
+from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.node.hub import Outgoing
@@ -74,7 +74,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
         return outbox
 
     with gc_frozen(), patch.object(autopilot, "serve", timed):
-        for _ in Flight(plant, autopilot, Direct()).samples(plan.spec.duration):
+        for _ in SteppedFlight(plant, autopilot, Direct()).samples(plan.spec.duration):
             pass
     sent = sum(channel.sent for channel in stations.hub.channels if channel.link >= 0)
     return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.spec.duration}

@@ -26,7 +26,7 @@ _PEER_MAX_S = 2.0
 _WARM_UP_S = 0.5
 
 
-class Peer(NamedTuple):
+class PeerSimulator(NamedTuple):
     """Another simulator: from frame rate, Hz, and duration, s, to simulated over wall-clock time."""
 
     name: str
@@ -34,7 +34,7 @@ class Peer(NamedTuple):
 
 
 def rate_figures(
-    profile: Profile, folder: Path, duration_s: float, runs: int, report: Report, peer: Peer | None = None
+    profile: Profile, folder: Path, duration_s: float, runs: int, report: Report, peer: PeerSimulator | None = None
 ) -> dict[str, Any]:
     """Fly at every rate over every link, and the peer; ratios are within a run, under the same load."""
     report("warm up")
@@ -70,7 +70,7 @@ def summarised(values: Iterable[float]) -> dict[str, float]:
     return {"min": ordered[0], "median": median(ordered), "max": ordered[-1]}
 
 
-def _with_ratios(flown: Samples, peer: Peer | None) -> dict[str, dict[str, float]]:
+def _with_ratios(flown: Samples, peer: PeerSimulator | None) -> dict[str, dict[str, float]]:
     figures = {name: summarised(values) for name, values in flown.items()}
     if peer is None:
         return figures

@@ -71,7 +71,7 @@ LINK_STAGES = (FRAME_SENT, FRAME_RECEIVED, COMMAND_SENT, COMMAND_RECEIVED)
 EXCHANGE = "exchange"
 
 
-class Flight(NamedTuple):
+class StageTimes(NamedTuple):
     """Times of each stage, some QPs, and the datagrams."""
 
     times_us: dict[str, list[float]]
@@ -80,9 +80,9 @@ class Flight(NamedTuple):
     commands: list[bytes]
 
 
-def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight:
+def measured_flight(profile: Profile, folder: Path, duration_s: float) -> StageTimes:
     """Fly in memory, timing every stage once all code is loaded."""
-    flight = Flight({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
+    flight = StageTimes({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
     every = max(1, round(duration_s / float(profile.table(CONTROLLER)["control_interval_s"]) / _QPS))
     seen, flying = 0, False
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from colibri.analysis.tables import Row
 from colibri.campaigns.definition import Campaign
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.values import CampaignError, is_number, shown
-from colibri.experiments.table import Table
+from colibri.experiments.table import SampleTable
 
 _NORMAL_95 = 1.959963984540054
 _QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
@@ -20,7 +20,7 @@ _QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
 class FlightTable:
     """The results of a campaign's flights, in its order."""
 
-    def __init__(self, campaign: Campaign, flown: Mapping[int, Flown], notes: Sequence[str] = ()) -> None:
+    def __init__(self, campaign: Campaign, flown: Mapping[int, FlightResult], notes: Sequence[str] = ()) -> None:
         """`notes` are lines on options without effect."""
         self.campaign = campaign
         self.notes = [*notes]
@@ -37,7 +37,7 @@ class FlightTable:
         return [self._row(each) for each in self.flown]
 
     @cached_property
-    def flights(self) -> Table:
+    def flights(self) -> SampleTable:
         """The table as a structured array; a missing number is nan."""
         columns: dict[str, Any] = {"flight": [each.flight for each in self.flown]}
         columns |= {name: self.factor(name) for name in self.campaign.factors}
@@ -50,7 +50,7 @@ class FlightTable:
         table = np.empty(len(self.flown), dtype=[(name, array.dtype) for name, array in arrays.items()])
         for name, array in arrays.items():
             table[name] = array
-        return table.view(Table)
+        return table.view(SampleTable)
 
     def to_pandas(self) -> Any:
         """Return the table as a pandas.DataFrame; PandasError if pandas is not installed."""
@@ -138,7 +138,7 @@ class FlightTable:
         refused = verdicts.count(Verdict.REFUSED)
         return sum(verdict.is_lost for verdict in verdicts), len(verdicts) - refused, refused
 
-    def _row(self, each: Flown) -> Row:
+    def _row(self, each: FlightResult) -> Row:
         point = self._points[each.flight]
         factors = (shown(point.factors[name]) for name in self.campaign.factors)
         metrics = ("" if value is None else _cell(value) for value in each.metrics)

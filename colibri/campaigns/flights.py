@@ -62,7 +62,7 @@ class Common(NamedTuple):
     track_files: dict[str, str]
 
 
-class Flown(NamedTuple):
+class FlightResult(NamedTuple):
     """The result of one flight.
 
     Attributes:
@@ -111,20 +111,20 @@ def check(points: Iterable[Point], common: Common, *, ignored: Collection[str] =
     return [line for line in (on_all, on_some) if line]
 
 
-def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
+def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[FlightResult, None, None]:
     with closing(engine.each(fly_point, common, points)) as results:
         for point, result in results:
             yield _killed(point, common) if isinstance(result, Killed) else result
 
 
-def fly_point(common: Common, point: Point) -> Flown:
+def fly_point(common: Common, point: Point) -> FlightResult:
     nothing = (None,) * len(common.metrics)
     failure_file = f"{point.folder}/{FAILURE}"
     try:
         plan = plan_point(common, point)
         outcome = fly_to_its_end(plan, for_viewers=common.logs != "none", failure_file=failure_file)
     except Error as error:
-        return Flown(point.flight, Verdict.REFUSED, str(error), nothing, "")
+        return FlightResult(point.flight, Verdict.REFUSED, str(error), nothing, "")
     verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
     files = {failure_file: outcome.failure_text.encode()} if outcome.failure else {}
     if common.logs == "all" or (common.logs == "lost" and verdict.is_lost):
@@ -132,10 +132,10 @@ def fly_point(common: Common, point: Point) -> Flown:
         files |= {f"{point.folder}/{name}": content for name, content in kept}
     contents = provenance_of(plan).sha256["all"]
     if outcome.report is None:
-        return Flown(point.flight, verdict, outcome.lost, nothing, "", contents, files)
+        return FlightResult(point.flight, verdict, outcome.lost, nothing, "", contents, files)
     flight = Flight(plan, outcome.report, outcome.log)
     metrics = tuple(_metric(metric, flight) for metric in common.metrics)
-    return Flown(point.flight, verdict, outcome.lost, metrics, flight.sha256, contents, files)
+    return FlightResult(point.flight, verdict, outcome.lost, metrics, flight.sha256, contents, files)
 
 
 def plan_point(common: Common, point: Point) -> FlightPlan:
@@ -155,9 +155,9 @@ def plan_point(common: Common, point: Point) -> FlightPlan:
     return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track), whole))
 
 
-def _killed(point: Point, common: Common) -> Flown:
+def _killed(point: Point, common: Common) -> FlightResult:
     why = "the process that flew it was killed, and again when it flew this alone"
-    return Flown(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")
+    return FlightResult(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")
 
 
 def _object(given: Any, known: Mapping[str, Any]) -> Any:

@@ -13,7 +13,7 @@ import msgspec
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import controller_names, origin_of, origin_of_factory
 from colibri.campaigns.definition import Campaign
-from colibri.campaigns.flights import Common, Flown
+from colibri.campaigns.flights import Common, FlightResult
 from colibri.campaigns.values import CampaignError, shown
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes, regular
@@ -24,12 +24,12 @@ IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 class Journal:
     """The open journal of a campaign."""
 
-    def __init__(self, folder: Path, kept: dict[int, Flown], file: str = JOURNAL) -> None:
+    def __init__(self, folder: Path, kept: dict[int, FlightResult], file: str = JOURNAL) -> None:
         self.kept = kept
         self._folder = folder
         self._file: IO[bytes] = open(folder / file, "ab", opener=regular)  # noqa: SIM115
 
-    def add(self, flown: Flown) -> None:
+    def add(self, flown: FlightResult) -> None:
         """Write a flight's logs, then its line, and flush it to disk."""
         keep_files(self._folder, flown)
         kept = flown._replace(files={})
@@ -130,7 +130,7 @@ def _hash(content: Any) -> str:
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
 
 
-def read_journal(path: Path) -> list[Flown]:
+def read_journal(path: Path) -> list[FlightResult]:
     """Read the flights of a journal, and cut off an incomplete last line in the file."""
     if not path.exists():
         return []
@@ -141,7 +141,7 @@ def read_journal(path: Path) -> list[Flown]:
     kept = []
     for number, line in enumerate(content[:whole].splitlines(), start=1):
         try:
-            kept.append(msgspec.json.decode(line, type=Flown))
+            kept.append(msgspec.json.decode(line, type=FlightResult))
         except UNREADABLE as error:
             raise CampaignError(
                 f"{path}: line {number}: {error}: remove the line, its flight is flown again"
@@ -149,7 +149,7 @@ def read_journal(path: Path) -> list[Flown]:
     return kept
 
 
-def keep_files(folder: Path, flown: Flown) -> None:
+def keep_files(folder: Path, flown: FlightResult) -> None:
     for name, content in flown.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

@@ -9,7 +9,7 @@ from warnings import warn
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.engines.pool import Pool
-from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points
+from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
@@ -28,7 +28,7 @@ def campaign(
     resume: bool = False,
     yes: bool = False,
     parquet: bool = False,
-    progress: Callable[[Flown], object] = lambda _flown: None,
+    progress: Callable[[FlightResult], object] = lambda _flown: None,
     **tables: Any,
 ) -> CampaignResults:
     """Fly a campaign.
@@ -78,7 +78,7 @@ def fly_campaign(
     resume: bool = False,
     yes: bool = False,
     parquet: bool = False,
-    progress: Callable[[Flown], object] = lambda _flown: None,
+    progress: Callable[[FlightResult], object] = lambda _flown: None,
     begun: Callable[[int], object] = lambda _kept: None,
 ) -> CampaignResults:
     """Fly the flights missing in `out`, and write the tables, also if interrupted."""
@@ -108,10 +108,10 @@ def _fly(
     common: Common,
     engine: Engine,
     journal: Journal | None,
-    progress: Callable[[Flown], object],
+    progress: Callable[[FlightResult], object],
     notes: Sequence[str],
 ) -> CampaignResults:
-    flown: dict[int, Flown] = {} if journal is None else journal.kept
+    flown: dict[int, FlightResult] = {} if journal is None else journal.kept
     done = frozenset(flown)
     left = (point for point in planned.points() if point.flight not in done)
     with closing(fly_points(left, common, engine)) as ended:

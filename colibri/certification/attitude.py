@@ -88,7 +88,7 @@ class Kinematic(NamedTuple):
 Kinematics: TypeAlias = Callable[[AttitudeNumbers], Kinematic]
 
 
-class Box(NamedTuple):
+class VertexBox(NamedTuple):
     """Vertices and largest entries over the ranges; `beside` is the largest |T - 1|."""
 
     kinematic: AnyArray
@@ -128,11 +128,11 @@ def _made(value: Any, number: Number) -> Any:
     return np.array([_made(item, number) for item in value]) if isinstance(value, list) else number(value)
 
 
-def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> Box:
+def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> VertexBox:
     kinematic, max_change, max_angles = kinematics(n)
     p, q, r = n.rates_rad_s
     gyroscopic = np.array([_gyroscopic(n.inertia_kg_m2, a * p, b * q, c * r) for a, b, c in product(_SIGNS, repeat=3)])
-    return Box(
+    return VertexBox(
         kinematic,
         gyroscopic,
         abs(kinematic).max(0),
@@ -193,7 +193,7 @@ def _of_commands(n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
     return B
 
 
-def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
+def _remainders(n: AttitudeNumbers, box: VertexBox) -> tuple[AnyArray, AnyArray]:
     """Return the bounds of ξ for each channel, (12, 18), and by the disturbance without its mean, (12,).
 
     Rates within the interval are at most W (|ω| + I⁻¹ (b1 |M| + b2 |u| + h d) + S |u - M|), W = (1 - h |G|)⁻¹
@@ -249,7 +249,7 @@ def _cross(a: AnyArray, b: AnyArray) -> AnyArray:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _limits(n: AttitudeNumbers, box: Box, eye: AnyArray) -> AnyArray:
+def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
     """Return the rows of limits; angles and rates stay away from their ends by their motion within an interval."""
     if n.headroom <= 0:
         raise RangeError("the thrust leaves the rotors nothing for moments")
@@ -278,7 +278,7 @@ def _moments(n: AttitudeNumbers) -> AnyArray:
     return largest
 
 
-def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
+def _turns(n: AttitudeNumbers, box: VertexBox) -> AnyArray:
     moments = _moments(n)
     turns: AnyArray = (moments + n.disturbance_n_m) * n.interval_s
     turns[2] += (abs(n.spin_s) * moments[2] + n.spin_spread_s @ moments) * 2
@@ -286,7 +286,7 @@ def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
     return turns
 
 
-def _unsure_speeds(n: AttitudeNumbers, box: Box) -> AnyArray:
+def _unsure_speeds(n: AttitudeNumbers, box: VertexBox) -> AnyArray:
     largest = np.concatenate([n.rates_rad_s, _moments(n), _moments(n)])
     angles = np.concatenate([box.max_angles, [_HALF_A_TURN] * (INPUTS - len(box.max_angles))])
     beyond = n.unsure[:, :, _RATES + _MOMENTS + _COMMANDS] @ largest + n.unsure[:, :, _ANGLES] @ angles

@@ -17,7 +17,7 @@ _WORKING_PART = 0.5
 _DIGITS = 4
 
 
-class RefusedError(Error):
+class NotCertifiedError(Error):
     """A law without proof."""
 
 
@@ -29,7 +29,7 @@ class CertifiedLaw(Protocol):
     def loop(self, numbers: Any, number: Number) -> UncertainLoop: ...
 
 
-class Entry(NamedTuple):
+class ProofEntry(NamedTuple):
     """A proof at a scale of the ranges, with the loop's numbers and the exact check's margins."""
 
     scale: float
@@ -47,11 +47,11 @@ class Certificate(NamedTuple):
         terminal: A terminal weight that keeps plans feasible and decreases their cost.
     """
 
-    largest: Entry
-    decay: Entry
-    invariant: Entry
-    attractor: Entry
-    terminal: Entry
+    largest: ProofEntry
+    decay: ProofEntry
+    invariant: ProofEntry
+    attractor: ProofEntry
+    terminal: ProofEntry
 
 
 def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Certificate:
@@ -63,12 +63,12 @@ def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Cert
     say("the largest ranges")
     found = lyapunov.largest_scale(lambda scale: _loop_at(law, scale), least)
     if found is None:
-        raise RefusedError(f"no Lyapunov function for {least:g} of the ranges: {_why(law, least)}")
+        raise NotCertifiedError(f"no Lyapunov function for {least:g} of the ranges: {_why(law, least)}")
     scale = round(_WORKING_PART * found[0], _DIGITS)
     try:
         loop = law.loop(law.numbers_at(scale), float)
     except RangeError as error:
-        raise RefusedError(f"no set within {scale:g} of the ranges: {error}") from None
+        raise NotCertifiedError(f"no set within {scale:g} of the ranges: {error}") from None
     proofs = {"largest": found}
     for name, what, finder in (
         ("decay", "the fastest decay", lyapunov.fastest),
@@ -79,7 +79,7 @@ def certify(law: CertifiedLaw, least: float, say: Callable[[str], None]) -> Cert
         say(what)
         proof = finder(loop)
         if proof is None:
-            raise RefusedError(f"{what}: there is none within {scale:g} of the ranges, against this disturbance")
+            raise NotCertifiedError(f"{what}: there is none within {scale:g} of the ranges, against this disturbance")
         proofs[name] = (scale, proof)
     say("exact arithmetic")
     return Certificate(**{name: _checked(law, name, *each) for name, each in proofs.items()})
@@ -109,18 +109,18 @@ def read(path: Path, numbers: Callable[..., Any]) -> Certificate:
 
 def _entry(
     kind: Callable[..., Any], scale: float, numbers: dict[str, Any], proof: dict[str, Any], margins: dict[str, float]
-) -> Entry:
+) -> ProofEntry:
     P, multipliers, sizes = (np.array(proof[name]) for name in ("P", "multipliers", "sizes"))
-    return Entry(scale, kind(**numbers), Proof(P, multipliers, sizes, proof["ratio"]), margins)
+    return ProofEntry(scale, kind(**numbers), Proof(P, multipliers, sizes, proof["ratio"]), margins)
 
 
-def _checked(law: CertifiedLaw, name: str, scale: float, proof: Proof) -> Entry:
+def _checked(law: CertifiedLaw, name: str, scale: float, proof: Proof) -> ProofEntry:
     numbers = law.numbers_at(scale)
     margins = margins_of(law, name, numbers, proof)
     failed = [what for what, margin in margins.items() if not margin > 0.0]
     if failed:
-        raise RefusedError(f"{name}: found, but exact arithmetic does not confirm {' and '.join(failed)}")
-    return Entry(scale, numbers, proof, margins)
+        raise NotCertifiedError(f"{name}: found, but exact arithmetic does not confirm {' and '.join(failed)}")
+    return ProofEntry(scale, numbers, proof, margins)
 
 
 def _loop_at(law: CertifiedLaw, scale: float) -> UncertainLoop | None:

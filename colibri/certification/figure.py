@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from colibri.certification.attitude import PHI, PSI, THETA, P, R
 from colibri.certification.certificate import Certificate
-from colibri.certification.flights import Flown
+from colibri.certification.flights import FlownErrors
 from colibri.certification.loop import AnyArray
 from colibri.common.types import Array
 
@@ -17,7 +17,7 @@ _POINTS = 181
 _RATE_NAMES = {P: "p (rad/s)", R: "r (rad/s)"}
 
 
-def draw(certificate: Certificate, flown: Flown, axes_names: tuple[str, ...], path: Path) -> None:
+def draw(certificate: Certificate, flown: FlownErrors, axes_names: tuple[str, ...], path: Path) -> None:
     errors = zip((PHI, THETA, PSI), axes_names, strict=True)
     names = _RATE_NAMES | {state: f"error {name} (deg)" for state, name in errors}
     figure = Figure(figsize=(8.6, 6.9), layout="constrained")
@@ -31,7 +31,7 @@ def draw(certificate: Certificate, flown: Flown, axes_names: tuple[str, ...], pa
     figure.savefig(path, dpi=150)
 
 
-def _draw_sets(ax: Axes, certificate: Certificate, flown: Flown, across: int, up: int) -> None:
+def _draw_sets(ax: Axes, certificate: Certificate, flown: FlownErrors, across: int, up: int) -> None:
     units = np.array([_unit(across), _unit(up)])
     shown = flown.states[:, :_SHOWN][:, :, [across, up]] * units
     never_left, tended_to = (np.linalg.inv(each.proof.P) for each in (certificate.invariant, certificate.attractor))
@@ -50,7 +50,7 @@ def _draw_sets(ax: Axes, certificate: Certificate, flown: Flown, across: int, up
     ax.grid(color="#DDDDDD", linewidth=0.6)
 
 
-def _draw_values(ax: Axes, certificate: Certificate, flown: Flown) -> None:
+def _draw_values(ax: Axes, certificate: Certificate, flown: FlownErrors) -> None:
     times = np.arange(len(flown.values)) * certificate.invariant.numbers.interval_s
     ax.semilogy(times, flown.values.max(axis=1), color="black", label=f"largest of {flown.values.shape[1]} flights")
     ax.semilogy(times, np.median(flown.values, axis=1), color="#999999", label="median")

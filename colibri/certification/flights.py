@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from colibri.certification.attitude import ANGLES, INPUTS, M1, RATES, STATES, AttitudeNumbers
-from colibri.certification.certificate import CertifiedLaw, Entry
+from colibri.certification.certificate import CertifiedLaw, ProofEntry
 from colibri.common.types import Array
 
 _SUBSTEPS = 4
@@ -24,7 +24,7 @@ Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""
 
 
-class Conditions(NamedTuple):
+class CertifiedConditions(NamedTuple):
     """Conditions of a certificate: disturbing moment, and used part of the battery's charge."""
 
     disturbance_n_m: float
@@ -49,7 +49,7 @@ class AttitudeLaw(CertifiedLaw, Protocol):
     what: str
     axes: tuple[str, str, str]
     not_proven: tuple[str, ...]
-    conditions: Conditions
+    conditions: CertifiedConditions
     terminal_weight: Array
     """Of the law's plans, (12, 12)."""
     thrust_n: tuple[float, float, float]
@@ -64,13 +64,13 @@ class AttitudeLaw(CertifiedLaw, Protocol):
 
     def ranges(self, numbers: AttitudeNumbers) -> str: ...
 
-    def held(self, entry: Entry) -> Array:
+    def held(self, entry: ProofEntry) -> Array:
         """Return the largest |phi| and |theta|, rad, around which an entry's set may lie."""
 
-    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer: ...
+    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> Flyer: ...
 
 
-class Flown(NamedTuple):
+class FlownErrors(NamedTuple):
     """Errors, (steps + 1, flights, 12), their V, and the largest commands beyond the gain, (3,)."""
 
     states: Array
@@ -89,7 +89,7 @@ class Interval(NamedTuple):
     momentum: Momentum
 
 
-class Plan(NamedTuple):
+class BorderFlights(NamedTuple):
     """Number and duration of flights."""
 
     flights: int
@@ -97,7 +97,7 @@ class Plan(NamedTuple):
     seed: int
 
 
-def fly(law: AttitudeLaw, entry: Entry, plan: Plan) -> Flown:
+def fly(law: AttitudeLaw, entry: ProofEntry, plan: BorderFlights) -> FlownErrors:
     """Fly from points all over the border V = 1 to attitudes that may be held, under the largest disturbance.
 
     The moment is constant, random at every sample, at the resonance, or always the worst for V.
@@ -122,7 +122,7 @@ def fly(law: AttitudeLaw, entry: Entry, plan: Plan) -> Flown:
         z = np.hstack([integrate(z[:, :STATES], interval, numbers.interval_s), remembered])
         states.append(z)
     flown = np.array(states)
-    return Flown(flown, np.einsum("tfi,ij,tfj->tf", flown, proof.P, flown), beyond_n_m)
+    return FlownErrors(flown, np.einsum("tfi,ij,tfj->tf", flown, proof.P, flown), beyond_n_m)
 
 
 def integrate(x: Array, interval: Interval, duration_s: float) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
-from colibri.autopilot.control.lpv_mpc.law import LpvMpc, LpvMpcSettings, Memory
+from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc, LpvMpcSettings
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan
 from colibri.autopilot.control.qp import QpSolver
 from colibri.certification.attitude import (
@@ -28,8 +28,8 @@ from colibri.certification.attitude import (
     Kinematic,
     attitude_loop,
 )
-from colibri.certification.certificate import Entry
-from colibri.certification.flights import AttitudeLaw, Conditions, Flyer, Momentum
+from colibri.certification.certificate import ProofEntry
+from colibri.certification.flights import AttitudeLaw, CertifiedConditions, Flyer, Momentum
 from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
@@ -67,7 +67,7 @@ class PlannedAttitude(AttitudeLaw):
     )
     thrust_part = 0.5  # the rest is the rotors' for moments
 
-    def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
+    def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: CertifiedConditions) -> None:
         self._settings, self._vehicle, self.conditions = read_settings(table, LpvMpcSettings), vehicle, conditions
         self._law = LpvMpc(table, vehicle, lambda: 0.0)
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
@@ -93,11 +93,11 @@ class PlannedAttitude(AttitudeLaw):
     def ranges(self, numbers: AttitudeNumbers) -> str:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
 
-    def held(self, entry: Entry) -> Array:
+    def held(self, entry: ProofEntry) -> Array:
         del entry
         return np.full(2, _HELD_RAD)
 
-    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
+    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> Flyer:
         flights = len(held)
         thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
         headings = rng.uniform(-pi, pi, flights)
@@ -168,7 +168,7 @@ class PlannedAttitude(AttitudeLaw):
         nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[_RATES].tolist()
         state = VehicleState(nowhere, nowhere, attitude, euler_from_quaternion(attitude), (p, q, r))
         demand = AttitudeDemand(np.tile(held, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
-        after, _ = law.step_attitude(Memory(tracked, plan, 1, 0), 0, state, demand)
+        after, _ = law.step_attitude(LawMemory(tracked, plan, 1, 0), 0, state, demand)
         made = after.plan
         if made is None:
             raise RangeError("the law makes no plan there")

@@ -10,9 +10,9 @@ from colibri.analysis.tables import print_table, write_table
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import ANGLES, RATES
-from colibri.certification.certificate import Certificate, Entry, RefusedError
+from colibri.certification.certificate import Certificate, NotCertifiedError, ProofEntry
 from colibri.certification.figure import draw
-from colibri.certification.flights import AttitudeLaw, Conditions, Flown, Plan, fly
+from colibri.certification.flights import AttitudeLaw, BorderFlights, CertifiedConditions, FlownErrors, fly
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
@@ -44,16 +44,16 @@ def certify_profile(args: Namespace) -> int:
     try:
         profile = load_profile(args.profile).with_choices(args.controller, None)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        law = law_of(profile, vehicle, Conditions(args.moment, args.charge))
+        law = law_of(profile, vehicle, CertifiedConditions(args.moment, args.charge))
     except Error as error:
         fail(str(error))
     for stale in (CERTIFICATE, FIGURE):
         (args.out / stale).unlink(missing_ok=True)
     try:
         found = certificates.certify(law, args.least, lambda what: None if args.quiet else _say(what))
-    except RefusedError as error:
+    except NotCertifiedError as error:
         fail(f"{profile.where} on {vehicle.name}: refused: {error}", EXIT_FAILED)
-    flown = fly(law, found.invariant, Plan(args.flights, _DURATION_S, args.seed))
+    flown = fly(law, found.invariant, BorderFlights(args.flights, _DURATION_S, args.seed))
     not_proven = (*law.not_proven, *_NOT_PROVEN)
     about = {
         "law": f"{law.what}, {profile.where}",
@@ -76,7 +76,7 @@ def certify_profile(args: Namespace) -> int:
     return 0
 
 
-def law_of(profile: Profile, vehicle: Vehicle, conditions: Conditions) -> AttitudeLaw:
+def law_of(profile: Profile, vehicle: Vehicle, conditions: CertifiedConditions) -> AttitudeLaw:
     name = profile.controller
     if name != LAW:
         raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {LAW} can")
@@ -85,7 +85,7 @@ def law_of(profile: Profile, vehicle: Vehicle, conditions: Conditions) -> Attitu
     return PlannedAttitude(profile.table(name), vehicle, conditions)
 
 
-def table(found: Certificate, law: AttitudeLaw, flown: Flown) -> list[tuple[str, ...]]:
+def table(found: Certificate, law: AttitudeLaw, flown: FlownErrors) -> list[tuple[str, ...]]:
     _, decay, invariant, attractor, terminal = found
     held = np.degrees(law.held(invariant))
     rate = -log(decay.proof.ratio) / (2.0 * decay.numbers.interval_s)
@@ -117,12 +117,12 @@ def _relative(weight: Array, other: Array) -> Array:
     return found
 
 
-def _ranges(what: str, entry: Entry, law: AttitudeLaw) -> tuple[str, ...]:
+def _ranges(what: str, entry: ProofEntry, law: AttitudeLaw) -> tuple[str, ...]:
     rates = ", ".join(f"{rate:.2f}" for rate in entry.numbers.rates_rad_s)
     return what, law.ranges(entry.numbers), rates, f"{entry.scale:.3f} of the profile's"
 
 
-def _reach(what: str, entry: Entry, how: str = "") -> tuple[str, ...]:
+def _reach(what: str, entry: ProofEntry, how: str = "") -> tuple[str, ...]:
     return what, *_triples(entry.proof.reach(np.eye(_STATES))), how
 
 

@@ -14,16 +14,16 @@ from colibri.companion.setpoint_forms import message_of, row_of
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.stack import Response
 from colibri.companion.stacks.thrust_curve import Thrust
-from colibri.companion.steering.law_pilot import Asked, LawPilot, first
+from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
 from colibri.companion.steering.smooth_start import smoothly_started
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
-from colibri.companion.supervision.ending import Ended, how_it_ended
+from colibri.companion.supervision.ending import CompanionEnd, how_it_ended
 from colibri.companion.supervision.limits import FlightFacts, Limit, box_of, exceeded
-from colibri.companion.supervision.pace import Pace
-from colibri.companion.supervision.phases import Condition, Phase, next_phase
+from colibri.companion.supervision.pace import SetpointRate
+from colibri.companion.supervision.phases import CompanionPhase, PhaseCondition, next_phase
 from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
 from colibri.plant.vehicle.description import Vehicle
 
@@ -63,17 +63,17 @@ class Companion:
         self._box = box_of(track, settings.duration_s, settings.limits.margin_m)
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._thrust: Thrust | None = None
-        self.phase, self._since_us = Phase.CONNECTING, 0
+        self.phase, self._since_us = CompanionPhase.CONNECTING, 0
         self._begun = False
         self._next_us = 0
         self._newest: ReceivedState | None = None
-        self._asked: Asked | None = None
+        self._asked: LawDemand | None = None
         self._jumped_m = 0.0
         self._law_error = ""
-        self._pace = Pace()
+        self._pace = SetpointRate()
         self._stopped = self._brakes = self._on_way = self._has_flown = False
         self.failing: list[str] = ["clock"]
-        self.ended: Ended | None = None
+        self.ended: CompanionEnd | None = None
         self.limit: Limit | None = None
         self.errors = TrackErrors()
         self.said: list[str] = []
@@ -92,9 +92,9 @@ class Companion:
 
     @property
     def waits_for(self) -> list[str]:
-        if self.phase is Phase.CONNECTING:
+        if self.phase is CompanionPhase.CONNECTING:
             return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
-        if self.phase is not Phase.CHECKING:
+        if self.phase is not CompanionPhase.CHECKING:
             return []
         if self.failing or self._settings.dry_run or self._settings.may_arm:
             return self.failing
@@ -138,7 +138,7 @@ class Companion:
         if self._settings.identifies and self._on_way:
             self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))
         past = self._history.at(at_us)
-        if self.phase is Phase.FLYING and past is not None and past.track_enu_m is not None:
+        if self.phase is CompanionPhase.FLYING and past is not None and past.track_enu_m is not None:
             self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
 
     def _adopt_stack(self) -> None:
@@ -166,9 +166,12 @@ class Companion:
             self._enter(after, why, now_us)
 
     def _look(self, now_us: int) -> None:
-        if self.phase is Phase.CHECKING:
+        if self.phase is CompanionPhase.CHECKING:
             self.failing = failing(self._check_facts(now_us))
-        elif self.phase in (Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING) and self.limit is None:
+        elif (
+            self.phase in (CompanionPhase.TAKING_OFF, CompanionPhase.TAKING_OVER, CompanionPhase.FLYING)
+            and self.limit is None
+        ):
             facts = self._flight_facts(now_us)
             self.limit = exceeded(facts, self._settings.limits, self._box)
             if self.limit is not None:
@@ -214,27 +217,27 @@ class Companion:
     def _identified_s(self, now_us: int) -> float:
         return (now_us - self._since_us - _STEADY_US) * 1e-6
 
-    def _enter(self, phase: Phase, why: Condition, now_us: int) -> None:
+    def _enter(self, phase: CompanionPhase, why: PhaseCondition, now_us: int) -> None:
         before, self.phase, self._since_us = self.phase, phase, now_us
         self.said.append(f"{phase}: {self._orders.refused or why.value}")
-        if self._newest is not None and before is Phase.CHECKING:
+        if self._newest is not None and before is CompanionPhase.CHECKING:
             x, y, z = self._newest.state.position_enu_m
             self._orders.set_ground(z)
-            here = (x, y, z) if phase is Phase.TAKING_OVER else (x, y, self._orders.height_enu_m)
+            here = (x, y, z) if phase is CompanionPhase.TAKING_OVER else (x, y, self._orders.height_enu_m)
             margin_m = self._settings.limits.margin_m
             for place in ((x, y, z), here):
                 self._box = self._box.around(place, margin_m)
         self._orders.enter(phase, before)
-        if phase is Phase.FLYING:
+        if phase is CompanionPhase.FLYING:
             self._pace.begin(now_us)
             self._predictor.begin()
             self._predictor.observe(self._newest.at_us, self._newest.state) if self._newest else None
             self._pilot.begin(self._predictor.at(self._acts_us(now_us)))
             self._on_way, self._has_flown, self._predictor.learns = False, True, True
-        elif phase is Phase.HANDING_OVER:
+        elif phase is CompanionPhase.HANDING_OVER:
             self._pilot.hold()
-            self._brakes = why is Condition.FINISHED
-        elif phase is Phase.ENDED:
+            self._brakes = why is PhaseCondition.FINISHED
+        elif phase is CompanionPhase.ENDED:
             self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self.failing)
 
     def _may_hand_over(self, now_us: int) -> bool:
@@ -245,17 +248,21 @@ class Companion:
         return slow or now_us - self._since_us > _BRAKES_US
 
     def _setpoint(self, now_us: int) -> list[bytes]:
-        rehearses = self._settings.dry_run and self.phase is Phase.CHECKING
+        rehearses = self._settings.dry_run and self.phase is CompanionPhase.CHECKING
         blind = self.limit is not None and self.limit.blind
-        flies = self._has_flown and self.phase in (Phase.FLYING, Phase.HANDING_OVER) and not blind
-        if self._thrust is None or self._newest is None or not (flies or rehearses or self.phase is Phase.TAKING_OVER):
+        flies = self._has_flown and self.phase in (CompanionPhase.FLYING, CompanionPhase.HANDING_OVER) and not blind
+        if (
+            self._thrust is None
+            or self._newest is None
+            or not (flies or rehearses or self.phase is CompanionPhase.TAKING_OVER)
+        ):
             return []
-        if self.phase is Phase.HANDING_OVER and self._age_s(now_us) > self._settings.limits.max_state_age_s:
+        if self.phase is CompanionPhase.HANDING_OVER and self._age_s(now_us) > self._settings.limits.max_state_age_s:
             return []
         acts_us = self._acts_us(now_us)
-        if rehearses or self.phase is Phase.TAKING_OVER:
+        if rehearses or self.phase is CompanionPhase.TAKING_OVER:
             self._pilot.begin(self._predictor.at(acts_us))
-        if self.phase is Phase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
+        if self.phase is CompanionPhase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
             self._on_way = True
             if not self._settings.identifies:
                 self._pilot.fly_track()
@@ -270,9 +277,9 @@ class Companion:
             self._asked = asked
             place = first(asked.reference.position_enu_m)
             self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
-        if self.phase is Phase.TAKING_OVER and not rehearses:
+        if self.phase is CompanionPhase.TAKING_OVER and not rehearses:
             asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
-        if self.phase is Phase.FLYING and self._on_way and self._settings.identifies:
+        if self.phase is CompanionPhase.FLYING and self._on_way and self._settings.identifies:
             asked = self._with_step(asked, now_us)
         thrust = self._thrust.command(asked.thrust_n / (self._weight_n * self._predictor.thrust_scale))
         if flies:
@@ -289,7 +296,7 @@ class Companion:
         name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
         return [self.peer.client.encode(name, *fields)]
 
-    def _with_step(self, asked: Asked, now_us: int) -> Asked:
+    def _with_step(self, asked: LawDemand, now_us: int) -> LawDemand:
         p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
         self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
         return asked._replace(rate_flu_rad_s=(p, q, r))
@@ -314,7 +321,7 @@ class Companion:
         )
 
     def _flight_facts(self, now_us: int) -> FlightFacts:
-        newest, flies = self._newest, self.phase is Phase.FLYING
+        newest, flies = self._newest, self.phase is CompanionPhase.FLYING
         reference = None
         if newest is not None and flies:
             past = self._history.at(newest.at_us)

@@ -9,7 +9,7 @@ from colibri.mavlink.wire.dialect import mav
 _AGAIN_US = 500_000
 
 
-class Home(NamedTuple):
+class LocalOrigin(NamedTuple):
     """Origin of the vehicle's local frame, and height of home in it."""
 
     origin: Geodetic
@@ -24,11 +24,11 @@ class HomeSeeker:
         self._again_us = 0
 
     @property
-    def home(self) -> Home | None:
+    def home(self) -> LocalOrigin | None:
         home, origin = self._peer.report.home, self._peer.report.origin
         if home is None or origin is None:
             return None
-        return Home(origin, home.altitude_m - origin.altitude_m)
+        return LocalOrigin(origin, home.altitude_m - origin.altitude_m)
 
     def poll(self, now_us: int) -> list[bytes]:
         if self._peer.system and now_us >= self._again_us:

@@ -3,8 +3,8 @@
 from math import isfinite, nan
 
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.stack import Stack, TakeOff
-from colibri.companion.supervision.phases import Phase
+from colibri.companion.stacks.stack import Stack, TakeOffOrder
+from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.client.conversation import UNANSWERED
 from colibri.mavlink.client.modes import FlightMode
@@ -43,7 +43,7 @@ class Orders:
         """Whether a stack with a take-off mode has left it for hold."""
         stack = self._peer.stack
         return stack is not None and (
-            stack.take_off is TakeOff.ARM_THEN_COMMAND or self._peer.report.mode == stack.hold.custom
+            stack.take_off is TakeOffOrder.ARM_THEN_COMMAND or self._peer.report.mode == stack.hold.custom
         )
 
     @property
@@ -56,45 +56,45 @@ class Orders:
             for mode in (stack.hold, stack.last_resort)
         )
 
-    def enter(self, phase: Phase, before: Phase) -> None:
+    def enter(self, phase: CompanionPhase, before: CompanionPhase) -> None:
         stack = self._peer.stack
         if stack is None:
             return
         self._again_us = 0
         self._before, self._reached = self._peer.report.mode, False
-        if phase in (Phase.ARMING, Phase.TAKING_OFF):
+        if phase in (CompanionPhase.ARMING, CompanionPhase.TAKING_OFF):
             self._own = stack.steady | {stack.offboard.custom}
-        elif phase in (Phase.TAKING_OVER, Phase.FLYING):
+        elif phase in (CompanionPhase.TAKING_OVER, CompanionPhase.FLYING):
             self._own = frozenset({stack.offboard.custom})
-        elif phase is Phase.HANDING_OVER:
+        elif phase is CompanionPhase.HANDING_OVER:
             self._peer.clear()
             self._own = frozenset({stack.hold.custom, stack.last_resort.custom})
-            if before is Phase.ARMING:
+            if before is CompanionPhase.ARMING:
                 self._disarming = True
                 self._peer.ask("disarm", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
-    def own_modes(self, phase: Phase) -> frozenset[int]:
+    def own_modes(self, phase: CompanionPhase) -> frozenset[int]:
         """Return the modes that the companion caused; until one is reported, with the previous mode."""
         mode = self._peer.report.mode
         if mode in self._own:
             self._reached = True
-        if phase is Phase.FLYING or self._reached:
+        if phase is CompanionPhase.FLYING or self._reached:
             return self._own
         return self._own | {self._before}
 
-    def poll(self, phase: Phase, in_phase_us: int, *, ready: bool) -> None:
+    def poll(self, phase: CompanionPhase, in_phase_us: int, *, ready: bool) -> None:
         """Send the commands of a phase; `ready` permits the order to hold."""
         stack, results = self._peer.stack, self._peer.results
         self._in_phase_us = in_phase_us
         if stack is None or self._settings.dry_run:
             return
-        if phase is Phase.ARMING:
+        if phase is CompanionPhase.ARMING:
             self._arm(stack)
-        elif phase is Phase.TAKING_OFF and stack.take_off is TakeOff.ARM_THEN_COMMAND:
+        elif phase is CompanionPhase.TAKING_OFF and stack.take_off is TakeOffOrder.ARM_THEN_COMMAND:
             self._once("take-off", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, 0.0, 0.0, self._climb_m)
-        elif phase is Phase.TAKING_OVER and in_phase_us >= _STREAMS_FIRST_US:
+        elif phase is CompanionPhase.TAKING_OVER and in_phase_us >= _STREAMS_FIRST_US:
             self._mode(stack.offboard)
-        elif phase is Phase.HANDING_OVER and ready and self._peer.report.armed:
+        elif phase is CompanionPhase.HANDING_OVER and ready and self._peer.report.armed:
             last_try = self._asked_hold >= _HOLD_TRIES
             wanted = stack.last_resort if last_try else stack.hold
             name = f"mode {wanted.name}"
@@ -103,7 +103,7 @@ class Orders:
             self._mode(wanted)
 
     def _arm(self, stack: Stack) -> None:
-        if stack.take_off is TakeOff.COMMAND_THEN_ARM:
+        if stack.take_off is TakeOffOrder.COMMAND_THEN_ARM:
             above_sea_m = self._peer.report.altitude_amsl_m + self._climb_m
             if not isfinite(above_sea_m):
                 return

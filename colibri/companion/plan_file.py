@@ -17,7 +17,7 @@ from colibri.common.errors import shown
 from colibri.common.files import read_text
 from colibri.common.types import Vector
 from colibri.companion.errors import CompanionError
-from colibri.companion.home import Home
+from colibri.companion.home import LocalOrigin
 from colibri.mavlink.wire.dialect import mav
 
 SUFFIX = ".plan"
@@ -37,7 +37,7 @@ class PlannedPoint(NamedTuple):
     above_home_m: float
     heading_deg: float | None
 
-    def enu_m(self, home: Home) -> Vector:
+    def enu_m(self, home: LocalOrigin) -> Vector:
         level = home.origin.altitude_m
         east, north, _ = enu_of(Geodetic(self.latitude_deg, self.longitude_deg, level), home.origin)
         return (east, north, home.up_m + self.above_home_m)
@@ -50,10 +50,10 @@ class MissionPlan(NamedTuple):
     points: tuple[PlannedPoint, ...]
     speed_m_s: float
     takeoff_m: float | None
-    planned_home: Home
+    planned_home: LocalOrigin
     note: str
 
-    def waypoints(self, home: Home) -> Waypoints:
+    def waypoints(self, home: LocalOrigin) -> Waypoints:
         """Convert the points to the vehicle's local frame."""
         places = [point.enu_m(home) for point in self.points]
         for point, before, place in zip(self.points[1:], places, places[1:], strict=False):
@@ -96,7 +96,7 @@ def read_plan(path: Path) -> MissionPlan:
         raise CompanionError(f"{path}: a track needs two waypoints, and it has {len(points)}")
     if len({point.heading_deg is None for point in points}) > 1:
         raise CompanionError(f"{path}: some waypoints have a heading and some have none: give it to all, or to none")
-    return MissionPlan(path, tuple(points), speed_m_s, takeoff_m, Home(planned, 0.0), note)
+    return MissionPlan(path, tuple(points), speed_m_s, takeoff_m, LocalOrigin(planned, 0.0), note)
 
 
 def _items(path: Path, items: list[Any]) -> Iterator[tuple[int, dict[str, Any], int, list[Any]]]:

@@ -18,7 +18,7 @@ from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
-from colibri.companion.home import Home, HomeSeeker
+from colibri.companion.home import HomeSeeker, LocalOrigin
 from colibri.companion.log import FlightSummary, LogRow
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
 from colibri.companion.report import report
@@ -39,7 +39,7 @@ _IDENTIFIES_AT_M = 3.0
 _SAY_FAILING_EVERY_S = 5.0
 
 
-class Plan(NamedTuple):
+class CompanionFlight(NamedTuple):
     """Inputs of a flight."""
 
     settings: CompanionSettings
@@ -49,14 +49,14 @@ class Plan(NamedTuple):
     note: str
     mission: MissionPlan | None = None
 
-    def from_home(self, home: Home) -> "Plan":
+    def from_home(self, home: LocalOrigin) -> "CompanionFlight":
         if self.mission is None:
             return self
         loaded = track_through(self.mission.waypoints(home), self.vehicle, self.profile, home.up_m)
         return self._replace(track=loaded.track, note=loaded.note or self.mission.note)
 
 
-def plan_of(args: Namespace) -> Plan:
+def plan_of(args: Namespace) -> CompanionFlight:
     profile = load_profile(args.profile).with_choices(args.controller, None)
     vehicle = load_vehicle(args.model or profile.simulation.vehicle)
     name = _track_name(args)
@@ -88,7 +88,7 @@ def plan_of(args: Namespace) -> Plan:
         identifies=args.identify,
         thrust_scale=thrust_scale,
     )
-    return Plan(settings, profile, vehicle, track, note, mission)
+    return CompanionFlight(settings, profile, vehicle, track, note, mission)
 
 
 def _track_name(args: Namespace) -> str:
@@ -162,7 +162,7 @@ class _Wire:
                 self.link.send(frame, None if self.link.target == self._address else self._address)
 
 
-def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> Home:
+def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> LocalOrigin:
     peer = VehiclePeer()
     peer.client.sign_with(signing)
     seeker, began_s = HomeSeeker(peer), perf_counter()
@@ -238,7 +238,7 @@ def _identify(companion: Companion, status: Status, out: Path) -> None:
     status.say("identified", f"time constants {lags} ms after {1e3 * found.latency_s:.0f} ms: {out / RESPONSE}")
 
 
-def _given(args: Namespace, plan: Plan) -> dict[str, Any]:
+def _given(args: Namespace, plan: CompanionFlight) -> dict[str, Any]:
     return {
         "track": args.track or "identification",
         "track_note": plan.note,

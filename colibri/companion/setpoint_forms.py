@@ -9,7 +9,7 @@ from colibri.common.types import Array
 from colibri.companion.log import LogRow
 from colibri.companion.settings import SetpointKind
 from colibri.companion.steering import response as model
-from colibri.companion.steering.law_pilot import Asked, first
+from colibri.companion.steering.law_pilot import LawDemand, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.conversation import Encoded
 from colibri.mavlink.client.setpoints import attitude_target, position_target
@@ -22,8 +22,8 @@ def message_of(
     kind: SetpointKind,
     now_us: int,
     target: tuple[int, int],
-    asked: Asked,
-    decided: Asked | None,
+    asked: LawDemand,
+    decided: LawDemand | None,
     thrust: float,
     y: Array,
 ) -> Encoded:
@@ -45,8 +45,8 @@ def message_of(
 
 def row_of(
     head: tuple[float, str, float, float],
-    asked: Asked,
-    decided: Asked,
+    asked: LawDemand,
+    decided: LawDemand,
     thrust: float,
     y: Array,
     predictor: Predictor,

@@ -21,7 +21,7 @@ _TIMED_S, _TIMED, _UNTIMED = 4.0, 200, 5
 """Duration and least number of timed steps; the first few are left out."""
 
 
-class Flown(NamedTuple):
+class FlownDistance(NamedTuple):
     """Distance to the reference at each control sample, m, and reason of a loss."""
 
     lost: str
@@ -82,15 +82,15 @@ def _flown(subject: Subject, track: str, tried: str, **options: Any) -> Row:
     return judged(AREA, tried, flown.lost, found, subject.command(track, **options))
 
 
-def fly(subject: Subject, track: str, **options: Any) -> Flown:
+def fly(subject: Subject, track: str, **options: Any) -> FlownDistance:
     try:
         plan = subject.plan(track, **options)
         outcome = fly_to_its_end(plan)
     except Exception as error:
-        return Flown(in_words(error), np.empty(0))
+        return FlownDistance(in_words(error), np.empty(0))
     if outcome.report is None:
-        return Flown(outcome.lost, np.empty(0))
-    return Flown(outcome.lost, read_recording(plan, outcome.log).position_error_m)
+        return FlownDistance(outcome.lost, np.empty(0))
+    return FlownDistance(outcome.lost, read_recording(plan, outcome.log).position_error_m)
 
 
 def _length(metres: float) -> str:

@@ -20,7 +20,7 @@ _STARTS = 5
 Draw: TypeAlias = Callable[[np.random.Generator], dict[str, float]]
 
 
-class Kind(NamedTuple):
+class FlightKind(NamedTuple):
     """Flights of one kind."""
 
     tried: str
@@ -68,13 +68,13 @@ def _gentle(rng: np.random.Generator) -> dict[str, float]:
 
 
 KINDS = (
-    Kind("from about hover", "hover:height=3", _gentle),
-    Kind("fast, in any direction", "lemniscate:height=40", _fast),
-    Kind("upside down", "hover:height=40", _upside_down),
-    Kind("tumbling", "hover:height=60", _tumbling),
-    Kind("far from the reference", "circle:height=30,speed=4", _far_away),
-    Kind("near the ground, sinking", "hover:height=0.2", _near_the_ground, needs_ground=True),
-    Kind("standing on the ground", "hover:height=2", _on_the_ground, needs_ground=True),
+    FlightKind("from about hover", "hover:height=3", _gentle),
+    FlightKind("fast, in any direction", "lemniscate:height=40", _fast),
+    FlightKind("upside down", "hover:height=40", _upside_down),
+    FlightKind("tumbling", "hover:height=60", _tumbling),
+    FlightKind("far from the reference", "circle:height=30,speed=4", _far_away),
+    FlightKind("near the ground, sinking", "hover:height=0.2", _near_the_ground, needs_ground=True),
+    FlightKind("standing on the ground", "hover:height=2", _on_the_ground, needs_ground=True),
 )
 
 

@@ -23,7 +23,7 @@ Taken: TypeAlias = Iterator[tuple[int, Array, Array]]
 """Number of a step in its flight, its original rotor speeds, and the repeated ones."""
 
 
-class Trial(NamedTuple):
+class RepeatedSteps(NamedTuple):
     """A way to repeat steps; `code` shows a difference at step {k}."""
 
     tried: str
@@ -117,29 +117,29 @@ def _plain(steps: list[FlownStep]) -> Row:
 
 
 _TRIALS = (
-    Trial(
+    RepeatedSteps(
         "the same step twice",
         _twice,
         "a = s[{k}]; print(*(a.again(law, a.memory)[1].rotor_speeds.tolist() for _ in range(2)))",
     ),
-    Trial(
+    RepeatedSteps(
         "the flight again by a law built anew",
         lambda subject, steps, _: _chained(subject, steps),
         "m = s[0].memory; print([(m := (r := a.again(law, m))[0], a.rotor_speeds.tolist(), "
         "r[1].rotor_speeds.tolist())[1:] for a in s][{k}])",
     ),
-    Trial(
+    RepeatedSteps(
         "two flights in turn by one law",
         _chained,
         "a, b = s[{k}], s[-1]; print(a.rotor_speeds.tolist(), b.again(law, b.memory)[1].rotor_speeds.tolist(), "
         "a.again(law, a.memory)[1].rotor_speeds.tolist())",
     ),
-    Trial(
+    RepeatedSteps(
         "stepped again from an old memory",
         _from_old,
         "a = s[{k}]; print(a.rotor_speeds.tolist(), a.again(law, a.memory)[1].rotor_speeds.tolist())",
     ),
-    Trial(
+    RepeatedSteps(
         "stepped from a memory pickled and read back",
         _from_pickled,
         "import pickle; a = s[{k}]; print(a.rotor_speeds.tolist(), "

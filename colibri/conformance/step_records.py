@@ -14,7 +14,7 @@ from colibri.autopilot.control.registry import DecisionError, check_answer, in_w
 from colibri.common.errors import Error, InFlightError
 from colibri.common.types import Array
 from colibri.conformance.subject import Subject
-from colibri.flights.flight import Direct, Flight
+from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.in_process import put_together
 from colibri.plant.vehicle.description import Vehicle
 
@@ -59,7 +59,7 @@ class FlownStep(NamedTuple):
         return next_memory, decision
 
 
-class Flown(NamedTuple):
+class FlownSteps(NamedTuple):
     """Steps of a flight, and the law's failure."""
 
     steps: list[FlownStep]
@@ -67,7 +67,7 @@ class Flown(NamedTuple):
     raised: BaseException | None
 
 
-class Recorder:
+class RecordingLaw:
     """A control law that records each step; it has the same members as the original."""
 
     def __init__(self, law: Controller[Any]) -> None:
@@ -93,12 +93,12 @@ class Recorder:
         return step
 
 
-def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
+def fly_for_steps(subject: Subject, track: str, **options: Any) -> FlownSteps:
     """Fly until the flight ends or the law fails."""
-    recorders: list[Recorder] = []
+    recorders: list[RecordingLaw] = []
 
     def law(table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> Controller[Any]:
-        recorders.append(Recorder(subject.law(table, vehicle, clock)))
+        recorders.append(RecordingLaw(subject.law(table, vehicle, clock)))
         recorded: Any = recorders[-1]
         return recorded  # type: ignore[no-any-return]
 
@@ -109,15 +109,15 @@ def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
     except Error:
         raise
     except Exception as error:  # of its warm_up
-        return Flown([], in_words(error), error)
+        return FlownSteps([], in_words(error), error)
     try:
-        for _ in Flight(plant, autopilot, Direct()).samples(plan.spec.duration):
+        for _ in SteppedFlight(plant, autopilot, Direct()).samples(plan.spec.duration):
             pass
     except DecisionError as error:
-        return Flown(recorders[0].steps, str(error), error)
+        return FlownSteps(recorders[0].steps, str(error), error)
     except InFlightError:  # the vehicle has left the range of the plant's model
         pass
-    return Flown(recorders[0].steps, "", None)
+    return FlownSteps(recorders[0].steps, "", None)
 
 
 def flown_steps(

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TypeAlias
 
 from colibri.common.process.lifecycle import EXIT_FAILED
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 from colibri.doctor.flying import flight, machine_code
 from colibri.doctor.ground_station import ground_station
 from colibri.doctor.network import beyond, loopback, ports
@@ -17,7 +17,7 @@ Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]
 
 CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)
 """In order."""
-_COLORS = {Verdict.FINE: "green", Verdict.NOTE: "yellow", Verdict.FAILED: "bold red"}
+_COLORS = {Severity.FINE: "green", Severity.NOTE: "yellow", Severity.FAILED: "bold red"}
 
 
 def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
@@ -34,7 +34,7 @@ def examine_as_told(args: argparse.Namespace) -> int:
     asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
     failed = 0
     for finding in examine([*CHECKS, *asked]):
-        failed += finding.verdict is Verdict.FAILED
+        failed += finding.verdict is Severity.FAILED
         show(finding)
     if link is not None:
         link.close()

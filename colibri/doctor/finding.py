@@ -4,7 +4,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 
-class Verdict(StrEnum):
+class Severity(StrEnum):
     """The meaning of a finding for a flight."""
 
     FINE = "fine"
@@ -18,6 +18,6 @@ class Finding(NamedTuple):
     """The finding of a check, with advice unless all is well."""
 
     checked: str
-    verdict: Verdict
+    verdict: Severity
     found: str
     advice: str = ""

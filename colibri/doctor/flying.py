@@ -5,7 +5,7 @@ import platform
 from pathlib import Path
 
 from colibri.common.errors import Error
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 
 _TRACK, _DURATION_S = "hover", 2.0
 _CPU_INFO = Path("/proc/cpuinfo")
@@ -18,11 +18,11 @@ def machine_code() -> Finding:
     folder = MachineCode(rotation_matrix).cache_path
     if folder is None:
         advice = "name a folder: NUMBA_CACHE_DIR=FOLDER"
-        return Finding("machine code", Verdict.NOTE, "can be kept nowhere: each start compiles anew", advice)
+        return Finding("machine code", Severity.NOTE, "can be kept nowhere: each start compiles anew", advice)
     if not os.access(folder, os.W_OK):
         advice = "make it so, or name another: NUMBA_CACHE_DIR=FOLDER"
-        return Finding("machine code", Verdict.NOTE, f"{folder} cannot be written to", advice)
-    return Finding("machine code", Verdict.FINE, f"kept in {folder}")
+        return Finding("machine code", Severity.NOTE, f"{folder} cannot be written to", advice)
+    return Finding("machine code", Severity.FINE, f"kept in {folder}")
 
 
 def flight() -> Finding:
@@ -32,9 +32,9 @@ def flight() -> Finding:
     try:
         flown = fly(_TRACK, link="udp", duration=_DURATION_S)
     except Error as error:
-        return Finding("flight", Verdict.FAILED, str(error), "colibri fly hover says more")
+        return Finding("flight", Severity.FAILED, str(error), "colibri fly hover says more")
     times = flown.report["real_time_factor"]
-    return Finding("flight", Verdict.FINE, f"{times:.0f} times real time, on {os.cpu_count()} cores: {processor()}")
+    return Finding("flight", Severity.FINE, f"{times:.0f} times real time, on {os.cpu_count()} cores: {processor()}")
 
 
 def processor() -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from time import perf_counter
 
 from colibri.common.types import Address
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 from colibri.flights.fleet_spec import GROUND_PORT
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.wire.dialect import Codec, mav
@@ -15,9 +15,9 @@ _EVERY_S = 1.0
 def ground_station(link: GroundLink, within_s: float) -> Finding:
     answers = called(link, within_s)
     if answers is not None:
-        return Finding("ground station", Verdict.FINE, answers)
+        return Finding("ground station", Severity.FINE, answers)
     said = f"no heartbeat over {link.url} within {within_s:g} s"
-    return Finding("ground station", Verdict.FAILED, said, f"start it; have it listen on UDP port {GROUND_PORT}")
+    return Finding("ground station", Severity.FAILED, said, f"start it; have it listen on UDP port {GROUND_PORT}")
 
 
 def called(link: GroundLink, within_s: float) -> str | None:

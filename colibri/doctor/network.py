@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 from colibri.flights.fleet_spec import GROUND_PORT, PLANT_PORT, SDK_PORT
 
 HOST = "127.0.0.1"
@@ -25,8 +25,8 @@ def loopback() -> Finding:
             there.recv(16)
         except OSError as error:
             why = str(error)
-            return Finding("loopback", Verdict.FAILED, f"UDP over {HOST}: {why}", "bring it up: ip link set lo up")
-    return Finding("loopback", Verdict.FINE, f"UDP over {HOST} arrives")
+            return Finding("loopback", Severity.FAILED, f"UDP over {HOST}: {why}", "bring it up: ip link set lo up")
+    return Finding("loopback", Severity.FINE, f"UDP over {HOST} arrives")
 
 
 def ports() -> Iterator[Finding]:
@@ -38,12 +38,12 @@ def ports() -> Iterator[Finding]:
         who = _who_has(port)
         checked = f"port {port}, {whose}"
         if who is None:
-            yield Finding(checked, Verdict.FINE, "free" if ours else "nobody waits there yet: start it when you like")
+            yield Finding(checked, Severity.FINE, "free" if ours else "nobody waits there yet: start it when you like")
         elif ours:
             advice = "end that, or colibri sitl --plant-port 0"
-            yield Finding(checked, Verdict.FAILED, f"taken by {who}", advice)
+            yield Finding(checked, Severity.FAILED, f"taken by {who}", advice)
         else:
-            yield Finding(checked, Verdict.FINE, f"{who} waits there: it will be called")
+            yield Finding(checked, Severity.FINE, f"{who} waits there: it will be called")
 
 
 def beyond() -> Finding | None:
@@ -53,9 +53,9 @@ def beyond() -> Finding | None:
         return None
     host = gateway(_ROUTES.read_text(encoding="ascii")) if _ROUTES.exists() else None
     if host is None:
-        return Finding(what, Verdict.NOTE, "no way out of it", "run the ground station in here, too")
+        return Finding(what, Severity.NOTE, "no way out of it", "run the ground station in here, too")
     advice = f"colibri sitl --gcs udpout:{host}:{GROUND_PORT} --signing-key FILE (or --insecure)"
-    return Finding(what, Verdict.NOTE, f"a ground station on the host is at {host}", advice)
+    return Finding(what, Severity.NOTE, f"a ground station on the host is at {host}", advice)
 
 
 def gateway(routes: str) -> str | None:

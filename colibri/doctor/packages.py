@@ -10,7 +10,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 import colibri
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 
 PACKAGE = "colibri-sitl"
 FOR_DEVELOPERS = ("bench", "clients", "dev")
@@ -21,14 +21,14 @@ _SHOWN = 3
 
 
 def python() -> Finding:
-    return Finding("Python", Verdict.FINE, f"{platform.python_version()}, {sys.executable}")
+    return Finding("Python", Severity.FINE, f"{platform.python_version()}, {sys.executable}")
 
 
 def packages() -> Finding:
     wrong = [words for asked in _asked() if (words := _wrong(asked))]
     if wrong:
-        return Finding("packages", Verdict.FAILED, ", ".join(wrong), f"pip install --upgrade {PACKAGE}")
-    return Finding("packages", Verdict.FINE, f"{PACKAGE} {version(PACKAGE)} and the {len(_asked())} that it needs")
+        return Finding("packages", Severity.FAILED, ", ".join(wrong), f"pip install --upgrade {PACKAGE}")
+    return Finding("packages", Severity.FINE, f"{PACKAGE} {version(PACKAGE)} and the {len(_asked())} that it needs")
 
 
 def lock() -> Finding | None:
@@ -40,8 +40,10 @@ def lock() -> Finding | None:
     others = [words for pin in pinned if version_of(pin.name) is not None and (words := _wrong(pin))]
     if others:
         more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
-        return Finding("lock", Verdict.NOTE, ", ".join(others[:_SHOWN]) + more, "make clean setup: as they were tested")
-    return Finding("lock", Verdict.FINE, f"no other version than {_LOCK} names")
+        return Finding(
+            "lock", Severity.NOTE, ", ".join(others[:_SHOWN]) + more, "make clean setup: as they were tested"
+        )
+    return Finding("lock", Severity.FINE, f"no other version than {_LOCK} names")
 
 
 def extras() -> Iterator[Finding]:
@@ -51,9 +53,9 @@ def extras() -> Iterator[Finding]:
         missing = [asked.name for asked in _asked(extra) if _wrong(asked)]
         if missing:
             advice = f"if you need it: pip install '{PACKAGE}[{extra}]'"
-            yield Finding(f"extra {extra}", Verdict.NOTE, f"without {', '.join(missing)}", advice)
+            yield Finding(f"extra {extra}", Severity.NOTE, f"without {', '.join(missing)}", advice)
         else:
-            yield Finding(f"extra {extra}", Verdict.FINE, "installed")
+            yield Finding(f"extra {extra}", Severity.FINE, "installed")
 
 
 def _asked(extra: str = "") -> list[Requirement]:

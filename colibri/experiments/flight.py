@@ -12,7 +12,7 @@ from colibri.analysis.series.figure_series import FigureSeries
 from colibri.common.errors import unknown
 from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
-from colibri.experiments.table import Table, table_of
+from colibri.experiments.table import SampleTable, table_of
 from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec, OptionError
@@ -56,17 +56,17 @@ class Flight:
         return impact
 
     @cached_property
-    def samples(self) -> Table:
+    def samples(self) -> SampleTable:
         """`flight.csv`, one row per control sample: state, inputs, references; m, s, rad, N."""
         return table_of(COLUMNS, (part.table for part in FlightReader(self.plan, self.log)))
 
     @cached_property
-    def frames(self) -> Table:
+    def frames(self) -> SampleTable:
         """One row per frame: true state, rotors, battery and wind."""
         return table_of(TRUTH.names, self.log.blocks(TRUTH))
 
     @cached_property
-    def estimate(self) -> Table | None:
+    def estimate(self) -> SampleTable | None:
         """One row per control sample: the state estimate; `None` with feedback of the true state."""
         table = table_of(ESTIMATE.names, self.log.blocks(ESTIMATE))
         return table if self.plan.spec.feedback is Feedback.SENSORS else None

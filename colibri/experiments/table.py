@@ -13,13 +13,13 @@ class PandasError(Error):
     """pandas is not installed."""
 
 
-class Table(np.ndarray[Any, np.dtype[np.void]]):
+class SampleTable(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array, (n,), of float64 by column name: `table["x"]`."""
 
     def __getitem__(self, key: Any) -> Any:
         """Return a column as a plain array, rows as a table."""
         found = super().__getitem__(key)
-        return found.view(np.ndarray) if isinstance(found, Table) and found.dtype.names is None else found
+        return found.view(np.ndarray) if isinstance(found, SampleTable) and found.dtype.names is None else found
 
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame; PandasError if pandas is not installed."""
@@ -30,6 +30,6 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
         return DataFrame({name: self[name] for name in self.dtype.names or ()})
 
 
-def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> Table:
+def table_of(columns: Sequence[str], blocks: Iterable[Array]) -> SampleTable:
     rows = np.concatenate([np.empty((0, len(columns))), *blocks])
-    return rows.view([(name, np.float64) for name in columns])[:, 0].view(Table)
+    return rows.view([(name, np.float64) for name in columns])[:, 0].view(SampleTable)

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from colibri.flights.fly import fly_plan as fly_plan
     from colibri.flights.folder import prepare as prepare
     from colibri.flights.plan import FlightPlan as FlightPlan
+    from colibri.flights.plan import FrameCount as FrameCount
     from colibri.flights.plan import PlanError as PlanError
-    from colibri.flights.plan import Summary as Summary
     from colibri.flights.processes import FlightError as FlightError
     from colibri.flights.replay import Difference as Difference
     from colibri.flights.replay import Replayed as Replayed

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias,
 from colibri.autopilot.core.autopilot import Autopilot, Stages
 from colibri.autopilot.core.step import Received, Step, answer
 from colibri.common.types import Address
-from colibri.flights.snapshots import Snapshot
+from colibri.flights.snapshots import ObjectSnapshot
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US
@@ -44,7 +44,7 @@ class Wire(Protocol):
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered: ...
 
 
-class Sample(NamedTuple):
+class FrameSample(NamedTuple):
     """A frame that was flown; `world` is at the time of the next one."""
 
     step: Step
@@ -54,7 +54,7 @@ class Sample(NamedTuple):
     to_stations: "list[Outgoing]"
 
 
-class Flight(Generic[StagesT]):
+class SteppedFlight(Generic[StagesT]):
     """A flight within this process."""
 
     def __init__(self, plant: Plant, autopilot: Autopilot[StagesT], wire: Wire) -> None:
@@ -64,23 +64,23 @@ class Flight(Generic[StagesT]):
     def time_us(self) -> int:
         return self.plant.world.time_us
 
-    def step(self, inbox: Iterable[Received] = ()) -> Sample:
+    def step(self, inbox: Iterable[Received] = ()) -> FrameSample:
         """Fly a frame, and serve ground stations, which sent `inbox`; DecisionError or IntegrationError."""
         step, command, faults, datagram = self.wire.exchange(self.plant, self.autopilot)
         self.plant.answer(command, faults)
-        return Sample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
+        return FrameSample(step, command, self.plant.world, datagram, self.autopilot.serve(inbox))
 
-    def samples(self, duration_s: float) -> Iterator[Sample]:
+    def samples(self, duration_s: float) -> Iterator[FrameSample]:
         """Fly whole frames up to `duration_s` since time 0."""
         end_us = duration_s * 1e6 - self.plant.interval_us
         while self.plant.world.time_us <= end_us:
             yield self.step()
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> ObjectSnapshot:
         """Keep the state of plant, autopilot and wire; vehicle, profile and track are shared."""
-        return Snapshot((self.plant, self.autopilot, self.wire))
+        return ObjectSnapshot((self.plant, self.autopilot, self.wire))
 
-    def restore(self, snapshot: Snapshot) -> None:
+    def restore(self, snapshot: ObjectSnapshot) -> None:
         snapshot.restore()
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, loading
-from colibri.flights.plan import FlightPlan, Summary, unseen
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.flights.provenance import write_provenance
 from colibri.mavlink.ulog.log import TopicLog
@@ -17,7 +17,7 @@ def fly_plan(
     say: Callable[[str], None] = unseen,
     compiling: Callable[[int], None] = unseen,
     topics: TopicLog | None = None,
-) -> Summary:
+) -> FrameCount:
     """Fly a plan over its link and write its provenance; with `topics` no files are written.
 
     Args:

@@ -12,8 +12,8 @@ from colibri.autopilot.process.logs import AutopilotLog, log_in
 from colibri.autopilot.process.recorded_inputs import setup_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen, loading
-from colibri.flights.flight import Direct, Flight, InMemory, Wire
-from colibri.flights.plan import FlightPlan, Summary, unseen
+from colibri.flights.flight import Direct, InMemory, SteppedFlight, Wire
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.wire.tlog import TlogWriter
 from colibri.plant.process.logs import TRAFFIC, TruthLog
@@ -23,7 +23,7 @@ from colibri.plant.simulation.plant import Plant, PlantBuilder
 
 def fly_locally(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, topics: TopicLog | None = None
-) -> Summary:
+) -> FrameCount:
     """Record in `topics`, or else in the plan's folder."""
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
@@ -39,7 +39,7 @@ def fly_locally(
         truth.write_world(plant.world)
         with gc_frozen():
             began_s = perf_counter()
-            for sample in Flight(plant, autopilot, wire).samples(plan.spec.duration):
+            for sample in SteppedFlight(plant, autopilot, wire).samples(plan.spec.duration):
                 log.write(sample.step, sample.datagram)
                 truth.write_world(sample.world)
                 frames += 1
@@ -52,7 +52,7 @@ def fly_locally(
         log.close()
         if traffic:
             traffic.close()
-    return Summary(wall_time_s, frames=frames, resent=0)
+    return FrameCount(wall_time_s, frames=frames, resent=0)
 
 
 def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot[TrackStages], Plant]:

@@ -26,7 +26,7 @@ def unseen(_what: object) -> None:
     """Ignore progress."""
 
 
-class Summary(NamedTuple):
+class FrameCount(NamedTuple):
     """Wall-clock time, frames exchanged, and frames sent again."""
 
     wall_time_s: float

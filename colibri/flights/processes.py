@@ -7,7 +7,7 @@ from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import kept_failure
 from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.flights.launcher import Child, end_children, events_of, how_it_ended
-from colibri.flights.plan import FlightPlan, Summary, unseen
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 
 _SHOWN = ("ground", "heard", "said")
 """Events of the autopilot shown to a user with ground stations."""
@@ -30,11 +30,11 @@ def fly_processes(
     progress: Callable[[float], None] = unseen,
     say: Callable[[str], None] = unseen,
     compiling: Callable[[int], None] = unseen,
-) -> Summary:
+) -> FrameCount:
     """Fly on a free port, as `fly_plan` does."""
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
-    summary: Summary | None = None
+    summary: FrameCount | None = None
     stopped, silent = _Wait(_STOPPED_S), _Wait(_SILENT_S)
     try:
         children["plant"] = Child(plan.plant_spec("udpin:127.0.0.1:0"), fork=True)
@@ -60,7 +60,7 @@ def fly_processes(
                         say(event["text"])
                     (silent.begin if kind == "silence" else silent.end)()
                 elif kind == "ended":
-                    summary = Summary(event["wall_time_s"], event["frames"], event["resent"])
+                    summary = FrameCount(event["wall_time_s"], event["frames"], event["resent"])
             held = [child.name for child in children.values() if child.is_stopped()]
             (stopped.begin if held else stopped.end)()
             if stopped.is_over():

@@ -19,7 +19,7 @@ from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.loading import load_track
-from colibri.autopilot.process.recorded_inputs import Inputs, InputsError, Setup, read_inputs
+from colibri.autopilot.process.recorded_inputs import InputsError, RecordedInputs, Setup, read_inputs
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error
 from colibri.common.files import read_bytes
@@ -117,7 +117,7 @@ class _Flight(NamedTuple):
 
     path: Path
     log: FlightFile
-    inputs: Inputs
+    inputs: RecordedInputs
 
 
 def _read(path: Path) -> _Flight:

@@ -33,7 +33,7 @@ Kept: TypeAlias = tuple[Restore | None, Iterable[Any]]
 Keep: TypeAlias = Callable[[Any], Kept]
 
 
-class Snapshot:
+class ObjectSnapshot:
     """The state of some objects and of all their references."""
 
     def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:

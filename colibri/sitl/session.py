@@ -13,7 +13,7 @@ from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.launcher import Launcher
 from colibri.sitl.backends.link_clocks import QuickClock
-from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
+from colibri.sitl.backends.lockstep import AutopilotSide, LockstepSession, PlantSide
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
@@ -58,14 +58,14 @@ class Flights:
         self._ends.callback(autopilot.close)
         return LockstepSession(plant, autopilot, setting.system, setting.seed)
 
-    def _plant(self, spec: PlantSpec, state: Path) -> Plant:
+    def _plant(self, spec: PlantSpec, state: Path) -> PlantSide:
         if self._launcher is None:
             return MemoryPlant(spec)
         if not self._launcher.starts_plants:
             return MemoryPlant(spec, QuickClock())
         return UdpPlant(self._launcher, spec, state)
 
-    def _autopilot(self, spec: AutopilotSpec, state: Path) -> Autopilot:
+    def _autopilot(self, spec: AutopilotSpec, state: Path) -> AutopilotSide:
         return MemoryAutopilot(spec) if self._launcher is None else UdpAutopilot(self._launcher, spec, state)
 
     def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:

@@ -4,7 +4,7 @@ import argparse
 
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, print_table, write_table
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.studies.comparison import fly_comparison
@@ -47,7 +47,7 @@ def compare(args: argparse.Namespace) -> int:
     return EXIT_FAILED if lost else 0
 
 
-def _cells(flown: Flown) -> Row:
+def _cells(flown: FlightResult) -> Row:
     *figures, lost_at_s = flown.metrics
     cells = (_UNKNOWN if value is None else format(value, how) for value, how in zip(figures, _FORMATS, strict=True))
     if flown.verdict is Verdict.FLOWN:

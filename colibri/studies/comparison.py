@@ -12,7 +12,7 @@ from colibri.campaigns.definition import Campaign, CampaignTables, Logs, Point, 
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.engines.progress import with_bar
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points, plan_point
+from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points, plan_point
 from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.values import CampaignError, shown
@@ -91,7 +91,7 @@ def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argpar
             journal.add(each)
 
 
-def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flown]:
+def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, FlightResult]:
     kept = {each.contents: each for each in read_journal(file) if len(each.metrics) == len(common.metrics)}
     found = {}
     for point in points if kept else ():

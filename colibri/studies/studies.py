@@ -21,7 +21,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import study_figures
-from colibri.studies.study_figures import Result
+from colibri.studies.study_figures import StudyResult
 from colibri.studies.study_flights import Flown, fly
 
 FORMATS = ("png", "svg")
@@ -50,7 +50,7 @@ class Measure(NamedTuple):
     cell: Callable[[Flown], str]
 
 
-class Case(NamedTuple):
+class StudyCase(NamedTuple):
     """A flight, the names of its row, and its group of columns."""
 
     row: Row
@@ -64,8 +64,8 @@ class Study(NamedTuple):
     name: str
     headings: Row
     measures: tuple[Measure, ...]
-    cases: tuple[Case, ...]
-    draw: Callable[[Sequence[Result]], dict[str, Figure]]
+    cases: tuple[StudyCase, ...]
+    draw: Callable[[Sequence[StudyResult]], dict[str, Figure]]
 
 
 def number(value: float) -> str:
@@ -94,16 +94,16 @@ RMS = Measure("RMS (m)", unless_lost(lambda flown: flown.rms_m))
 MAX_ERROR = Measure("maximum (m)", unless_lost(lambda flown: flown.max_error_m))
 
 
-def _tracks() -> Iterable[Case]:
+def _tracks() -> Iterable[StudyCase]:
     for track in (*THESIS_TRACKS, LEMNISCATE):
         for group, law in _LAWS.items():
-            yield Case((track,), group, {**law, "track": track})
+            yield StudyCase((track,), group, {**law, "track": track})
 
 
 _BATTERY: dict[str, Settings] = {"with": {}, "without": _NO_BATTERY}
 
 
-def _speed() -> Iterable[Case]:
+def _speed() -> Iterable[StudyCase]:
     # Height keeps a saturated vehicle off the ground; the start is on the track at its speed, so that it has no effect.
     # In its middle the lemniscate is straight and fastest, along both axes alike.
     for lap_s in (9.0, 7.5, 6.0, 5.5, 5.0, 4.5, 4.25, 4.0, 3.75, 3.5, 3.0, 2.5, 2.0):
@@ -113,7 +113,7 @@ def _speed() -> Iterable[Case]:
         for group, law in (_LAWS | {ON_PATH: _ON_PATH}).items():
             for battery, vehicle in _BATTERY.items():
                 flight = {**law, "track": track, "start": start, **({} if group is THESIS else vehicle)}
-                yield Case((f"{lap_s:g}", f"{sqrt(2.0) * along_m_s:.2f}", battery), group, flight)
+                yield StudyCase((f"{lap_s:g}", f"{sqrt(2.0) * along_m_s:.2f}", battery), group, flight)
 
 
 _STARTS: dict[str, dict[str, float]] = {
@@ -126,12 +126,12 @@ _STARTS: dict[str, dict[str, float]] = {
 }
 
 
-def _recovery() -> Iterable[Case]:
+def _recovery() -> Iterable[StudyCase]:
     for name, values in _STARTS.items():
         texts = (f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values.items())
         row = (name, ", ".join(texts))
         flight = {"track": "hover:height=20", "start": {"y": 0.0, "z": 20.0, **values}, "duration": 20.0}
-        yield Case(row, "", {**_LAWS[LPV_MPC], **flight})
+        yield StudyCase(row, "", {**_LAWS[LPV_MPC], **flight})
 
 
 def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:
@@ -157,20 +157,20 @@ _UPSETS: dict[str, Settings] = {
 }
 
 
-def _robustness() -> Iterable[Case]:
+def _robustness() -> Iterable[StudyCase]:
     for upset, settings in _UPSETS.items():
         for track in (SPIRAL, LEMNISCATE):
             for group in (SE3, LPV_MPC):
-                yield Case((track, upset), group, {**_LAWS[group], **settings, "track": track, "duration": 60.0})
+                yield StudyCase((track, upset), group, {**_LAWS[group], **settings, "track": track, "duration": 60.0})
 
 
-def _limits() -> Iterable[Case]:
+def _limits() -> Iterable[StudyCase]:
     slow = (600.0, (SPIRAL, LEMNISCATE, "lemniscate:lap=5"))
     for max_speed, tracks in ((838.0, (SPIRAL, "lemniscate:lap=5")), slow):
         for track in tracks:
             flight = {**_LAWS[LPV_MPC], "track": track, "vehicle.rotors.max_speed": max_speed, "duration": 40.0}
             for battery, vehicle in _BATTERY.items():
-                yield Case((track, f"{max_speed:g}", battery), "", {**flight, **vehicle})
+                yield StudyCase((track, f"{max_speed:g}", battery), "", {**flight, **vehicle})
 
 
 _BINDING = tuple(
@@ -239,7 +239,7 @@ def campaign(flights: Sequence[Settings]) -> Campaign:
 
 def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:
     paths = write_table(out / study.name, *table(study, flown), names=len(study.headings))
-    results = [Result(case.row, case.group, result) for case, result in zip(study.cases, flown, strict=True)]
+    results = [StudyResult(case.row, case.group, result) for case, result in zip(study.cases, flown, strict=True)]
     for name, figure in study.draw(results).items():
         paths += write_figure(figure, out / name, FORMATS)
     return paths

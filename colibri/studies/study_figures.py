@@ -33,7 +33,7 @@ _ALSO_WITHOUT = ("SE(3)", "LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
 
-class Result(NamedTuple):
+class StudyResult(NamedTuple):
     """A completed case."""
 
     row: tuple[str, ...]
@@ -41,7 +41,7 @@ class Result(NamedTuple):
     flown: Flown
 
 
-def tracks(results: Sequence[Result]) -> dict[str, Figure]:
+def tracks(results: Sequence[StudyResult]) -> dict[str, Figure]:
     names = _names(result.row[0] for result in results)
     figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.62 * len(names))
     figure.subplots_adjust(left=0.17)
@@ -54,7 +54,7 @@ def _names(names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
+def _compare(axes: Axes, named: Sequence[tuple[StudyResult, str]]) -> None:
     names, groups = _names(name for _, name in named), _names(result.group for result, _ in named)
     for group in groups:
         color = _CONTENDERS[group]
@@ -82,7 +82,7 @@ def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
     axes.set_xlabel(f"position error after {SETTLED_AFTER_S:.0f} s (m)")
 
 
-def speed(results: Sequence[Result]) -> dict[str, Figure]:
+def speed(results: Sequence[StudyResult]) -> dict[str, Figure]:
     figure, grid = axes_grid(3, 1, TOP_IN + 2 * _LEGEND_ROW_IN, row_in=2.1)
     quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
         ("RMS (m)", lambda flown: min(flown.rms_m, _MOST_M)),
@@ -109,7 +109,7 @@ def speed(results: Sequence[Result]) -> dict[str, Figure]:
     return {"speed": figure}
 
 
-def robustness(results: Sequence[Result]) -> dict[str, Figure]:
+def robustness(results: Sequence[StudyResult]) -> dict[str, Figure]:
     on = _names(result.row[0] for result in results)
     plants = _names(result.row[1] for result in results)
     figure, grid = axes_grid(len(on), 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.55 * len(plants))
@@ -124,7 +124,7 @@ def robustness(results: Sequence[Result]) -> dict[str, Figure]:
     return {"robustness": figure}
 
 
-def recovery(results: Sequence[Result]) -> dict[str, Figure]:
+def recovery(results: Sequence[StudyResult]) -> dict[str, Figure]:
     groups = _names(result.group for result in results)
     by_group = {group: [result for result in results if result.group == group] for group in groups}
     return {
@@ -133,11 +133,11 @@ def recovery(results: Sequence[Result]) -> dict[str, Figure]:
     }
 
 
-def limits(results: Sequence[Result]) -> dict[str, Figure]:
+def limits(results: Sequence[StudyResult]) -> dict[str, Figure]:
     return {"-".join(("limits", *map(_file_name, result.row))): _limits(result) for result in results}
 
 
-def _recoveries(law: str, results: Sequence[Result]) -> Figure:
+def _recoveries(law: str, results: Sequence[StudyResult]) -> Figure:
     figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
     quantities: tuple[tuple[str, Callable[[Flown], Array]], ...] = (
         ("height (m)", lambda flown: flown.recording["z"]),
@@ -160,7 +160,7 @@ def _recoveries(law: str, results: Sequence[Result]) -> Figure:
     return figure
 
 
-def _recovery(result: Result) -> Figure:
+def _recovery(result: StudyResult) -> Figure:
     figure, grid = axes_grid(4, 1, TOP_IN + _LEGEND_ROW_IN)
     flown = result.flown
     shown = flown.t <= RECOVERY_SHOWN_S
@@ -186,7 +186,7 @@ _MIN_HEIGHTS_M = 0.02  # closer ticks would need more digits than there is room 
 _RECOVERY_QUANTITIES = ("height (m)", "tilt (°)", "rates (rad/s)", "Ω (rad/s)")
 
 
-def _limits(result: Result) -> Figure:
+def _limits(result: StudyResult) -> Figure:
     figure, grid = axes_grid(3, 1, TOP_IN, row_in=1.8)
     flown = result.flown
     begin_s = 0.0 if result.row[0] == "spiral" else SETTLED_AFTER_S

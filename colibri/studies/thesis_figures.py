@@ -32,7 +32,7 @@ FORMATS = ("png", "svg")
 FIRST_SECONDS = (0.0, 5.0)
 
 
-class Flight(NamedTuple):
+class ThesisFlight(NamedTuple):
     """A flight of the thesis."""
 
     name: str
@@ -50,12 +50,12 @@ class ThesisFigure(NamedTuple):
 
 
 FLIGHTS = (
-    Flight("global", "spiral", "global-lpv-mpc", "Spiral, global LPV-MPC"),
-    Flight("spiral", "spiral", "cascade", "Spiral"),
-    Flight("expanding-spiral", "expanding-spiral", "cascade", "Expanding spiral"),
-    Flight("line", "line", "cascade", "Line"),
-    Flight("wave", "wave", "cascade", "Wave"),
-    Flight("crown", "crown", "cascade", "Crown"),
+    ThesisFlight("global", "spiral", "global-lpv-mpc", "Spiral, global LPV-MPC"),
+    ThesisFlight("spiral", "spiral", "cascade", "Spiral"),
+    ThesisFlight("expanding-spiral", "expanding-spiral", "cascade", "Expanding spiral"),
+    ThesisFlight("line", "line", "cascade", "Line"),
+    ThesisFlight("wave", "wave", "cascade", "Wave"),
+    ThesisFlight("crown", "crown", "cascade", "Crown"),
 )
 _EVERY_TRACK = ("trajectory", "x", "y", "z", "angles", "inputs")
 _APPENDIX = ("expanding-spiral", "line", "wave", "crown")
@@ -81,7 +81,8 @@ def figures(args: argparse.Namespace) -> int:
     flights = [flight for flight in FLIGHTS if any(figure.flight == flight.name for figure in wanted)]
     make_folder(args.out)
     jobs = [
-        Job(flight, tuple(figure for figure in wanted if figure.flight == flight.name), args.out) for flight in flights
+        FigureJob(flight, tuple(figure for figure in wanted if figure.flight == flight.name), args.out)
+        for flight in flights
     ]
     written = in_order(draw, jobs, "flights", quiet=args.quiet)
     if not args.quiet:
@@ -89,15 +90,15 @@ def figures(args: argparse.Namespace) -> int:
     return 0
 
 
-class Job(NamedTuple):
+class FigureJob(NamedTuple):
     """A flight and its figures."""
 
-    flight: Flight
+    flight: ThesisFlight
     figures: tuple[ThesisFigure, ...]
     out: Path
 
 
-def draw(job: Job) -> list[Path]:
+def draw(job: FigureJob) -> list[Path]:
     """Fly once and draw the figures of that flight."""
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
@@ -116,7 +117,7 @@ def draw(job: Job) -> list[Path]:
     return paths
 
 
-class Kind(NamedTuple):
+class PlotKind(NamedTuple):
     """A kind of plot: its subject in titles, and its function."""
 
     subject: str
@@ -130,17 +131,17 @@ def over_time(rows: Iterable[tuple[Panel, ...]]) -> Callable[[Series, str], Figu
 
 _COORDINATES = {axis: (followed(axis, f"{axis} (m)"), followed(f"v{axis}", f"{axis}' (m/s)")) for axis in POSITION}
 KINDS = {
-    "trajectory": Kind("trajectory", draw_trajectory),
-    "position": Kind("position and velocity", over_time(_COORDINATES.values())),
+    "trajectory": PlotKind("trajectory", draw_trajectory),
+    "position": PlotKind("position and velocity", over_time(_COORDINATES.values())),
     **{
-        axis: Kind(f"{axis} and its velocity", over_time((panel,) for panel in panels))
+        axis: PlotKind(f"{axis} and its velocity", over_time((panel,) for panel in panels))
         for axis, panels in _COORDINATES.items()
     },
-    "angles": Kind("angles", over_time((panel,) for panel in ANGLES)),
-    "first-seconds": Kind(
+    "angles": PlotKind("angles", over_time((panel,) for panel in ANGLES)),
+    "first-seconds": PlotKind(
         "angles, first seconds", over_time((panel._replace(span_s=FIRST_SECONDS),) for panel in ANGLES)
     ),
-    "inputs": Kind("thrust and moments", over_time((panel,) for panel in INPUTS)),
+    "inputs": PlotKind("thrust and moments", over_time((panel,) for panel in INPUTS)),
 }
 
 

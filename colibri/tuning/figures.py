@@ -12,7 +12,7 @@ from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, round_ti
 from colibri.campaigns.figure import COLORS, make_room_for_names, scale_values
 from colibri.campaigns.values import Choice, LogUniform, shown
 from colibri.tuning.space import Range
-from colibri.tuning.trials import Ended
+from colibri.tuning.trials import FinishedTrial
 
 _TRIED, _PRUNED, _BEST, _AS_IT_IS = "#0072B2", "#999999", "#D55E00", "#000000"
 _BAR_IN, _PANEL_IN = 0.32, 1.9
@@ -50,7 +50,9 @@ def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) 
     return figure
 
 
-def draw_slices(title: str, space: Mapping[str, Range], objective: str, trials: Sequence[Ended], best: Ended) -> Figure:
+def draw_slices(
+    title: str, space: Mapping[str, Range], objective: str, trials: Sequence[FinishedTrial], best: FinishedTrial
+) -> Figure:
     """Draw the first objective over each number, one dot per trial."""
     names = list(space)
     rows = -(-len(names) // _COLUMNS)
@@ -75,7 +77,7 @@ def draw_slices(title: str, space: Mapping[str, Range], objective: str, trials: 
     return figure
 
 
-def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended], best: Ended) -> Figure:
+def draw_history(title: str, objectives: Sequence[str], trials: Sequence[FinishedTrial], best: FinishedTrial) -> Figure:
     """Draw each objective over the trials, and its minimum so far."""
     figure, grid = axes_grid(len(objectives), 1, TOP_IN, row_in=2.6)
     for place, (objective, (axes,)) in enumerate(zip(objectives, grid, strict=True)):
@@ -92,7 +94,11 @@ def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended],
 
 
 def draw_pareto(
-    title: str, objectives: Sequence[str], trials: Sequence[Ended], front: Sequence[Ended], best: Ended
+    title: str,
+    objectives: Sequence[str],
+    trials: Sequence[FinishedTrial],
+    front: Sequence[FinishedTrial],
+    best: FinishedTrial,
 ) -> Figure:
     figure, grid = axes_grid(len(objectives) - 1, 1, TOP_IN, row_in=3.6, share=False)
     joined = sorted(front, key=lambda trial: trial.values)
@@ -114,7 +120,12 @@ def draw_pareto(
 
 
 def _dots(
-    axes: Axes, trials: Sequence[Ended], best: Ended, along: Any, place: int, front: Sequence[Ended] | None = None
+    axes: Axes,
+    trials: Sequence[FinishedTrial],
+    best: FinishedTrial,
+    along: Any,
+    place: int,
+    front: Sequence[FinishedTrial] | None = None,
 ) -> None:
     """Draw an objective of each trial: pruned or dominated ones grey."""
     first = trials[0]

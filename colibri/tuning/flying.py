@@ -9,11 +9,11 @@ import numpy as np
 
 from colibri.campaigns.definition import Point
 from colibri.campaigns.engines.engine import Engine
-from colibri.campaigns.flights import Common, Flown, Verdict, fly_points
+from colibri.campaigns.flights import Common, FlightResult, Verdict, fly_points
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning
 from colibri.tuning.space import TuningError
-from colibri.tuning.trials import Begun, Ended
+from colibri.tuning.trials import Begun, FinishedTrial
 
 _WORST, _EACH = "worst", "each"
 
@@ -25,7 +25,7 @@ class Scale(NamedTuple):
     each: tuple[tuple[float, ...], ...]
 
 
-class Flights:
+class TrialFlights:
     """Flies with an engine whose workers are kept between trials.
 
     It is also the engine's iterator of jobs.
@@ -35,7 +35,7 @@ class Flights:
         self._left: deque[Point] = deque()
         self._flown = fly_points(self, common, engine)
 
-    def fly(self, points: Sequence[Point]) -> list[Flown]:
+    def fly(self, points: Sequence[Point]) -> list[FlightResult]:
         self._left.extend(points)
         found = {flown.flight: flown for flown in islice(self._flown, len(points))}
         return [found[point.flight] for point in points]
@@ -58,11 +58,11 @@ class Flights:
 def fly_trial(
     tuning: Tuning,
     begun: Begun,
-    flights: Flights,
+    flights: TrialFlights,
     scale: Scale | None,
     best: float,
-    progress: Callable[[Flown], object],
-) -> Ended:
+    progress: Callable[[FlightResult], object],
+) -> FinishedTrial:
     """Fly a trial.
 
     Args:
@@ -70,7 +70,7 @@ def fly_trial(
         best: Least value so far; a pruned trial counts at least that.
     """
     factors = tuning.flown(begun.params)
-    flown: list[Flown] = []
+    flown: list[FlightResult] = []
     counts: list[Array] = []
     for points in tuning.steps():
         some = flights.fly([point._replace(factors=point.factors | factors) for point in points])
@@ -89,7 +89,7 @@ def fly_trial(
     return _ended(begun, flown, tuple(pooled), scale=scale if begun.number == 0 else None)
 
 
-def scale_of(tuning: Tuning, flown: Sequence[Flown]) -> Scale:
+def scale_of(tuning: Tuning, flown: Sequence[FlightResult]) -> Scale:
     """Return the reference values; TuningError without a metric."""
     refused = next((each for each in flown if each.verdict is Verdict.REFUSED), None)
     if refused is not None:
@@ -98,11 +98,11 @@ def scale_of(tuning: Tuning, flown: Sequence[Flown]) -> Scale:
     return Scale(worst, tuple(tuple(each.tolist()) for each in _counts(tuning, flown, worst)))
 
 
-def scale_kept(first: Ended) -> Scale:
+def scale_kept(first: FinishedTrial) -> Scale:
     return Scale(tuple(first.attributes[_WORST]), tuple(map(tuple, first.attributes[_EACH])))
 
 
-def _counts(tuning: Tuning, flown: Sequence[Flown], worst: Sequence[float]) -> list[Array]:
+def _counts(tuning: Tuning, flown: Sequence[FlightResult], worst: Sequence[float]) -> list[Array]:
     metrics = tuning.campaign.metrics
     return [
         objective.of_flights(flown, metrics, at_most)
@@ -129,12 +129,12 @@ def _expected(tuning: Tuning, counts: Array, scale: Scale) -> float:
 
 def _ended(
     begun: Begun,
-    flown: Sequence[Flown],
+    flown: Sequence[FlightResult],
     values: tuple[float, ...],
     *,
     pruned: bool = False,
     scale: Scale | None = None,
-) -> Ended:
+) -> FinishedTrial:
     lost = sum(each.verdict is not Verdict.FLOWN for each in flown)
     kept: Mapping[str, Any] = {} if scale is None else {_WORST: list(scale.worst), _EACH: list(map(list, scale.each))}
-    return Ended(begun.number, values, begun.params, len(flown), lost, pruned, kept)
+    return FinishedTrial(begun.number, values, begun.params, len(flown), lost, pruned, kept)

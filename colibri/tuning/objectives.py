@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.metrics import NAMES, Metric, read_metrics
 from colibri.campaigns.values import is_number
 from colibri.common.errors import unknown
@@ -32,14 +32,14 @@ class Objective(NamedTuple):
             return SHARE_LOST
         return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
 
-    def of_flights(self, flown: Sequence[Flown], metrics: Sequence[Metric], worst: float) -> Array:
+    def of_flights(self, flown: Sequence[FlightResult], metrics: Sequence[Metric], worst: float) -> Array:
         """Return each flight's value, (n,), at most `worst`, which replaces missing ones."""
         if self.metric == SHARE_LOST:
             return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
         place = [metric.name for metric in metrics].index(self.metric)
         return np.array([min(value_of(each, place, worst), worst) for each in flown])
 
-    def worst(self, flown: Sequence[Flown], metrics: Sequence[Metric]) -> float:
+    def worst(self, flown: Sequence[FlightResult], metrics: Sequence[Metric]) -> float:
         """Return the value of a lost flight, from the original profile's flights."""
         if self.metric == SHARE_LOST:
             return 1.0
@@ -63,7 +63,7 @@ class Objective(NamedTuple):
         return pool(values, axis=axis)
 
 
-def value_of(flown: Flown, place: int, otherwise: float) -> float:
+def value_of(flown: FlightResult, place: int, otherwise: float) -> float:
     value = flown.metrics[place]
     return value if flown.verdict is Verdict.FLOWN and value is not None else otherwise
 

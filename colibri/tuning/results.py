@@ -12,7 +12,7 @@ from colibri.campaigns.values import shown
 from colibri.tuning.definition import Tuning
 from colibri.tuning.profile_file import profile_file
 from colibri.tuning.space import TuningError
-from colibri.tuning.trials import Ended
+from colibri.tuning.trials import FinishedTrial
 from colibri.tuning.verdict import HEADINGS, Compared, better, compare
 
 if TYPE_CHECKING:
@@ -35,7 +35,9 @@ class TuningResults:
         verdict: Comparison of both; empty without them.
     """
 
-    def __init__(self, tuning: Tuning, trials: Sequence[Ended], importances: Sequence[dict[str, float]]) -> None:
+    def __init__(
+        self, tuning: Tuning, trials: Sequence[FinishedTrial], importances: Sequence[dict[str, float]]
+    ) -> None:
         self.tuning = tuning
         self.trials = list(trials)
         names = [objective.name for objective in tuning.objectives]
@@ -61,7 +63,7 @@ class TuningResults:
         """The file of the tuned profile, with its origin as a comment."""
         return self.file_of(self.best)
 
-    def file_of(self, trial: Ended) -> str:
+    def file_of(self, trial: FinishedTrial) -> str:
         """Return the file of a trial's profile."""
         from importlib.metadata import version
 
@@ -127,7 +129,7 @@ class TuningResults:
         rows = [each.row for each in self.verdict]
         (folder / "verdict.csv").write_text(comma_separated(HEADINGS, rows), encoding="utf-8")
 
-    def _state(self, trial: Ended) -> str:
+    def _state(self, trial: FinishedTrial) -> str:
         if trial is self.best:
             return "chosen"
         if trial.pruned:
@@ -151,20 +153,20 @@ class TuningResults:
         return found
 
 
-def _front(trials: Sequence[Ended]) -> list[Ended]:
+def _front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
     """Return the trials that are not dominated; of equal ones the first."""
-    front: list[Ended] = []
+    front: list[FinishedTrial] = []
     for trial in sorted(trials, key=lambda trial: (trial.values, trial.number)):
         if not any(all(a <= b for a, b in zip(other.values, trial.values, strict=True)) for other in front):
             front.append(trial)
     return sorted(front, key=lambda trial: trial.number)
 
 
-def _chosen(front: Sequence[Ended]) -> Ended:
+def _chosen(front: Sequence[FinishedTrial]) -> FinishedTrial:
     least = [min(values) for values in zip(*(trial.values for trial in front), strict=True)]
     most = [max(values) for values in zip(*(trial.values for trial in front), strict=True)]
 
-    def distance(trial: Ended) -> float:
+    def distance(trial: FinishedTrial) -> float:
         ranges = zip(trial.values, least, most, strict=True)
         parts = [(value - low) / (high - low) for value, low, high in ranges if high > low]
         return sum((part * part for part in parts), 0.0)

@@ -10,13 +10,13 @@ import msgspec
 
 from colibri.campaigns.definition import tables_of
 from colibri.campaigns.engines.engine import Engine
-from colibri.campaigns.flights import Flown
+from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.journal import claim, identity_of
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.file_lock import FileLock
-from colibri.tuning.flying import Flights, fly_trial, scale_kept
+from colibri.tuning.flying import TrialFlights, fly_trial, scale_kept
 from colibri.tuning.profile_file import tuned_name
 from colibri.tuning.results import TuningResults
 from colibri.tuning.space import TuningError
@@ -31,7 +31,7 @@ class Watcher:
 
     def began(self, trials: int) -> None: ...
 
-    def flown(self, flown: Flown) -> None: ...
+    def flown(self, flown: FlightResult) -> None: ...
 
     def ended(self, trials: int, first: float, best: float) -> None:
         """Update progress; `first` and `best` are first objectives."""
@@ -104,7 +104,7 @@ def fly_tuning(
 
 def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -> None:
     told.began(tuning.trials)
-    with Flights(engine, tuning.common) as flights:
+    with TrialFlights(engine, tuning.common) as flights:
         while (begun := trials.ask()) is not None:
             ended = trials.ended
             scale = scale_kept(ended[0]) if begun.number else None

@@ -26,7 +26,7 @@ _MAX_P = 0.05
 _BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
-class Ended(NamedTuple):
+class FinishedTrial(NamedTuple):
     """A finished trial; number 0 is the original profile. Objectives are extrapolated if pruned."""
 
     number: int
@@ -95,14 +95,14 @@ class Trials:
                 return None
             sleep(_POLL_S)
 
-    def tell(self, begun: Begun, ended: Ended) -> None:
+    def tell(self, begun: Begun, ended: FinishedTrial) -> None:
         kept = {_FLIGHTS: ended.flights, _LOST: ended.lost, _PRUNED: ended.pruned, **ended.attributes}
         for name, value in kept.items():
             begun.trial.set_user_attr(name, value)
         self._study.tell(begun.trial, list(ended.values))
 
     @property
-    def ended(self) -> list[Ended]:
+    def ended(self) -> list[FinishedTrial]:
         return [_ended(trial) for trial in self._trials() if trial.state.is_finished()]
 
     def importances(self) -> list[dict[str, float]]:
@@ -205,9 +205,9 @@ def _unwarned() -> Iterator[None]:
         yield
 
 
-def _ended(trial: "FrozenTrial") -> Ended:
+def _ended(trial: "FrozenTrial") -> FinishedTrial:
     kept = trial.user_attrs
-    return Ended(
+    return FinishedTrial(
         number=int(kept[_NUMBER]),
         values=tuple(trial.values),
         params=dict(trial.params),

@@ -10,7 +10,7 @@ from colibri.analysis.tables import Row
 from colibri.autopilot.control.profile import Profile
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import Flown
+from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.values import shown
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning
@@ -121,7 +121,7 @@ class _Pairs:
         found[:, np.isnan(found).any(axis=0)] = np.nan
         return found
 
-    def _listed(self, of: int) -> list[Flown]:
+    def _listed(self, of: int) -> list[FlightResult]:
         return list(self._flown[of].ravel())
 
 

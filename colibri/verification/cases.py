@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _WAYPOINTS_FILE = "waypoints.csv"
 
 
-class Case(NamedTuple):
+class TrackCase(NamedTuple):
     """A flight along a track, by options of `colibri fly`."""
 
     name: str

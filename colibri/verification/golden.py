@@ -14,7 +14,7 @@ from colibri.common.errors import Error
 from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.folder import make_folder
-from colibri.verification.cases import Case, SitlCase
+from colibri.verification.cases import SitlCase, TrackCase
 from colibri.verification.golden_flights import FLIGHTS
 
 FOUND = "golden.json"
@@ -25,7 +25,7 @@ _NO_HASH = "-"
 _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
 
-class Outcome(NamedTuple):
+class GoldenResult(NamedTuple):
     """The result of a golden flight; the hash is empty if it failed."""
 
     name: str
@@ -59,7 +59,7 @@ def verify_golden(args: argparse.Namespace) -> int:
     return 0
 
 
-def chosen(names: Sequence[str]) -> list[Case | SitlCase]:
+def chosen(names: Sequence[str]) -> list[TrackCase | SitlCase]:
     flights = {flight.name: flight for flight in FLIGHTS}
     for name in names:
         if name not in flights:
@@ -67,13 +67,13 @@ def chosen(names: Sequence[str]) -> list[Case | SitlCase]:
     return [flight for flight in FLIGHTS if not names or flight.name in names]
 
 
-def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
+def fly_golden(flight: TrackCase | SitlCase, out: Path, link: str) -> GoldenResult:
     began_s = perf_counter()
     try:
         sha256, error = flight.fly(out, link), ""
     except Error as failure:
         sha256, error = "", str(failure)
-    return Outcome(flight.name, sha256, perf_counter() - began_s, error)
+    return GoldenResult(flight.name, sha256, perf_counter() - began_s, error)
 
 
 def read_hashes(path: Path) -> dict[str, str]:
@@ -95,7 +95,7 @@ def _check_names(path: Path, known: Mapping[str, str]) -> None:
         fail(f"{path} {wrong[0]}: write it anew with --renew")
 
 
-def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[Outcome]) -> int:
+def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[GoldenResult]) -> int:
     """Write the hashes flown, keep the others, and print the changes."""
     path: Path = args.golden
     lost = [outcome for outcome in outcomes if outcome.error]
@@ -113,7 +113,7 @@ def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterabl
     return 0
 
 
-def _print(outcomes: Sequence[Outcome], known: Mapping[str, str], args: argparse.Namespace) -> None:
+def _print(outcomes: Sequence[GoldenResult], known: Mapping[str, str], args: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl import mission_items
-from colibri.verification.cases import Case, SitlCase
+from colibri.verification.cases import SitlCase, TrackCase
 
 if TYPE_CHECKING:
     from colibri.sitl.vehicle import Sitl
@@ -22,8 +22,8 @@ WAYPOINTS = "x,y,z,t,yaw\n0,0,1,0,0\n3,0,2,2,90\n3,4,2,4,180\n0,0,1,7,270\n"
 TRACKS = ("spiral", "expanding-spiral", "line", "wave", "crown")
 
 
-def _flown(name: str, track: str, duration: float, profile: str = "flight", **options: Any) -> Case:
-    return Case(name, {"track": track, "profile": profile, "duration": duration, **options})
+def _flown(name: str, track: str, duration: float, profile: str = "flight", **options: Any) -> TrackCase:
+    return TrackCase(name, {"track": track, "profile": profile, "duration": duration, **options})
 
 
 def _mission(sitl: "Sitl") -> None:
@@ -69,7 +69,7 @@ def _sticks(sitl: "Sitl") -> None:
     sitl.run(3.0)
 
 
-FLIGHTS: tuple[Case | SitlCase, ...] = (
+FLIGHTS: tuple[TrackCase | SitlCase, ...] = (
     # Beyond what the vehicle can do, and back from where no flight should be.
     _flown("beyond-its-limits", "lemniscate:lap=1.0", 40.0),
     _flown("at-its-limits-in-gusts", "lemniscate:lap=4.0", 20.0, **GUSTS),
@@ -81,7 +81,7 @@ FLIGHTS: tuple[Case | SitlCase, ...] = (
     _flown("wave-late-on-sensors", "wave", 8.0, latency=8.0, **SENSORS),
     # What the plant and the planner have beside.
     _flown("lemniscate-adaptive", "lemniscate", 5.0, integrator="adaptive", wind="5@270"),
-    Case("waypoints", {"track": "waypoints", "profile": "flight", "duration": 9.0}, WAYPOINTS),
+    TrackCase("waypoints", {"track": "waypoints", "profile": "flight", "duration": 9.0}, WAYPOINTS),
     # Every control law.
     _flown("circle-by-se3", "circle:radius=3,speed=4", 6.0, "se3", **GUSTS),
     _flown("tumbling-by-se3", "hover:height=20", 5.0, "se3", start=TUMBLING),

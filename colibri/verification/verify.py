@@ -10,20 +10,20 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.processes import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.verification.cases import Case
+from colibri.verification.cases import TrackCase
 
 _SHOWN = 16
 DEFAULT_DURATION_S = 20.0
 
 CASES = (
-    Case("thesis-spiral", {"track": "spiral", "profile": "thesis"}),
-    Case("spiral", {"track": "spiral", "profile": "flight"}),
-    Case(
+    TrackCase("thesis-spiral", {"track": "spiral", "profile": "thesis"}),
+    TrackCase("spiral", {"track": "spiral", "profile": "flight"}),
+    TrackCase(
         "lemniscate-in-gusts", {"track": "lemniscate", "profile": "flight", "wind": "5@270", "turbulence": "moderate"}
     ),
-    Case("circle-by-se3", {"track": "circle", "profile": "se3"}),
-    Case("spiral-on-sensors", {"track": "spiral", "profile": "flight", "feedback": Feedback.SENSORS}),
-    Case(
+    TrackCase("circle-by-se3", {"track": "circle", "profile": "se3"}),
+    TrackCase("spiral-on-sensors", {"track": "spiral", "profile": "flight", "feedback": Feedback.SENSORS}),
+    TrackCase(
         "wave-on-sensors-in-gusts",
         {
             "track": "wave",
@@ -37,7 +37,7 @@ CASES = (
 SEED = 7
 
 
-class Verdict(NamedTuple):
+class CaseResult(NamedTuple):
     """The result of a case."""
 
     name: str
@@ -71,16 +71,16 @@ def verify(args: argparse.Namespace) -> int:
     return 0
 
 
-def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
+def _verdict(case: TrackCase, args: argparse.Namespace) -> CaseResult:
     folder: Path = args.out / case.name
     fly = partial(case.fly, duration=args.duration, seed=SEED)
     first, second = (fly(folder / again, args.link) for again in ("first", "second"))
     third = fly(folder / "memory", "memory")
     replayed = replay_flight(folder / "first")
-    return Verdict(case.name, (first, second, third), replayed.commands, replayed.difference is None)
+    return CaseResult(case.name, (first, second, third), replayed.commands, replayed.difference is None)
 
 
-def _print(verdicts: list[Verdict], args: argparse.Namespace) -> None:
+def _print(verdicts: list[CaseResult], args: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.common.types import Array, FourRotors, Quaternion, Vector
-from colibri.view.snapshot import Airframe, Mark, Surroundings, Zone
+from colibri.view.snapshot import Mark, Surroundings, VehicleShape, Zone
 
 Colour: TypeAlias = tuple[int, int, int]
 
@@ -50,7 +50,7 @@ def about_up(angle_rad: float) -> Quaternion:
     return cos(angle_rad / 2.0), 0.0, 0.0, sin(angle_rad / 2.0)
 
 
-def thrust_arrows(airframe: Airframe, rotors: FourRotors, scale: float) -> Array:
+def thrust_arrows(airframe: VehicleShape, rotors: FourRotors, scale: float) -> Array:
     """Return the ends of thrust arrows, proportional to squared speeds; FLU, m times scale, (4, 2, 3)."""
     arrows = np.zeros((len(airframe.rotors_m), 2, 3))
     arrows[:, :, :2] = scale * np.array(airframe.rotors_m)[:, None, :]
@@ -116,7 +116,7 @@ def outline(around: Surroundings) -> list[Array]:
     return [around.path, around.reference_path, np.array([mark.place_enu_m for mark in marks]), *zones]
 
 
-def vehicle_scale(extent_m: float, airframe: Airframe) -> float:
+def vehicle_scale(extent_m: float, airframe: VehicleShape) -> float:
     size = max(hypot(*place) for place in airframe.rotors_m) + airframe.radius_m
     return max(1.0, round(0.2 * extent_m / size, 1))
 

@@ -6,8 +6,8 @@ from time import perf_counter
 
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import open_ground_link
-from colibri.view.observer import Observer
-from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings, ViewError
+from colibri.view.observer import VehicleObserver
+from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape, ViewError
 
 _WAIT_S = 0.02
 
@@ -15,7 +15,7 @@ _WAIT_S = 0.02
 class LiveVehicle:
     """The vehicle at the other end of a link; a `Source`. Telemetry has no airframe."""
 
-    airframe = Airframe()
+    airframe = VehicleShape()
     is_live = True
 
     def __init__(self, url: str, name: str = "") -> None:
@@ -25,7 +25,7 @@ class LiveVehicle:
             raise ViewError(str(error)) from error
         self.url = self._link.url
         self.name = name or self.url
-        self._observer = Observer()
+        self._observer = VehicleObserver()
         self._lock = Lock()
         self._ends = Event()
         self._peers = [self._link.target] if self._link.target else []
@@ -55,7 +55,7 @@ class LiveVehicle:
         with self._lock:
             return self._observer.telemetry.charts()
 
-    def order(self, give: Callable[[Observer], None]) -> None:
+    def order(self, give: Callable[[VehicleObserver], None]) -> None:
         """Call a command of the observer: `live.order(Observer.land)`."""
         with self._lock:
             give(self._observer)

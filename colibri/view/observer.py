@@ -9,7 +9,7 @@ from math import nan
 
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
-from colibri.mavlink.client.client import Client, Ended, Found
+from colibri.mavlink.client.client import Client, ConversationEnded, VehicleFound
 from colibri.mavlink.client.commands import Command, CommandInt, set_message_interval
 from colibri.mavlink.client.conversation import UNANSWERED, Repeat, Target
 from colibri.mavlink.client.modes import ARDUPILOT, PX4, mode_named
@@ -32,7 +32,7 @@ _RESULTS = {number: each.name.removeprefix("MAV_RESULT_").lower() for number, ea
 _ABSOLUTE_FRAMES = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
 
 
-class Observer:
+class VehicleObserver:
     """Watches the first vehicle on a link; `surroundings` is a new object after each change."""
 
     def __init__(self) -> None:
@@ -130,13 +130,13 @@ class Observer:
     def _note_events(self) -> None:
         for event in self._client.take_events():
             match event:
-                case Found(vehicle) if not self.telemetry.system:
+                case VehicleFound(vehicle) if not self.telemetry.system:
                     self.telemetry.system = vehicle.system
                     for name, interval_us in INTERVALS_US.items():
                         self._client.begin(set_message_interval(vehicle.target, name, interval_us, repeat=_REPEAT))
-                case Ended(Download() as download) if download.accepted:
+                case ConversationEnded(Download() as download) if download.accepted:
                     self._plans[download.plan] = download.items
-                case Ended(Command() as command) if self._order is not None and command is self._order[1]:
+                case ConversationEnded(Command() as command) if self._order is not None and command is self._order[1]:
                     result = command.result
                     words = "no answer" if result == UNANSWERED else _RESULTS.get(result, result)
                     self.telemetry.say(f"{self._order[0]}: {words}")

@@ -17,7 +17,7 @@ from colibri.common.files import write_bytes
 from colibri.common.process.lifecycle import Stop
 from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
-from colibri.view.observer import CHOICES, Observer
+from colibri.view.observer import CHOICES, VehicleObserver
 from colibri.view.page.page import Page
 from colibri.view.page.server import PageServer, serve
 from colibri.view.recorded.flight import RecordedFlight
@@ -136,12 +136,12 @@ def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None])
 
 
 def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
-    orders: dict[str, Callable[[Observer], None]] = {
+    orders: dict[str, Callable[[VehicleObserver], None]] = {
         "arm": lambda observer: observer.arm(True),
         "disarm": lambda observer: observer.arm(False),
         "take off": lambda observer: observer.take_off(value),
-        "land": Observer.land,
-        "return": Observer.return_home,
+        "land": VehicleObserver.land,
+        "return": VehicleObserver.return_home,
         "mode": lambda observer: observer.set_mode(value),
         "go to": lambda observer: observer.go_to(value),
     }

@@ -18,7 +18,7 @@ class ViewError(Error):
     """Data that cannot be shown."""
 
 
-class Airframe(NamedTuple):
+class VehicleShape(NamedTuple):
     """The geometry of a vehicle with four rotors.
 
     Attributes:
@@ -124,7 +124,7 @@ class Source(Protocol):
     """
 
     name: str
-    airframe: Airframe
+    airframe: VehicleShape
 
     @property
     def is_live(self) -> bool: ...

@@ -46,7 +46,7 @@ _EVENTS = 1000
 Talk = TypeVar("Talk", bound=Conversation)
 
 
-class Vehicle(NamedTuple):
+class RemoteVehicle(NamedTuple):
     """Identity of a vehicle."""
 
     system: int
@@ -62,25 +62,25 @@ class Vehicle(NamedTuple):
         return self.system, AUTOPILOT_COMPONENT
 
 
-class Found(NamedTuple):
+class VehicleFound(NamedTuple):
     """A vehicle's first HEARTBEAT, or the first after it was lost."""
 
-    vehicle: Vehicle
+    vehicle: RemoteVehicle
 
 
-class Lost(NamedTuple):
+class VehicleLost(NamedTuple):
     """A vehicle has been silent for `LOST_AFTER_US`."""
 
-    vehicle: Vehicle
+    vehicle: RemoteVehicle
 
 
-class Ended(NamedTuple):
+class ConversationEnded(NamedTuple):
     """A conversation has its result."""
 
     conversation: Conversation
 
 
-Event: TypeAlias = Found | Lost | Ended
+Event: TypeAlias = VehicleFound | VehicleLost | ConversationEnded
 
 
 class Client:
@@ -98,7 +98,7 @@ class Client:
     ) -> None:
         """Create a component of MAV_TYPE `kind`; by default it receives all systems, but only autopilots."""
         self.source = (system, component)  # own system and component id
-        self.vehicles: dict[int, Vehicle] = {}  # by system id
+        self.vehicles: dict[int, RemoteVehicle] = {}  # by system id
         self._codec = Codec(system, component)
         self.dropped: Counter[str] = self._codec.dropped  # invalid input, by reason
         self._heartbeat_every_us = heartbeat_every_us
@@ -110,7 +110,7 @@ class Client:
         self._events: deque[Event] = deque(maxlen=_EVENTS)
 
     @property
-    def vehicle(self) -> Vehicle | None:
+    def vehicle(self) -> RemoteVehicle | None:
         return next(iter(self.vehicles.values()), None)
 
     def sign_with(self, signing: Signing | None) -> None:
@@ -164,7 +164,7 @@ class Client:
         for system, vehicle in self.vehicles.items():
             if not vehicle.lost and now_us - vehicle.heartbeat_us > LOST_AFTER_US:
                 self.vehicles[system] = lost = vehicle._replace(lost=True)
-                self._events.append(Lost(lost))
+                self._events.append(VehicleLost(lost))
         return datagrams
 
     def poll_requests(self, now_us: int) -> list[bytes]:
@@ -190,12 +190,12 @@ class Client:
                 uid2 = bytes(fields.uid2)
                 self.vehicles[system] = known._replace(capabilities=int(fields.capabilities), uid2=uid2)
         elif fields.autopilot != AUTOPILOT_INVALID:
-            met = Vehicle(system, fields.autopilot, fields.type, now_us)
+            met = RemoteVehicle(system, fields.autopilot, fields.type, now_us)
             if known is not None:
                 met = met._replace(capabilities=known.capabilities, uid2=known.uid2)
             self.vehicles[system] = met
             if known is None or known.lost:
-                self._events.append(Found(met))
+                self._events.append(VehicleFound(met))
 
     def _converse(self, message: Message, now_us: int) -> None:
         for conversation in [lane[0] for lane in self._lanes.values()]:
@@ -216,4 +216,4 @@ class Client:
     def _retire(self, conversation: Conversation) -> None:
         if conversation.result is not None:
             self.cancel(conversation)
-            self._events.append(Ended(conversation))
+            self._events.append(ConversationEnded(conversation))

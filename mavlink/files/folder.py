@@ -13,7 +13,7 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Names, Quota, Reading, can_be_new
+from colibri.mavlink.files.tree import Entry, FileRefusal, Names, OpenFile, Quota, can_be_new
 
 DEFAULT_QUOTA = Quota(64 << 20, 1000)
 
@@ -82,9 +82,9 @@ class Folder:
             return sorted(entry for entry in map(_entry_of, found) if entry is not None)
 
     @_refusing
-    def open(self, names: Names) -> Reading:
+    def open(self, names: Names) -> OpenFile:
         with self._open_file(names, os.O_RDONLY) as file:
-            return Reading(os.fstat(file).st_size, partial(self._read, names))
+            return OpenFile(os.fstat(file).st_size, partial(self._read, names))
 
     @_refusing
     def create(self, names: Names) -> None:

@@ -17,7 +17,7 @@ from zlib import crc32
 from colibri.mavlink.files.ftp_wire import (
     DATA_BYTES,
     SIZE,
-    Error,
+    FtpError,
     Key,
     Nak,
     Opcode,
@@ -27,7 +27,7 @@ from colibri.mavlink.files.ftp_wire import (
     path_in,
     request_of,
 )
-from colibri.mavlink.files.tree import ENTRY_US, FileRefusal, Files, Names, Reading
+from colibri.mavlink.files.tree import ENTRY_US, FileRefusal, Files, Names, OpenFile
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
@@ -59,14 +59,14 @@ class _Session:
     """An open file, for reading if `reading` is set, otherwise for writing."""
 
     names: Names
-    reading: Reading | None
+    reading: OpenFile | None
     used_us: int
 
 
 @dataclass(slots=True)
 class _Burst:
     request: Request
-    reading: Reading
+    reading: OpenFile
     packets_left: int = MAX_BURST_PACKETS
 
 
@@ -74,7 +74,7 @@ class _Burst:
 class _Checksum:
     request: Request
     names: Names
-    reading: Reading
+    reading: OpenFile
     done: int = 0
     register: int = _UINT32_MAX
 
@@ -117,9 +117,9 @@ class Ftp:
         if request.opcode in (Opcode.ACK, Opcode.NAK):  # of another server, and to answer it would begin a quarrel
             return ()
         self._forget(now_us)
-        outcome: Outcome = Nak(Error.UNKNOWN_COMMAND)
+        outcome: Outcome = Nak(FtpError.UNKNOWN_COMMAND)
         if request.size > DATA_BYTES:
-            outcome = Nak(Error.INVALID_DATA_SIZE)
+            outcome = Nak(FtpError.INVALID_DATA_SIZE)
         elif request.opcode in self._change:
             return (self._changed(request),)
         elif request.opcode in self._obey:
@@ -191,7 +191,7 @@ class Ftp:
             return found
         self._budget.spend(PATH_US + ENTRY_US * len(found))
         if request.offset >= len(found):
-            return Nak(Error.END_OF_FILE)
+            return Nak(FtpError.END_OF_FILE)
         data = b""
         for entry in found[request.offset :]:
             line = line_of(entry, with_time=request.opcode == Opcode.LIST_WITH_TIME)
@@ -222,22 +222,22 @@ class Ftp:
             or b""
         )
 
-    def _opened(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
+    def _opened(self, request: Request, names: Names, reading: OpenFile | None) -> Nak | None:
         refused = self._no_session(request, names, reading)
         if refused is None:
             self._close(request.key)
             self._sessions[request.key] = _Session(names, reading, request.now_us)
         return refused
 
-    def _no_session(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
+    def _no_session(self, request: Request, names: Names, reading: OpenFile | None) -> Nak | None:
         session = self._sessions.get(request.key)
         if session is not None:
             again = session.names == names and (session.reading is None) == (reading is None)
             idle_us = request.now_us - session.used_us
-            return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(Error.NO_SESSIONS)
+            return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(FtpError.NO_SESSIONS)
         of_peer = sum(peer == request.peer for peer, _ in self._sessions)
         full = len(self._sessions) >= MAX_SESSIONS or of_peer >= MAX_SESSIONS_OF_A_PEER
-        return Nak(Error.NO_SESSIONS) if full else None
+        return Nak(FtpError.NO_SESSIONS) if full else None
 
     def _used(self, request: Request) -> _Session | None:
         session = self._sessions.get(request.key)
@@ -249,19 +249,19 @@ class Ftp:
         """Read part of a file; a burst continues meanwhile, as clients fill its gaps like this."""
         session = self._used(request)
         if session is None or session.reading is None:
-            return Nak(Error.INVALID_SESSION)
+            return Nak(FtpError.INVALID_SESSION)
         count = min(request.size or DATA_BYTES, session.reading.size - request.offset)
         if count <= 0:
-            return Nak(Error.END_OF_FILE)
-        return session.reading.read(request.offset, count) or Nak(Error.END_OF_FILE)
+            return Nak(FtpError.END_OF_FILE)
+        return session.reading.read(request.offset, count) or Nak(FtpError.END_OF_FILE)
 
     def _begin_burst(self, request: Request) -> Outcome:
         session = self._used(request)
         if session is None or session.reading is None:
-            return Nak(Error.INVALID_SESSION)
+            return Nak(FtpError.INVALID_SESSION)
         self._bursts.pop(request.key, None)
         if request.offset >= session.reading.size:
-            return Nak(Error.END_OF_FILE)
+            return Nak(FtpError.END_OF_FILE)
         self._bursts[request.key] = _Burst(request, session.reading)
         return None
 
@@ -271,7 +271,7 @@ class Ftp:
         data = burst.reading.read(burst.request.offset, wanted)
         if isinstance(data, FileRefusal) or not data:  # removed, or cut, since it was opened
             burst.packets_left = 0
-            yield answer(burst.request, data or Nak(Error.END_OF_FILE))
+            yield answer(burst.request, data or Nak(FtpError.END_OF_FILE))
             return
         for start in range(0, len(data), size):
             request, part = burst.request, data[start : start + size]
@@ -286,9 +286,9 @@ class Ftp:
     def _write(self, request: Request) -> Outcome:
         session = self._used(request)
         if session is None:
-            return Nak(Error.INVALID_SESSION)
+            return Nak(FtpError.INVALID_SESSION)
         if session.reading is not None:
-            return Nak(Error.PROTECTED)
+            return Nak(FtpError.PROTECTED)
         return self._files.write(session.names, request.offset, request.data) or b""
 
     def _truncate(self, request: Request, names: Names) -> Outcome:
@@ -296,7 +296,7 @@ class Ftp:
         if isinstance(reading, FileRefusal):
             return reading
         if request.offset > reading.size:
-            return Nak(Error.END_OF_FILE)
+            return Nak(FtpError.END_OF_FILE)
         return self._files.truncate(names, request.offset) or b""
 
     def _rename(self, request: Request, old: Names) -> Outcome:
@@ -305,7 +305,7 @@ class Ftp:
         if isinstance(new, FileRefusal):
             return new
         if not new:
-            return Nak(Error.INVALID_DATA_SIZE)
+            return Nak(FtpError.INVALID_DATA_SIZE)
         return self._files.rename(old, new) or b""
 
     def _begin_checksum(self, request: Request, names: Names) -> Outcome:
@@ -317,7 +317,7 @@ class Ftp:
         if isinstance(reading, FileRefusal):
             return reading
         if len(self._checksums) >= MAX_SESSIONS:
-            return Nak(Error.NO_SESSIONS)
+            return Nak(FtpError.NO_SESSIONS)
         checksum = _Checksum(request, names, reading)
         outcome = _sum(checksum)
         if outcome is None:

@@ -39,7 +39,7 @@ class Opcode(IntEnum):
     NAK = 129
 
 
-class Error(IntEnum):
+class FtpError(IntEnum):
     """Reason of a refusal."""
 
     FAIL_ERRNO = 2
@@ -82,20 +82,20 @@ class Request(NamedTuple):
 class Nak(NamedTuple):
     """A refusal; errno with FAIL_ERRNO."""
 
-    error: Error
+    error: FtpError
     errno: int = 0
 
 
 _NAKS = {
-    FileRefusal.NOT_FOUND: Nak(Error.NOT_FOUND),
-    FileRefusal.EXISTS: Nak(Error.EXISTS),
-    FileRefusal.PROTECTED: Nak(Error.PROTECTED),
-    FileRefusal.NO_SPACE: Nak(Error.FAIL_ERRNO, ENOSPC),
-    FileRefusal.IS_FOLDER: Nak(Error.FAIL_ERRNO, EISDIR),
-    FileRefusal.NOT_A_FOLDER: Nak(Error.FAIL_ERRNO, ENOTDIR),
-    FileRefusal.NOT_EMPTY: Nak(Error.FAIL_ERRNO, ENOTEMPTY),
-    FileRefusal.BAD_NAME: Nak(Error.FAIL_ERRNO, EINVAL),
-    FileRefusal.FAILED: Nak(Error.FAIL_ERRNO, EIO),
+    FileRefusal.NOT_FOUND: Nak(FtpError.NOT_FOUND),
+    FileRefusal.EXISTS: Nak(FtpError.EXISTS),
+    FileRefusal.PROTECTED: Nak(FtpError.PROTECTED),
+    FileRefusal.NO_SPACE: Nak(FtpError.FAIL_ERRNO, ENOSPC),
+    FileRefusal.IS_FOLDER: Nak(FtpError.FAIL_ERRNO, EISDIR),
+    FileRefusal.NOT_A_FOLDER: Nak(FtpError.FAIL_ERRNO, ENOTDIR),
+    FileRefusal.NOT_EMPTY: Nak(FtpError.FAIL_ERRNO, ENOTEMPTY),
+    FileRefusal.BAD_NAME: Nak(FtpError.FAIL_ERRNO, EINVAL),
+    FileRefusal.FAILED: Nak(FtpError.FAIL_ERRNO, EIO),
 }
 
 

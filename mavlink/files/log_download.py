@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from colibri.mavlink.files.tree import ENTRY_US, Entry, FileRefusal, Files, Names, Reading
+from colibri.mavlink.files.tree import ENTRY_US, Entry, FileRefusal, Files, Names, OpenFile
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.wire.dialect import Message
@@ -29,7 +29,7 @@ _UINT32_MAX = 0xFFFFFFFF
 
 
 @dataclass(slots=True)
-class _Listing:
+class _LogListing:
     peer: Peer
     next: int
     last: int
@@ -39,7 +39,7 @@ class _Listing:
 class _Transfer:
     peer: Peer
     id: int
-    reading: Reading
+    reading: OpenFile
     offset: int
     end: int
 
@@ -60,7 +60,7 @@ class Logs:
         self._folder = folder
         self._being_written = being_written
         self._shown: dict[Peer, list[Entry]] = {}
-        self._listings: dict[Peer, _Listing] = {}
+        self._listings: dict[Peer, _LogListing] = {}
         self._transfers: deque[_Transfer] = deque()
         self._erasing: dict[str, None] = {}
 
@@ -98,10 +98,10 @@ class Logs:
         logs = self._look(peer)
         if not logs:  # "answered with one LOG_ENTRY message with id = 0 and num_logs = 0"
             return (to(peer, "LOG_ENTRY", 0, 0, 0, 0, 0),)
-        self._listings[peer] = _Listing(peer, start, min(end, len(logs) - 1))
+        self._listings[peer] = _LogListing(peer, start, min(end, len(logs) - 1))
         return ()
 
-    def _entries(self, listing: _Listing, at_most: int) -> Iterator[Send]:
+    def _entries(self, listing: _LogListing, at_most: int) -> Iterator[Send]:
         logs = self._shown.get(listing.peer, ())
         last = min(listing.last, len(logs) - 1)
         until = min(last + 1, listing.next + at_most)

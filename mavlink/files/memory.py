@@ -2,12 +2,12 @@
 
 from functools import partial
 
-from colibri.mavlink.files.tree import Entry, FileRefusal, Names, Quota, Reading, can_be_new
+from colibri.mavlink.files.tree import Entry, FileRefusal, Names, OpenFile, Quota, can_be_new
 
 DEFAULT_QUOTA = Quota(8 << 20, 1000)
 
 
-class Memory:
+class MemoryFiles:
     """Files in memory, see `Files`."""
 
     def __init__(self, quota: Quota = DEFAULT_QUOTA) -> None:
@@ -23,8 +23,8 @@ class Memory:
         found += [Entry(path[-1], False, len(data)) for path, data in self._files.items() if path[:-1] == names]
         return sorted(found)
 
-    def open(self, names: Names) -> Reading | FileRefusal:
-        return self._no_file(names) or Reading(len(self._files[names]), partial(self._read, names))
+    def open(self, names: Names) -> OpenFile | FileRefusal:
+        return self._no_file(names) or OpenFile(len(self._files[names]), partial(self._read, names))
 
     def create(self, names: Names) -> FileRefusal | None:
         if names in self._files:

@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     modified_s: int = 0  # Unix time; 0 if unknown
 
 
-class Reading(NamedTuple):
+class OpenFile(NamedTuple):
     """A file open for reading."""
 
     size: int  # bytes when opened
@@ -58,7 +58,7 @@ class Files(Protocol):
 
     def list(self, names: Names) -> list[Entry] | FileRefusal: ...
 
-    def open(self, names: Names) -> Reading | FileRefusal: ...
+    def open(self, names: Names) -> OpenFile | FileRefusal: ...
 
     def create(self, names: Names) -> FileRefusal | None:
         """Create an empty file, or empty an existing one."""
@@ -98,8 +98,8 @@ def _fits(name: str) -> bool:
     return len(name.encode(errors="surrogatepass")) <= MAX_NAME_BYTES
 
 
-def reading_of(data: bytes) -> Reading:
-    return Reading(len(data), lambda offset, count: data[offset : offset + count])
+def reading_of(data: bytes) -> OpenFile:
+    return OpenFile(len(data), lambda offset, count: data[offset : offset + count])
 
 
 Generator: TypeAlias = Callable[[str], bytes]
@@ -136,7 +136,7 @@ class Tree:
         entries |= {entry.name: entry for entry in self._fixed_in(names)}
         return [entries[name] for name in sorted(entries)]
 
-    def open(self, names: Names) -> Reading | FileRefusal:
+    def open(self, names: Names) -> OpenFile | FileRefusal:
         if names:
             name, _, query = names[-1].partition("?")
             generator = self._generated.get((*names[:-1], name))

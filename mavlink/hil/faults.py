@@ -40,7 +40,7 @@ _ROUNDING = 1e-6
 _NOT_GIVEN: FourRotors = (0.0, 0.0, 0.0, 0.0)
 
 
-class Part(StrEnum):
+class Equipment(StrEnum):
     """Equipment that a fault requires of the plant."""
 
     ROTORS = "rotors"
@@ -69,12 +69,12 @@ class Value(NamedTuple):
     rest: float  # if only others are given
 
 
-class Row(NamedTuple):
+class FaultRow(NamedTuple):
     """A kind of fault; `values` from param4 on."""
 
     unit: int
     kind: int
-    part: Part
+    part: Equipment
     meaning: str
     values: tuple[Value, ...] = ()
     instances: int = 1  # number of units
@@ -90,21 +90,23 @@ def _vector(name: str, unit: str, axes: str, maximum: float, usual: tuple[float,
     )
 
 
-def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value, what: str) -> tuple[Row, ...]:
+def _sensor(
+    unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value, what: str
+) -> tuple[FaultRow, ...]:
     late = _scalar("late by", "s", 0.001, 10.0, 0.2)
-    part = Part.SENSORS
+    part = Equipment.SENSORS
     return (
-        Row(unit, OK, part, "is well again"),
-        Row(unit, OFF, part, "measures nothing new"),
-        Row(unit, STUCK, part, "reports its last value again and again, as if it were new"),
-        Row(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
-        Row(unit, WRONG, part, f"is off by {what}", wrong),
-        Row(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
-        Row(unit, DELAYED, part, "reports later", (late,)),
+        FaultRow(unit, OK, part, "is well again"),
+        FaultRow(unit, OFF, part, "measures nothing new"),
+        FaultRow(unit, STUCK, part, "reports its last value again and again, as if it were new"),
+        FaultRow(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
+        FaultRow(unit, WRONG, part, f"is off by {what}", wrong),
+        FaultRow(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
+        FaultRow(unit, DELAYED, part, "reports later", (late,)),
     )
 
 
-ROWS: tuple[Row, ...] = (
+ROWS: tuple[FaultRow, ...] = (
     *_sensor(
         GYROSCOPE,
         _vector("bias", "rad/s", "xyz", 20.0, (0.1, 0.0, 0.0)),
@@ -147,25 +149,27 @@ ROWS: tuple[Row, ...] = (
         _scalar("standard deviation", "m", 0.001, 100.0, 0.5),
         "a distance",
     ),
-    Row(BATTERY, OK, Part.BATTERY, "is well again, and has back what a fault took"),
-    Row(BATTERY, OFF, Part.BATTERY, "is empty: its voltage falls to that of no charge"),
-    Row(
-        *(BATTERY, WRONG, Part.BATTERY, "sags: less charge, and the voltage with it; a larger resistance"),
+    FaultRow(BATTERY, OK, Equipment.BATTERY, "is well again, and has back what a fault took"),
+    FaultRow(BATTERY, OFF, Equipment.BATTERY, "is empty: its voltage falls to that of no charge"),
+    FaultRow(
+        *(BATTERY, WRONG, Equipment.BATTERY, "sags: less charge, and the voltage with it; a larger resistance"),
         values=(
             Value("part of the full charge that is left", "1", 1e-3, 1.0, 0.2, 0.2),
             Value("times its resistance", "1", 0.1, 10.0, 1.0, 1.0),
         ),
     ),
-    Row(MOTOR, OK, Part.ROTORS, "is well again", instances=MOTORS),
-    Row(MOTOR, OFF, Part.ROTORS, "is lost: nothing drives it, it runs down", instances=MOTORS),
-    Row(MOTOR, STUCK, Part.ROTORS, "turns as fast as at this moment, whatever is commanded", instances=MOTORS),
-    Row(
-        *(MOTOR, WRONG, Part.ROTORS, "is weak: has a part of its thrust and torque"),
+    FaultRow(MOTOR, OK, Equipment.ROTORS, "is well again", instances=MOTORS),
+    FaultRow(MOTOR, OFF, Equipment.ROTORS, "is lost: nothing drives it, it runs down", instances=MOTORS),
+    FaultRow(
+        MOTOR, STUCK, Equipment.ROTORS, "turns as fast as at this moment, whatever is commanded", instances=MOTORS
+    ),
+    FaultRow(
+        *(MOTOR, WRONG, Equipment.ROTORS, "is weak: has a part of its thrust and torque"),
         values=(_scalar("part that is left", "1", 1e-3, 1.0, 0.65),),
         instances=MOTORS,
     ),
 )
-TABLE: Mapping[tuple[int, int], Row] = {(row.unit, row.kind): row for row in ROWS}
+TABLE: Mapping[tuple[int, int], FaultRow] = {(row.unit, row.kind): row for row in ROWS}
 """All faults that a plant may support."""
 
 
@@ -184,13 +188,13 @@ def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | N
     return Fault(int(p1), int(p2), int(p3), values)
 
 
-def judged(fault: Fault, parts: Collection[Part]) -> Fault | Refusal:
+def judged(fault: Fault, parts: Collection[Equipment]) -> Fault | Refusal:
     """Return a fault with all its numbers, or the refusal for a plant with these `parts`."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
         return Refusal("no plant does this fault", RESULT_UNSUPPORTED)
     if row.part not in parts:
-        without = "flown by the state, not by sensors" if row.part is Part.SENSORS else f"no {row.part} to fail"
+        without = "flown by the state, not by sensors" if row.part is Equipment.SENSORS else f"no {row.part} to fail"
         return Refusal(without, RESULT_UNSUPPORTED)
     if not 0 <= fault.instance <= row.instances:
         return Refusal(f"instance must be 0 to {row.instances}")
@@ -206,7 +210,7 @@ def decode_fault(fields: Any) -> Fault | None:
     return fault_from(fields.param1, fields.param2, fields.param3, values)
 
 
-def _with_values(row: Row, fault: Fault) -> Fault | Refusal:
+def _with_values(row: FaultRow, fault: Fault) -> Fault | Refusal:
     given = [0.0 if isnan(value) else value for value in fault.values[: len(row.values)]]
     some = any(given)
     taken = [value or (it.rest if some else it.usual) for value, it in zip(given, row.values, strict=True)]

@@ -43,7 +43,7 @@ from colibri.mavlink.wire.dialect import Codec, Message
 _WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD})
 
 
-class Outgoing(NamedTuple):
+class PlantDatagram(NamedTuple):
     """A datagram, as its frames, and its destination."""
 
     frames: tuple[bytes, ...]
@@ -85,7 +85,7 @@ class PlantEnd:
         self._battery: PlantBattery | None = None
         self._faults: list[Fault | WorldChange] = []
         self._resend_at_s = 0.0
-        self._outbox: list[Outgoing] = []
+        self._outbox: list[PlantDatagram] = []
 
     def sends_battery(self, time_us: int) -> bool:
         return time_us % BATTERY_EVERY_US == 0
@@ -163,14 +163,14 @@ class PlantEnd:
             self._send_frame(now_s)
         return self._resend_at_s
 
-    def take_outbox(self) -> list[Outgoing]:
+    def take_outbox(self) -> list[PlantDatagram]:
         outbox, self._outbox = self._outbox, []
         return outbox
 
     def _send_frame(self, now_s: float) -> None:
         self._resend_at_s = now_s + RESEND_AFTER_S
         if self.peer is not None:
-            self._outbox.append(Outgoing(self._frames, self.peer))
+            self._outbox.append(PlantDatagram(self._frames, self.peer))
 
     def _receive_heartbeat(self, sender: Address, now_s: float) -> None:
         if sender == self.peer:
@@ -213,7 +213,7 @@ class PlantEnd:
         if feedback in self._serves:
             result = self._set_frames(feedback, fields.param2)
         ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)
-        self._outbox.append(Outgoing((ack,), sender))
+        self._outbox.append(PlantDatagram((ack,), sender))
 
     def _set_frames(self, feedback: Feedback, interval_us: float) -> int:
         whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0

@@ -40,21 +40,21 @@ class MissionItem(NamedTuple):
     z: float  # altitude, m, or parameter seven
 
 
-class Plan(NamedTuple):
+class StoredPlan(NamedTuple):
     """The stored items of one type; the opaque id changes with them."""
 
     items: tuple[MissionItem, ...] = ()
     id: int = 0
 
 
-NO_PLAN = Plan()
+NO_PLAN = StoredPlan()
 
 
-def plan_of(items: Sequence[MissionItem]) -> Plan:
+def plan_of(items: Sequence[MissionItem]) -> StoredPlan:
     """Return the plan of these items. Its id is their CRC-32, or 1 if that is 0."""
     if not items:
         return NO_PLAN
-    return Plan(tuple(items), crc32(b"".join(_PACKED.pack(*item) for item in items)) or 1)
+    return StoredPlan(tuple(items), crc32(b"".join(_PACKED.pack(*item) for item in items)) or 1)
 
 
 def item_of(message_name: str, fields: Any) -> MissionItem | int:

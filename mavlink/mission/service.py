@@ -17,13 +17,13 @@ from colibri.mavlink.mission.items import (
     PLAN_TYPES,
     RALLY,
     MissionItem,
-    Plan,
+    StoredPlan,
     item_fields,
     plan_of,
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
-from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, Command
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, ReceivedCommand
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -39,7 +39,7 @@ MAX_READERS = 32
 
 
 class _Reading(NamedTuple):
-    plan: Plan
+    plan: StoredPlan
     received_us: int
 
 
@@ -49,12 +49,12 @@ class Downloads:
     def __init__(self) -> None:
         self._readings: dict[tuple[Peer, int], _Reading] = {}
 
-    def begin(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> Send:
+    def begin(self, peer: Peer, plan_type: int, plan: StoredPlan, now_us: int) -> Send:
         self._remember(peer, plan_type, plan, now_us)
         target = (peer.system, peer.component)
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
-    def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
+    def item(self, peer: Peer, plan_type: int, seq: int, newest: StoredPlan, current: int, now_us: int) -> Send:
         """Return an item, also for the deprecated MISSION_REQUEST as MISSION_ITEM_INT."""
         reading = self._readings.get((peer, plan_type))
         plan = newest
@@ -69,7 +69,7 @@ class Downloads:
     def end(self, peer: Peer, plan_type: int) -> None:
         self._readings.pop((peer, plan_type), None)
 
-    def _remember(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> None:
+    def _remember(self, peer: Peer, plan_type: int, plan: StoredPlan, now_us: int) -> None:
         self._readings.pop((peer, plan_type), None)
         if plan is not NO_PLAN:
             self._readings[peer, plan_type] = _Reading(plan, now_us)
@@ -77,7 +77,7 @@ class Downloads:
             del self._readings[next(iter(self._readings))]
 
 
-class Progress(NamedTuple):
+class MissionProgress(NamedTuple):
     """Progress of the mission."""
 
     seq: int = 0
@@ -88,11 +88,11 @@ class Progress(NamedTuple):
 Receiver: TypeAlias = Callable[[Any, Peer, int], Iterable[Send]]
 
 
-class Vehicle(NamedTuple):
+class MissionVehicle(NamedTuple):
     """The service's interface to the vehicle."""
 
-    load: Callable[[int, Plan], None]  # (plan type, plan)
-    progress: Callable[[], Progress]  # called at every poll
+    load: Callable[[int, StoredPlan], None]  # (plan type, plan)
+    progress: Callable[[], MissionProgress]  # called at every poll
     set_current: Callable[[int, bool], Refusal | None]  # (seq or -1 for the current, reset the counters)
     guided_goto: Callable[[float, float, float, int], Refusal | None]  # (degrees, degrees, m, MAV_FRAME)
 
@@ -100,15 +100,15 @@ class Vehicle(NamedTuple):
 class MissionService:
     """Holds the three plans and serves the mission protocol: one method per message."""
 
-    def __init__(self, rules: Mapping[int, Rules], vehicle: Vehicle, text: StatusText) -> None:
-        self.plans: dict[int, Plan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
+    def __init__(self, rules: Mapping[int, Rules], vehicle: MissionVehicle, text: StatusText) -> None:
+        self.plans: dict[int, StoredPlan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
         self._vehicle = vehicle
         self._progress = vehicle.progress
         self._text = text
         self._uploads = Uploads(rules, self.load)
         self._downloads = Downloads()
         self._outbox: list[Send] = []
-        self._shown: Progress | None = None
+        self._shown: MissionProgress | None = None
         self._stream_us = self._due_us = 0
         self._receivers: dict[str, Receiver] = {
             "MISSION_COUNT": self._count,
@@ -160,14 +160,14 @@ class MissionService:
         """Hold plans kept over a restart, without loading them into the vehicle."""
         self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
 
-    def load(self, plan_type: int, items: Sequence[MissionItem]) -> Plan:
+    def load(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
         plan = plan_of(items)
         self.plans[plan_type] = plan
         self._vehicle.load(plan_type, plan)
         self._announce()
         return plan
 
-    def do_set_mission_current(self, command: Command) -> Refusal | None:
+    def do_set_mission_current(self, command: ReceivedCommand) -> Refusal | None:
         seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
         if not (-1.0 <= seq <= 0xFFFF and seq == int(seq)):
             return Refusal("mission: not a sequence number")

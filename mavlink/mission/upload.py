@@ -12,7 +12,7 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, Plan, item_of
+from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, StoredPlan, item_of
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.wire.dialect import Message, mav
 
@@ -82,7 +82,7 @@ class _Upload:
 class Uploads:
     """The uploads in progress, at most one per type and per ground station."""
 
-    def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], Plan]) -> None:
+    def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], StoredPlan]) -> None:
         self._rules = rules
         self._store = store
         self._under_way: dict[int, _Upload] = {}

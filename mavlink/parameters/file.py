@@ -4,7 +4,7 @@ A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, separated by
 """
 
 from colibri.mavlink.errors import MavlinkError
-from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parameters, Value, float32
+from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, float32
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 
 _COLUMNS = 5
@@ -65,7 +65,7 @@ def _value(parameter: Parameter, text: str, kind: str) -> Value:
         raise ValueError(f"its type is {parameter.kind.value}, not {kind!r}")
     value: Value
     try:
-        value = int(text) if parameter.kind == Kind.INT else float32(float(text))
+        value = int(text) if parameter.kind == ParamType.INT else float32(float(text))
     except ValueError:
         raise ValueError(f"no number: {text!r}") from None
     if parameter.refusal(value) == ParamError.VALUE_OUT_OF_RANGE:
@@ -80,4 +80,4 @@ def _choices(parameter: Parameter) -> str:
 
 
 def _text(parameter: Parameter, value: Value) -> str:
-    return str(value) if parameter.kind == Kind.INT else f"{value:.9g}"
+    return str(value) if parameter.kind == ParamType.INT else f"{value:.9g}"

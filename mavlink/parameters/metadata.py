@@ -10,7 +10,7 @@ from zlib import crc32
 
 from colibri.mavlink.files.tree import Generator
 from colibri.mavlink.node.service import Peer, Send, to
-from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Parameter, ParamType
 
 GENERAL = "general.json"
 PARAMETERS = "parameter.json"
@@ -18,7 +18,7 @@ TYPE_PARAMETER = 1
 """COMP_METADATA_TYPE_PARAMETER."""
 
 _VERSION = 1
-_TYPES = {Kind.INT: "Int32", Kind.REAL: "Float"}
+_TYPES = {ParamType.INT: "Int32", ParamType.REAL: "Float"}
 _UINT32_MAX = 0xFFFFFFFF
 
 
@@ -64,7 +64,7 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
         entry["min"] = _shortest(parameter, parameter.minimum)
     if parameter.maximum not in (INT32_MAX, FLOAT32_MAX):
         entry["max"] = _shortest(parameter, parameter.maximum)
-    if parameter.kind == Kind.REAL:
+    if parameter.kind == ParamType.REAL:
         entry["decimalPlaces"] = parameter.decimals
         entry["increment"] = float(f"1e-{min(parameter.decimals, 2)}")
     if parameter.values:
@@ -78,4 +78,4 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 
 def _shortest(parameter: Parameter, value: float) -> float:
     """Return the number before its rounding to 32 bits, if seven digits suffice."""
-    return value if parameter.kind == Kind.INT else float(f"{value:.7g}")
+    return value if parameter.kind == ParamType.INT else float(f"{value:.7g}")

@@ -2,7 +2,7 @@
 
 from struct import Struct
 
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, bits_of
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, bits_of
 
 BLOCK_BYTES = 239
 """Read size of clients: a value must not cross a block boundary."""
@@ -10,7 +10,7 @@ BLOCK_BYTES = 239
 _HEADER = Struct("<HHH")
 """Magic, parameters in this file, parameters in all."""
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
-_TYPES = {Kind.INT: 3, Kind.REAL: 4}
+_TYPES = {ParamType.INT: 3, ParamType.REAL: 4}
 _HAS_DEFAULT = 0x10
 _VALUE_BYTES = 4
 _MAX_COMMON_CHARS = 15

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
-from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parameters, Value, bits_of, value_of
+from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, bits_of, value_of
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
 INTERVAL_US = 2_000
@@ -123,9 +123,9 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamErr
     Clients of the packed file (MAVProxy), or without types (DroneKit), send integers as REAL32 and expect conversion
     (https://mavlink.io/en/services/parameter_ftp.html). Other types must match.
     """
-    if wire_type not in tuple(Kind):
+    if wire_type not in tuple(ParamType):
         return ParamError.TYPE_UNSUPPORTED
-    value = value_of(Kind(wire_type), bits)
+    value = value_of(ParamType(wire_type), bits)
     if wire_type == definition.kind:
         return value
     if isinstance(value, float) and value.is_integer() and abs(value) < _NOT_EXACT_IN_FLOAT:

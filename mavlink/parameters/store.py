@@ -22,7 +22,7 @@ _MAX_BATCHES = 8
 _INT, _REAL, _BITS = Struct("<i"), Struct("<f"), Struct("<I")
 
 
-class Kind(IntEnum):
+class ParamType(IntEnum):
     """MAV_PARAM_TYPE."""
 
     INT = mav.MAV_PARAM_TYPE_INT32
@@ -57,7 +57,7 @@ class Parameter:
     """Definition of a parameter. Numbers are rounded to 32 bits."""
 
     name: str  # at most 16 capitals, digits and underscores
-    kind: Kind
+    kind: ParamType
     default: Value
     minimum: Value = -FLOAT32_MAX
     maximum: Value = FLOAT32_MAX
@@ -73,7 +73,7 @@ class Parameter:
     def __post_init__(self) -> None:
         if not fullmatch(_NAME, self.name):
             raise ValueError(f"{self.name}: no name of a parameter")
-        if self.kind == Kind.INT:
+        if self.kind == ParamType.INT:
             object.__setattr__(self, "minimum", max(self.minimum, INT32_MIN))
             object.__setattr__(self, "maximum", min(self.maximum, INT32_MAX))
         else:
@@ -83,7 +83,7 @@ class Parameter:
             raise ValueError(f"{self.name}: its default {self.default} is not among the values that it may have")
 
     def refusal(self, value: Value) -> ParamError | None:
-        if self.kind == Kind.INT and not isinstance(value, int):
+        if self.kind == ParamType.INT and not isinstance(value, int):
             return ParamError.TYPE_MISMATCH
         if not isfinite(value) or not self.minimum <= value <= self.maximum:
             return ParamError.VALUE_OUT_OF_RANGE
@@ -179,7 +179,7 @@ class Parameters:
         if index is None:
             return ParamError.DOES_NOT_EXIST
         definition = self._definitions[index]
-        if definition.kind == Kind.REAL:
+        if definition.kind == ParamType.REAL:
             value = float32(value)
         if value == self._values[name] and isinstance(value, type(self._values[name])):
             return value
@@ -226,11 +226,11 @@ def float32(value: float) -> float:
     return float(rounded)
 
 
-def bits_of(kind: Kind, value: Value) -> int:
-    (bits,) = _BITS.unpack(_INT.pack(value) if kind == Kind.INT else _REAL.pack(value))
+def bits_of(kind: ParamType, value: Value) -> int:
+    (bits,) = _BITS.unpack(_INT.pack(value) if kind == ParamType.INT else _REAL.pack(value))
     return int(bits)
 
 
-def value_of(kind: Kind, bits: int) -> Value:
-    (value,) = (_INT if kind == Kind.INT else _REAL).unpack(_BITS.pack(bits))
-    return int(value) if kind == Kind.INT else float(value)
+def value_of(kind: ParamType, bits: int) -> Value:
+    (value,) = (_INT if kind == ParamType.INT else _REAL).unpack(_BITS.pack(bits))
+    return int(value) if kind == ParamType.INT else float(value)

@@ -50,7 +50,7 @@ MAX_REMEMBERED = 64
 SAME_REASON_AFTER_US = 1_000_000
 
 
-class Command(NamedTuple):
+class ReceivedCommand(NamedTuple):
     """A command, COMMAND_LONG and COMMAND_INT alike; nan in a parameter means not given."""
 
     id: int  # MAV_CMD
@@ -66,13 +66,13 @@ class Command(NamedTuple):
     now_us: int
 
 
-Handler: TypeAlias = Callable[[Command], Refusal | None]
+Handler: TypeAlias = Callable[[ReceivedCommand], Refusal | None]
 """Executes one kind of command or refuses it. Must check every parameter that it uses."""
 
 
 @dataclass(slots=True)
 class _Running:
-    command: Command
+    command: ReceivedCommand
     report_at_us: int
 
 
@@ -136,7 +136,7 @@ class CommandService:
         now_us = running.command.now_us
         return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
-    def _obey(self, handler: Handler, command: Command, confirmation: int) -> list[Send]:
+    def _obey(self, handler: Handler, command: ReceivedCommand, confirmation: int) -> list[Send]:
         """Execute a command unless it is a repetition after a lost answer, or another is in progress."""
         running = self._running.get(command.id)
         if running is not None:
@@ -157,7 +157,7 @@ class CommandService:
     def _schedule(self) -> None:
         self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
 
-    def _answered_with(self, command: Command, confirmation: int, refusal: Refusal | None, at_us: int) -> Send:
+    def _answered_with(self, command: ReceivedCommand, confirmation: int, refusal: Refusal | None, at_us: int) -> Send:
         key = (command.peer, command.id)
         self._answered.pop(key, None)
         if len(self._answered) >= MAX_REMEMBERED:
@@ -181,27 +181,27 @@ def _goes_to_a_place(number: int) -> bool:
     return definition is not None and definition.has_location
 
 
-def _from_long(fields: Any, peer: Peer, now_us: int) -> Command:
+def _from_long(fields: Any, peer: Peer, now_us: int) -> ReceivedCommand:
     numbers = (fields.param1, fields.param2, fields.param3, fields.param4, fields.param5, fields.param6, fields.param7)
-    return Command(fields.command, *numbers, None, peer, now_us)
+    return ReceivedCommand(fields.command, *numbers, None, peer, now_us)
 
 
-def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> Command:
+def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> ReceivedCommand:
     """Convert x and y of a place to degrees: "PARAM5 / global: latitude * 10^7"."""
     scale = 1.0
     if goes_to_a_place:
         scale = DEGREES if fields.frame in GLOBAL_FRAMES else nan
     x, y = (nan if number == NOT_GIVEN else number * scale for number in (fields.x, fields.y))
     numbers = (fields.param1, fields.param2, fields.param3, fields.param4, x, y, fields.z)
-    return Command(fields.command, *numbers, fields.frame, peer, now_us)
+    return ReceivedCommand(fields.command, *numbers, fields.frame, peer, now_us)
 
 
-def _parameters(command: Command) -> tuple[str, ...]:
+def _parameters(command: ReceivedCommand) -> tuple[str, ...]:
     """Return the parameters as text, so that nan equals itself."""
     return tuple(map(repr, command[1:9]))
 
 
-def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bool:
+def _is_sent_again(command: ReceivedCommand, confirmation: int, before: _Answered) -> bool:
     recent = 0 <= command.now_us - before.at_us < REMEMBERED_FOR_US
     return recent and confirmation > before.confirmation and before.parameters == _parameters(command)
 

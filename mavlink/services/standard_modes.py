@@ -5,7 +5,7 @@ from math import isnan
 from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import Fields, Send, to
-from colibri.mavlink.services.command import FAILED, Command, Handler
+from colibri.mavlink.services.command import FAILED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -23,7 +23,7 @@ class ModeInfo(NamedTuple):
     advanced: bool = False  # "harder to fly"
 
 
-SetMode: TypeAlias = Callable[[int, Command], Refusal | None]
+SetMode: TypeAlias = Callable[[int, ReceivedCommand], Refusal | None]
 """Sets the given custom mode for a command."""
 
 
@@ -37,7 +37,7 @@ class StandardModes:
     def handlers(self) -> dict[int, Handler]:
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
 
-    def available_modes(self, command: Command) -> list[Send] | Refusal:
+    def available_modes(self, command: ReceivedCommand) -> list[Send] | Refusal:
         """Answer REQUEST_MESSAGE of AVAILABLE_MODES: param2 is an index from 1, or 0 for all modes."""
         index = 0.0 if isnan(command.p2) else command.p2
         numbers = range(1, len(self._modes) + 1)
@@ -47,7 +47,7 @@ class StandardModes:
             return Refusal()
         return [to(command.peer, "AVAILABLE_MODES", *self._fields(int(index)))]
 
-    def monitor(self, command: Command) -> list[Send]:
+    def monitor(self, command: ReceivedCommand) -> list[Send]:
         return [to(command.peer, "AVAILABLE_MODES_MONITOR", 0)]
 
     def _fields(self, index: int) -> Fields:
@@ -57,7 +57,7 @@ class StandardModes:
         name = mode.name.encode()[:NAME_BYTES]
         return (len(self._modes), index, mode.standard_mode, mode.custom_mode, properties, name)
 
-    def _set_standard_mode(self, command: Command) -> Refusal | None:
+    def _set_standard_mode(self, command: ReceivedCommand) -> Refusal | None:
         for mode in self._modes:
             if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
                 return self._set_mode(mode.custom_mode, command)

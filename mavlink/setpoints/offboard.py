@@ -24,7 +24,7 @@ from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
-from colibri.mavlink.telemetry.snapshot import Home
+from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
@@ -82,7 +82,7 @@ class Whereabouts(NamedTuple):
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0
     origin: Geodetic = DEFAULT_ORIGIN
-    home: Home | None = None
+    home: HomePosition | None = None
 
 
 def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
@@ -250,7 +250,7 @@ class Offboard(StreamedService[OffboardSetpoint]):
         super().__init__()
         self._here = Whereabouts()
 
-    def update(self, position_enu_m: Vector, yaw_rad: float, origin: Geodetic, home: Home | None) -> None:
+    def update(self, position_enu_m: Vector, yaw_rad: float, origin: Geodetic, home: HomePosition | None) -> None:
         self._here = Whereabouts(position_enu_m, yaw_rad, origin, home)
 
     def latest(self, now_us: int, timeout_us: int) -> OffboardSetpoint | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to_all
 from colibri.mavlink.services.identity import Identity
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, TYPE_QUADROTOR, Message, mav
 
 EVERY_US = 1_000_000
@@ -21,12 +21,12 @@ class HeartbeatService:
 
     def __init__(self, identity: Identity) -> None:
         self._identity = identity
-        self._snapshot: Snapshot | None = None
+        self._snapshot: TelemetrySnapshot | None = None
         self._sent: tuple[object, ...] | None = None
         self._sent_at_us = -EVERY_US
         self.station_us: int | None = None  # last ground station's (MAV_TYPE_GCS)
 
-    def update(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: TelemetrySnapshot) -> None:
         self._snapshot = snapshot
 
     def go_on(self, custom_mode: int, *, armed: bool) -> None:
@@ -49,13 +49,13 @@ class HeartbeatService:
         self._sent, self._sent_at_us = news, now_us
         return (to_all("HEARTBEAT", *self.fields(s)),)
 
-    def fields(self, s: Snapshot) -> Fields:
+    def fields(self, s: TelemetrySnapshot) -> Fields:
         armed = MODE_ARMED if s.armed else 0
         mode = (s.base_mode | MODE_CUSTOM | armed) & 0xFF
         return (TYPE_QUADROTOR, self._identity.autopilot, mode, s.custom_mode, _state(s), MAVLINK_VERSION)
 
 
-def _state(s: Snapshot) -> int:
+def _state(s: TelemetrySnapshot) -> int:
     state: int = mav.MAV_STATE_ACTIVE if s.armed else mav.MAV_STATE_STANDBY
     if s.failsafe:
         state = mav.MAV_STATE_CRITICAL

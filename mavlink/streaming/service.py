@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Handler
+from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SILENT
 from colibri.mavlink.streaming.schedule import Schedule
 from colibri.mavlink.telemetry.encoder import Encoder
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
 
-Provider: TypeAlias = Callable[[Command], list[Send] | Refusal]
+Provider: TypeAlias = Callable[[ReceivedCommand], list[Send] | Refusal]
 """Answers or refuses REQUEST_MESSAGE for another service's message, by the command's param2 to param6."""
 
 MIN_INTERVAL_US = 1_000
@@ -58,7 +58,7 @@ class StreamService:
         self._kinds: dict[int, str] = {}
         self._open: set[int] = set()
         self._waiting: list[Send] = []
-        self._snapshot: Snapshot | None = None
+        self._snapshot: TelemetrySnapshot | None = None
         self._encoded: dict[str, list[Fields]] = {}
         self._now_us = 0
 
@@ -67,7 +67,7 @@ class StreamService:
         assert message_id >= 0, name
         self._providers[message_id] = provider
 
-    def update(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: TelemetrySnapshot) -> None:
         self._snapshot = snapshot
         if self._encoded:
             self._encoded = {}
@@ -120,7 +120,7 @@ class StreamService:
             commands[getattr(mav, command)] = self._request_of(name)
         return commands
 
-    def _set_message_interval(self, command: Command) -> Refusal | None:
+    def _set_message_interval(self, command: ReceivedCommand) -> Refusal | None:
         """Set the interval, µs: -1 off, 0 default."""
         message_id, interval_us = _whole(command.p1), command.p2
         name = self._names.get(message_id)
@@ -137,10 +137,10 @@ class StreamService:
             return Refusal()
         return None
 
-    def _get_message_interval(self, command: Command) -> Refusal | None:
+    def _get_message_interval(self, command: ReceivedCommand) -> Refusal | None:
         return self._report_interval(_whole(command.p1), command.peer)
 
-    def _interval_requested(self, command: Command) -> list[Send] | Refusal:
+    def _interval_requested(self, command: ReceivedCommand) -> list[Send] | Refusal:
         return self._report_interval(_whole(command.p2), command.peer) or []
 
     def _report_interval(self, message_id: int, peer: Peer) -> Refusal | None:
@@ -155,14 +155,14 @@ class StreamService:
             return Refusal(result=UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 
-    def _request_message(self, command: Command) -> Refusal | None:
+    def _request_message(self, command: ReceivedCommand) -> Refusal | None:
         return self._request(_whole(command.p1), command)
 
     def _request_of(self, name: str) -> Handler:
         message_id = _message_id(name)
         return lambda command: self._request(message_id, command._replace(p1=float(message_id), p2=0.0))
 
-    def _request(self, message_id: int, command: Command) -> Refusal | None:
+    def _request(self, message_id: int, command: ReceivedCommand) -> Refusal | None:
         provider = self._providers.get(message_id)
         if provider is not None:
             answer = provider(command)

@@ -16,7 +16,7 @@ from colibri.mavlink.telemetry.encoder import (
     velocity_ned_cm_s,
     yaw_ned,
 )
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
 
@@ -24,18 +24,18 @@ FULL_QUALITY_PERCENT = 100
 COVARIANCE_UNKNOWN = (nan,) + (0.0,) * 20
 
 
-def attitude(s: Snapshot) -> Fields:
+def attitude(s: TelemetrySnapshot) -> Fields:
     """ATTITUDE (30): Euler angles NED/FRD in rad; rates rad/s."""
     roll, pitch, yaw = euler_from_quaternion(s.attitude)
     return (boot_ms(s), roll, -pitch, yaw_ned(yaw), *rate_frd(s))
 
 
-def attitude_quaternion(s: Snapshot) -> Fields:
+def attitude_quaternion(s: TelemetrySnapshot) -> Fields:
     """ATTITUDE_QUATERNION (31): NED/FRD, wxyz."""
     return (boot_ms(s), *ned_frd_from_enu_flu(s.attitude), *rate_frd(s))
 
 
-def odometry(s: Snapshot) -> Fields:
+def odometry(s: TelemetrySnapshot) -> Fields:
     """ODOMETRY (331): pose in NED, velocity and rates in the body's FRD."""
     pose = (*ned_from_enu(s.position_enu_m), ned_frd_from_enu_flu(s.attitude))
     twist = (*in_body_frd(s.attitude, s.velocity_enu_m_s), *rate_frd(s))
@@ -44,7 +44,7 @@ def odometry(s: Snapshot) -> Fields:
     return (s.time_us, *frames, *pose, *twist, COVARIANCE_UNKNOWN, COVARIANCE_UNKNOWN, *quality)
 
 
-def hil_state_quaternion(s: Snapshot) -> Fields:
+def hil_state_quaternion(s: TelemetrySnapshot) -> Fields:
     """HIL_STATE_QUATERNION (115), the ground truth: coordinate acceleration, mG, FRD."""
     place = place_of(s)
     where = (*degrees_e7(place), 1e3 * place.altitude_m, *velocity_ned_cm_s(s))

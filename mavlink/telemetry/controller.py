@@ -7,7 +7,7 @@ from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms, minus, yaw_ned
-from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, Snapshot
+from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
@@ -18,7 +18,7 @@ FLOATS = 58
 ARRAY_NAME = b"lpv_mpc"
 
 
-def attitude_target(s: Snapshot) -> Fields:
+def attitude_target(s: TelemetrySnapshot) -> Fields:
     """ATTITUDE_TARGET (83): quaternion NED/FRD, rates FRD rad/s, thrust 0..1."""
     setpoint = s.setpoint
     rates = frd_from_flu(setpoint.rate_flu_rad_s)
@@ -28,14 +28,14 @@ def attitude_target(s: Snapshot) -> Fields:
     return (boot_ms(s), ignore, ned_frd_from_enu_flu(setpoint.attitude), *rates, setpoint.thrust)
 
 
-def position_target_local_ned(s: Snapshot) -> Fields:
+def position_target_local_ned(s: TelemetrySnapshot) -> Fields:
     """POSITION_TARGET_LOCAL_NED (85): nan, and a bit of the mask, where there is no setpoint."""
     position = ned_from_enu(s.setpoint.position_enu_m)
     moving = _moving_ned(s.setpoint)
     return (boot_ms(s), mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
 
 
-def position_target_global_int(s: Snapshot) -> Fields:
+def position_target_global_int(s: TelemetrySnapshot) -> Fields:
     """POSITION_TARGET_GLOBAL_INT (87): degE7 and m above the sea; the rest as POSITION_TARGET_LOCAL_NED."""
     moving = _moving_ned(s.setpoint)
     mask = _ignored((*ned_from_enu(s.setpoint.position_enu_m), *moving))
@@ -48,7 +48,7 @@ def position_target_global_int(s: Snapshot) -> Fields:
     return (boot_ms(s), mav.MAV_FRAME_GLOBAL, mask, *place, up + s.origin.altitude_m, *moving)
 
 
-def nav_controller_output(s: Snapshot) -> Fields:
+def nav_controller_output(s: TelemetrySnapshot) -> Fields:
     """NAV_CONTROLLER_OUTPUT (62): degrees and m to the destination; distance zero without one."""
     roll, pitch, yaw = euler_from_quaternion(s.setpoint.attitude)
     target = s.setpoint.position_enu_m if any(map(isnan, s.target_enu_m)) else s.target_enu_m
@@ -60,7 +60,7 @@ def nav_controller_output(s: Snapshot) -> Fields:
     return (degrees(roll), degrees(-pitch), *bearings, distance, up, 0.0, 0.0)
 
 
-def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
+def trajectory_representation_waypoints(s: TelemetrySnapshot) -> Fields | None:
     """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon up to its end; local NED."""
     points = _spread(s.solver.horizon)
     if not points:
@@ -70,7 +70,7 @@ def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
     return (s.time_us, len(points), *columns, (UNKNOWN_U16,) * POINTS)
 
 
-def debug_float_array(s: Snapshot) -> Fields:
+def debug_float_array(s: TelemetrySnapshot) -> Fields:
     """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: eleven figures of the solver, then its plan.
 
     The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and the numbers of active bounds on
@@ -86,7 +86,7 @@ def debug_float_array(s: Snapshot) -> Fields:
     return (s.time_us, ARRAY_NAME, 0, data + (0.0,) * (FLOATS - len(data)))
 
 
-def named_value_float(s: Snapshot) -> list[Fields]:
+def named_value_float(s: TelemetrySnapshot) -> list[Fields]:
     """NAMED_VALUE_FLOAT (251), one a figure: of the law, and the delay compensated; names of at most ten letters."""
     solver = s.solver
     figures: dict[bytes, float] = {

@@ -8,11 +8,11 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.snapshot import Home, Snapshot
+from colibri.mavlink.telemetry.snapshot import HomePosition, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
-Encoder: TypeAlias = Callable[[Snapshot], Fields | list[Fields] | None]
+Encoder: TypeAlias = Callable[[TelemetrySnapshot], Fields | list[Fields] | None]
 """Returns a message's fields, a list for several messages, or `None` if there is nothing to send."""
 
 UNKNOWN_U8 = 0xFF
@@ -37,7 +37,7 @@ def fitted(name: str, encoder: Encoder) -> Encoder:
             ]
         )
 
-    def encode(snapshot: Snapshot) -> Fields | list[Fields] | None:
+    def encode(snapshot: TelemetrySnapshot) -> Fields | list[Fields] | None:
         try:
             fields = encoder(snapshot)
             if fields is None:
@@ -73,11 +73,11 @@ for _bits in (8, 16, 32, 64):
     _CONVERTERS[f"int{_bits}_t"] = _integer(-(2 ** (_bits - 1)), 2 ** (_bits - 1) - 1)
 
 
-def boot_ms(s: Snapshot) -> int:
+def boot_ms(s: TelemetrySnapshot) -> int:
     return s.time_us // 1000 % 2**32
 
 
-def place_of(s: Snapshot) -> Geodetic:
+def place_of(s: TelemetrySnapshot) -> Geodetic:
     return geodetic_of(s.position_enu_m, s.origin)
 
 
@@ -85,11 +85,11 @@ def degrees_e7(place: Geodetic) -> tuple[float, float]:
     return (place.latitude_deg * 1e7, place.longitude_deg * 1e7)
 
 
-def velocity_ned_cm_s(s: Snapshot) -> Vector:
+def velocity_ned_cm_s(s: TelemetrySnapshot) -> Vector:
     return times(100.0, ned_from_enu(s.velocity_enu_m_s))
 
 
-def rate_frd(s: Snapshot) -> Vector:
+def rate_frd(s: TelemetrySnapshot) -> Vector:
     return frd_from_flu(s.rate_flu_rad_s)
 
 
@@ -98,8 +98,8 @@ def in_body_frd(q: Quaternion, vector_enu: Vector) -> Vector:
     return frd_from_flu(earth_from_body((w, -x, -y, -z), vector_enu))
 
 
-def height_above_home_m(s: Snapshot) -> float:
-    home: Home | None = s.home
+def height_above_home_m(s: TelemetrySnapshot) -> float:
+    home: HomePosition | None = s.home
     return s.position_enu_m[2] - (home.position_enu_m[2] if home else 0.0)
 
 
@@ -114,7 +114,7 @@ def compass_cdeg(angle_rad: float) -> int:
     return round(100.0 * degrees(pi / 2 - angle_rad)) % FULL_TURN_CDEG
 
 
-def airspeed_m_s(s: Snapshot) -> float:
+def airspeed_m_s(s: TelemetrySnapshot) -> float:
     wind = s.wind_enu_m_s if all(map(isfinite, s.wind_enu_m_s)) else (0.0, 0.0, 0.0)
     return hypot(*minus(s.velocity_enu_m_s, wind))
 

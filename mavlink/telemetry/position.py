@@ -17,7 +17,7 @@ from colibri.mavlink.telemetry.encoder import (
     velocity_ned_cm_s,
     yaw_ned,
 )
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_from_enu
 
@@ -28,19 +28,19 @@ RANGE_CM = (0, 10_000)
 PERCENT = 100
 
 
-def global_position_int(s: Snapshot) -> Fields:
+def global_position_int(s: TelemetrySnapshot) -> Fields:
     """GLOBAL_POSITION_INT (33): degE7, mm, cm/s NED, centidegrees."""
     place = place_of(s)
     altitudes_mm = (1e3 * place.altitude_m, 1e3 * height_above_home_m(s))
     return (boot_ms(s), *degrees_e7(place), *altitudes_mm, *velocity_ned_cm_s(s), heading_cdeg(s))
 
 
-def local_position_ned(s: Snapshot) -> Fields:
+def local_position_ned(s: TelemetrySnapshot) -> Fields:
     """LOCAL_POSITION_NED (32): m and m/s."""
     return (boot_ms(s), *ned_from_enu(s.position_enu_m), *ned_from_enu(s.velocity_enu_m_s))
 
 
-def home_position(s: Snapshot) -> Fields | None:
+def home_position(s: TelemetrySnapshot) -> Fields | None:
     """HOME_POSITION (242): its ground level, its heading in q, and an approach straight from above."""
     if s.home is None:
         return None
@@ -51,12 +51,12 @@ def home_position(s: Snapshot) -> Fields | None:
     return (*degrees_e7(place), 1e3 * place.altitude_m, *local, surface, *local, s.time_us)
 
 
-def gps_global_origin(s: Snapshot) -> Fields:
+def gps_global_origin(s: TelemetrySnapshot) -> Fields:
     """GPS_GLOBAL_ORIGIN (49): degE7, mm."""
     return (*degrees_e7(s.origin), 1e3 * s.origin.altitude_m, s.time_us)
 
 
-def gps_raw_int(s: Snapshot) -> Fields:
+def gps_raw_int(s: TelemetrySnapshot) -> Fields:
     """GPS_RAW_INT (24): the receiver's fix, or a simulated good one; or no fix. Course is unknown at rest."""
     if not s.gps_ok:
         nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
@@ -71,7 +71,7 @@ def gps_raw_int(s: Snapshot) -> Fields:
     return (s.time_us, *fix, min(100.0 * speed, UNKNOWN_U16 - 1), course, seen)
 
 
-def altitude(s: Snapshot) -> Fields:
+def altitude(s: TelemetrySnapshot) -> Fields:
     """ALTITUDE (141), m: monotonic, above the sea, the origin, home, the terrain; clearance below."""
     above_origin = s.position_enu_m[2]
     above_sea, above_ground = above_origin + s.origin.altitude_m, above_origin - s.ground_m
@@ -80,7 +80,7 @@ def altitude(s: Snapshot) -> Fields:
     return (s.time_us, above_sea, above_sea, above_origin, height_above_home_m(s), terrain, clearance)
 
 
-def vfr_hud(s: Snapshot) -> Fields:
+def vfr_hud(s: TelemetrySnapshot) -> Fields:
     """VFR_HUD (74): m/s, degrees, percent, m."""
     east, north, up = s.velocity_enu_m_s
     throttle = PERCENT * sum(s.controls) / len(s.controls)
@@ -89,14 +89,14 @@ def vfr_hud(s: Snapshot) -> Fields:
     return (airspeed_m_s(s), hypot(east, north), compass_cdeg(yaw) / 100, throttle, altitude_m, up)
 
 
-def distance_sensor(s: Snapshot) -> Fields:
+def distance_sensor(s: TelemetrySnapshot) -> Fields:
     """DISTANCE_SENSOR (132): height above the ground, cm, as measured by a downward sensor."""
     height_cm = max(0.0, 100.0 * (s.position_enu_m[2] - s.ground_m))
     sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, 0)
     return (boot_ms(s), *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
 
 
-def wind_cov(s: Snapshot) -> Fields | None:
+def wind_cov(s: TelemetrySnapshot) -> Fields | None:
     """WIND_COV (231): direction of the wind's motion, NED, m/s; sent once it is known."""
     if not all(map(isfinite, s.wind_enu_m_s)):
         return None
@@ -104,6 +104,6 @@ def wind_cov(s: Snapshot) -> Fields | None:
     return (s.time_us, *ned_from_enu(s.wind_enu_m_s), nan, nan, altitude_m, 0.0, 0.0)
 
 
-def heading_cdeg(s: Snapshot) -> int:
+def heading_cdeg(s: TelemetrySnapshot) -> int:
     _, _, yaw = euler_from_quaternion(s.attitude)
     return compass_cdeg(yaw) if isfinite(yaw) else UNKNOWN_U16

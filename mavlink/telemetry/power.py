@@ -5,7 +5,7 @@ from math import isfinite, pi
 from colibri.common.types import FourRotors
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16
-from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
+from colibri.mavlink.telemetry.snapshot import BatteryState, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 
 CELLS = 10
@@ -21,7 +21,7 @@ ESC_CONNECTION_TYPE_DSHOT = 5
 MIXED_GROUP = 0
 
 
-def battery_status(s: Snapshot) -> Fields | None:
+def battery_status(s: TelemetrySnapshot) -> Fields | None:
     """BATTERY_STATUS (147): mV a cell, cA, mAh, hJ, percent, s."""
     battery = s.battery
     if battery is None:
@@ -34,7 +34,7 @@ def battery_status(s: Snapshot) -> Fields | None:
     return (*kind, cells, 100.0 * battery.current_a, *used, *left, more, 0, 0)
 
 
-def esc_status(s: Snapshot) -> Fields:
+def esc_status(s: TelemetrySnapshot) -> Fields:
     """ESC_STATUS (291): rpm, V, A; the current is shared in proportion to a rotor's power, the cube of its speed."""
     cubes = [speed * speed * speed for speed in s.rotor_speeds_rad_s]
     total = sum(cubes) or 1.0
@@ -43,24 +43,24 @@ def esc_status(s: Snapshot) -> Fields:
     return (0, s.time_us, rpm, (voltage,) * ROTORS, tuple(current * cube / total for cube in cubes))
 
 
-def esc_info(s: Snapshot) -> Fields:
+def esc_info(s: TelemetrySnapshot) -> Fields:
     """ESC_INFO (290): four healthy controllers of unknown temperature."""
     packets = s.time_us // 1_000_000 % 2**16
     healthy = ((0,) * ROTORS, (0,) * ROTORS, (UNKNOWN_I16,) * ROTORS)
     return (0, s.time_us, packets, ROTORS, ESC_CONNECTION_TYPE_DSHOT, ALL_ROTORS, *healthy)
 
 
-def servo_output_raw(s: Snapshot) -> Fields:
+def servo_output_raw(s: TelemetrySnapshot) -> Fields:
     """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; its time is in µs and wraps after 71 minutes."""
     return (s.time_us % 2**32, 0, *_pulses_us(s.controls), *(0,) * 12)
 
 
-def actuator_output_status(s: Snapshot) -> Fields:
+def actuator_output_status(s: TelemetrySnapshot) -> Fields:
     """ACTUATOR_OUTPUT_STATUS (375): the pulses of SERVO_OUTPUT_RAW."""
     return (s.time_us, ALL_ROTORS, (*_pulses_us(s.controls), *(0.0,) * (OUTPUTS - ROTORS)))
 
 
-def actuator_control_target(s: Snapshot) -> Fields:
+def actuator_control_target(s: TelemetrySnapshot) -> Fields:
     """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotors' controls.
 
     The rotors are those of a plus: front, right, rear, left. The first turns counter-clockwise, the body so clockwise.
@@ -70,7 +70,7 @@ def actuator_control_target(s: Snapshot) -> Fields:
     return (s.time_us, MIXED_GROUP, (*moments, 0.25 * (front + right + rear + left), 0.0, 0.0, 0.0, 0.0))
 
 
-def rc_channels(s: Snapshot) -> Fields:
+def rc_channels(s: TelemetrySnapshot) -> Fields:
     """RC_CHANNELS (65): the sticks of MANUAL_CONTROL as roll, pitch, throttle and yaw of a radio, 1000 to 2000 µs."""
     from_boot_ms = s.time_us // 1000 % 2**32
     if s.sticks is None:

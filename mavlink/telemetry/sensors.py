@@ -5,7 +5,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import MILLI_G, boot_ms, in_body_frd, times
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import bits
 from colibri.mavlink.wire.ned import frd_from_flu
 
@@ -21,7 +21,7 @@ UPDATED = bits(
 )
 
 
-def highres_imu(s: Snapshot) -> Fields:
+def highres_imu(s: TelemetrySnapshot) -> Fields:
     """HIGHRES_IMU (105): m/s², rad/s, gauss, hPa, m, °C."""
     m = _measured(s)
     motion = (*frd_from_flu(m.specific_force_flu_m_s2), *frd_from_flu(m.rate_flu_rad_s))
@@ -29,30 +29,30 @@ def highres_imu(s: Snapshot) -> Fields:
     return (s.time_us, *motion, *frd_from_flu(m.magnetic_field_flu_gauss), *air, UPDATED, 0)
 
 
-def scaled_imu(s: Snapshot) -> Fields:
+def scaled_imu(s: TelemetrySnapshot) -> Fields:
     """SCALED_IMU (26): mG, mrad/s, mgauss, centidegrees Celsius."""
     m = _measured(s)
     return (boot_ms(s), *_thousandths(m), _temperature_cdeg(m))
 
 
-def raw_imu(s: Snapshot) -> Fields:
+def raw_imu(s: TelemetrySnapshot) -> Fields:
     """RAW_IMU (27): the counts equal SCALED_IMU's units."""
     m = _measured(s)
     return (s.time_us, *_thousandths(m), 0, _temperature_cdeg(m))
 
 
-def scaled_pressure(s: Snapshot) -> Fields:
+def scaled_pressure(s: TelemetrySnapshot) -> Fields:
     """SCALED_PRESSURE (29): hPa, centidegrees Celsius."""
     m = _measured(s)
     return (boot_ms(s), m.pressure_pa / 100.0, 0.0, _temperature_cdeg(m), 0)
 
 
-def vibration(s: Snapshot) -> Fields:
+def vibration(s: TelemetrySnapshot) -> Fields:
     """VIBRATION (241): zeros."""
     return (s.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
-def _measured(s: Snapshot) -> SensorFrame:
+def _measured(s: TelemetrySnapshot) -> SensorFrame:
     """Return the sensors' measurements; under state feedback, those of ideal sensors."""
     if s.sensed is not None:
         return s.sensed
@@ -64,7 +64,7 @@ def _measured(s: Snapshot) -> SensorFrame:
     return SensorFrame(0, 0, force, s.rate_flu_rad_s, field, pressure_pa(altitude_m), temperature_c(altitude_m))
 
 
-def _altitude_amsl_m(s: Snapshot) -> float:
+def _altitude_amsl_m(s: TelemetrySnapshot) -> float:
     return s.origin.altitude_m + s.position_enu_m[2]
 
 

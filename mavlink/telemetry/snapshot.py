@@ -15,7 +15,7 @@ CHARGE_OK = 1
 """MAV_BATTERY_CHARGE_STATE_OK."""
 
 
-class Home(NamedTuple):
+class HomePosition(NamedTuple):
     """The place of return."""
 
     position_enu_m: Vector
@@ -91,7 +91,7 @@ NO_SETPOINT = Setpoint()
 NOT_SOLVED = SolverState()
 
 
-class Snapshot(NamedTuple):
+class TelemetrySnapshot(NamedTuple):
     """All values that telemetry sends."""
 
     time_us: int  # simulated, since the autopilot's start
@@ -110,7 +110,7 @@ class Snapshot(NamedTuple):
     attitude: Quaternion = LEVEL  # FLU to ENU
     rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
     origin: Geodetic = DEFAULT_ORIGIN
-    home: Home | None = None
+    home: HomePosition | None = None
     rotor_speeds_rad_s: FourRotors = (0.0, 0.0, 0.0, 0.0)  # estimated
     controls: FourRotors = (0.0, 0.0, 0.0, 0.0)  # commanded, parts of the largest
     battery: BatteryState | None = None

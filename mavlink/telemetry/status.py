@@ -4,7 +4,7 @@ from math import isfinite
 
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import bits, mav
 
 SENSORS = bits(
@@ -22,7 +22,7 @@ ESTIMATED = bits(
 )
 
 
-def sys_status(s: Snapshot) -> Fields:
+def sys_status(s: TelemetrySnapshot) -> Fields:
     """SYS_STATUS (1): present, enabled and healthy parts; load in thousandths, mV, cA, percent.
 
     The geofence is healthy until breached, even if disabled: consoles alarm at this bit alone.
@@ -46,27 +46,27 @@ def sys_status(s: Snapshot) -> Fields:
     return (present, enabled, health, 1e3 * s.load, *_battery(s), 0, 0, 0, 0, 0, 0)
 
 
-def extended_sys_state(s: Snapshot) -> Fields:
+def extended_sys_state(s: TelemetrySnapshot) -> Fields:
     """EXTENDED_SYS_STATE (245): no VTOL; landed, taking off, in the air or landing."""
     return (mav.MAV_VTOL_STATE_UNDEFINED, s.landed_state)
 
 
-def current_mode(s: Snapshot) -> Fields:
+def current_mode(s: TelemetrySnapshot) -> Fields:
     """CURRENT_MODE (436)."""
     return (s.standard_mode, s.custom_mode, s.intended_custom_mode)
 
 
-def system_time(s: Snapshot, boot_unix_us: int = 0) -> Fields:
+def system_time(s: TelemetrySnapshot, boot_unix_us: int = 0) -> Fields:
     """SYSTEM_TIME (2): Unix time µs, 0 if unknown; ms since the start."""
     return (boot_unix_us + s.time_us if boot_unix_us else 0, boot_ms(s))
 
 
-def flight_information(s: Snapshot) -> Fields:
+def flight_information(s: TelemetrySnapshot) -> Fields:
     """FLIGHT_INFORMATION (264): times since the start in µs (despite their names) and ms; the number of the flight."""
     return (boot_ms(s), s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
 
 
-def estimator_status(s: Snapshot) -> Fields:
+def estimator_status(s: TelemetrySnapshot) -> Fields:
     """ESTIMATOR_STATUS (230). Under state feedback all states are known, and test ratios are 0."""
     if s.estimator is not None:
         e = s.estimator
@@ -81,7 +81,7 @@ def estimator_status(s: Snapshot) -> Fields:
     return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
 
 
-def _battery(s: Snapshot) -> tuple[float, float, float]:
+def _battery(s: TelemetrySnapshot) -> tuple[float, float, float]:
     if s.battery is None:
         return (UNKNOWN_U16, -1, -1)
     return (1e3 * s.battery.voltage_v, 100.0 * s.battery.current_a, 100.0 * s.battery.remaining)

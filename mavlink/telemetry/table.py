@@ -6,7 +6,7 @@ from colibri.mavlink.hil.sensors import OWN_MESSAGES, OwnMessage
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
 from colibri.mavlink.telemetry.encoder import Encoder, fitted
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 
 
 def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
@@ -21,7 +21,7 @@ def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
 
 def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
 
-    def encoder(s: Snapshot) -> Fields | list[Fields] | None:
+    def encoder(s: TelemetrySnapshot) -> Fields | list[Fields] | None:
         value = s.latest.get(row.field)
         if value is not None:
             return row.encoded(value, s.time_us)

@@ -16,7 +16,7 @@ CONTENT_BYTES = _CHUNK.size
 """Of a message without its head."""
 
 
-class Kind(IntEnum):
+class RecordKind(IntEnum):
     """The kind of a record."""
 
     SETUP = 1
@@ -35,7 +35,7 @@ class InputRecord(NamedTuple):
     content: bytes
 
 
-def encode_input(time_us: int, kind: Kind, content: bytes) -> bytes:
+def encode_input(time_us: int, kind: RecordKind, content: bytes) -> bytes:
     encoded = b""
     for begin in range(0, max(len(content), 1), CHUNK_BYTES):
         chunk = content[begin : begin + CHUNK_BYTES]

@@ -5,14 +5,14 @@ from math import nan
 
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.mavlink.parameters.store import Parameters, Value
-from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, Snapshot
+from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, TelemetrySnapshot
 from colibri.mavlink.ulog import messages, topics
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
-from colibri.mavlink.ulog.status import Status, status_message
+from colibri.mavlink.ulog.status import VehicleStatus, status_message
 from colibri.mavlink.ulog.topics import record
 
 STATUS_EVERY_US = 1_000_000
@@ -31,7 +31,7 @@ class Recorder:
         self._with_battery = with_battery
         self._samples, self._sensings = SampleBlocks(), SensingBlocks()
         self._revision, self._values = parameters.revision, dict(parameters.values)
-        self._status: Status | None = None
+        self._status: VehicleStatus | None = None
         self._status_us = 0
         self._thinning = Thinning()
 
@@ -40,7 +40,7 @@ class Recorder:
         self._revision, self._values = self._parameters.revision, dict(self._parameters.values)
         return beginning(self._vehicle, self._values)
 
-    def update(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: TelemetrySnapshot) -> None:
         self._record_parameters()
         self._record_status(snapshot)
         if not self._thinning.is_due(snapshot.time_us):
@@ -61,10 +61,10 @@ class Recorder:
         changed: Mapping[str, Value] = {name: value for name, value in values.items() if known.get(name) != value}
         self._log.append(messages.SYNC + messages.parameters(changed))
 
-    def _record_status(self, s: Snapshot) -> None:
+    def _record_status(self, s: TelemetrySnapshot) -> None:
         """Record a new status, or every second; with it the battery, and flush the log."""
         now_us = s.time_us
-        status = Status(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
+        status = VehicleStatus(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
         if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
             return
         self._status, self._status_us = status, now_us
@@ -74,7 +74,7 @@ class Recorder:
             self._log.append(battery_message(now_us, s.battery))
 
 
-def sample_row(s: Snapshot) -> tuple[float, ...]:
+def sample_row(s: TelemetrySnapshot) -> tuple[float, ...]:
     steered, solver = s.setpoint, s.solver
     attitude = _NO_REFERENCE if s.solver.step_time_s == 0.0 else euler_from_quaternion(steered.attitude)
     return (

@@ -25,7 +25,7 @@ _NAV_STATES = {
 """PX4's main mode and sub mode -> its nav_state; 23, EXTERNAL1, flies a track."""
 
 
-class Status(NamedTuple):
+class VehicleStatus(NamedTuple):
     """The status of a vehicle."""
 
     armed: bool
@@ -40,7 +40,7 @@ def nav_state(custom_mode: int) -> int:
     return _NAV_STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF), 31)
 
 
-def status_message(time_us: int, status: Status, system_id: int) -> bytes:
+def status_message(time_us: int, status: VehicleStatus, system_id: int) -> bytes:
     mode = nav_state(status.custom_mode)
     who = (_ROTARY_WING, mav.MAV_TYPE_QUADROTOR, system_id, AUTOPILOT_COMPONENT)
     times_us, arming = (time_us, status.armed_us, status.takeoff_us), _ARMED if status.armed else _DISARMED

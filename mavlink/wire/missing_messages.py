@@ -13,7 +13,7 @@ _CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint3
 _CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d", "char": "s"}
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """A field of a message; `length` 0 is a scalar."""
 
     kind: str
@@ -29,9 +29,9 @@ class Definition(NamedTuple):
     text: str
 
     @property
-    def fields(self) -> list[Field]:
+    def fields(self) -> list[MessageField]:
         found = findall(r"(\w+)(?:\[(\d+)\])? (\w+)", self.text)
-        return [Field(kind, name, int(length or 0)) for kind, length, name in found]
+        return [MessageField(kind, name, int(length or 0)) for kind, length, name in found]
 
 
 MISSING = (
@@ -93,7 +93,7 @@ def _class_of(definition: Definition, dialect: Any) -> Any:
     return type(f"MAVLink_{definition.name.lower()}_message", (dialect.MAVLink_message,), members)
 
 
-def _crc_extra(name: str, ordered: list[Field], dialect: Any) -> int:
+def _crc_extra(name: str, ordered: list[MessageField], dialect: Any) -> int:
     data = bytearray(f"{name} ".encode())
     for field in ordered:
         data += f"{field.kind} {field.name} ".encode()

@@ -9,7 +9,7 @@ from numpy.random import SeedSequence, default_rng
 _BLOCK = 1024
 
 
-class Source(IntEnum):
+class RandomStream(IntEnum):
     """Consumers of random numbers."""
 
     SENSORS = 0
@@ -47,5 +47,5 @@ class Chance:
         self._left = self._generator.standard_normal(_BLOCK).astype(np.float32).tolist()[::-1]
 
 
-def streams(seed: int, source: Source, count: int) -> list[Chance]:
+def streams(seed: int, source: RandomStream, count: int) -> list[Chance]:
     return [Chance(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]

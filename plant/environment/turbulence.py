@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.common.kernels import exp, expm1, power
-from colibri.plant.environment.random_streams import Source
+from colibri.plant.environment.random_streams import RandomStream
 from colibri.plant.environment.weather import Intensity
 
 FEET_PER_M = 1.0 / 0.3048
@@ -68,7 +68,7 @@ class Turbulence:
     """The turbulence of one seed."""
 
     def __init__(self, seed: int) -> None:
-        self._key = np.random.SeedSequence(seed, spawn_key=(Source.WEATHER,)).generate_state(2, np.uint64)
+        self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.WEATHER,)).generate_state(2, np.uint64)
         self._block: tuple[int, list[list[float]]] = (-1, [])
 
     def begin(self) -> Eddies:

@@ -23,7 +23,7 @@ _AH_PER_C = 1.0 / 3600.0
 _HALVINGS = 60
 
 
-class Parameters(NamedTuple):
+class PlantParameters(NamedTuple):
     """Numbers of a vehicle and of the air around it; the defaults switch an effect off. Kernels take them `packed`."""
 
     mass_kg: float
@@ -61,7 +61,7 @@ class Wrench(NamedTuple):
 
 
 @compiled
-def rotor_wrench(speeds: FourRotors, parameters: Parameters) -> Wrench:
+def rotor_wrench(speeds: FourRotors, parameters: PlantParameters) -> Wrench:
     """Return force (0, 0, U1) and moment (U2, U3, U4) of the rotors, THESIS [2.2]."""
     u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
@@ -75,7 +75,7 @@ def rotor_wrench(speeds: FourRotors, parameters: Parameters) -> Wrench:
 
 
 @compiled
-def rotor_momentum(speeds: FourRotors, parameters: Parameters) -> float:
+def rotor_momentum(speeds: FourRotors, parameters: PlantParameters) -> float:
     """Return the angular momentum h along body z, N m s; h = -J Ω in the thesis's symbols (erratum 2)."""
     h = parameters.momentum
     return h[0] * speeds[0] + h[1] * speeds[1] + h[2] * speeds[2] + h[3] * speeds[3]
@@ -97,7 +97,7 @@ def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, 
 
 
 @compiled
-def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: Parameters) -> Wrench:
+def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: PlantParameters) -> Wrench:
     """Return the drag of airframe and rotors; `air` is the velocity through the air, FLU.
 
     The airframe's is linear, a rotor's -c Ω (v + ω × r) in its plane: Faessler, Franchi, Scaramuzza (RA-L 2018),
@@ -116,7 +116,7 @@ def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: Param
 
 
 @compiled
-def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, parameters: Parameters) -> Wrench:
+def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, parameters: PlantParameters) -> Wrench:
     """Return the ground's wrench: at each point below it a spring and a damper that only push, and friction.
 
     Friction is Coulomb's up to a stiffness of `slip_damping_n_s_m`: points creep instead of sticking, which keeps the
@@ -143,7 +143,7 @@ def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, p
 
 
 @compiled
-def battery(speeds: FourRotors, charge_ah: float, parameters: Parameters) -> tuple[float, float]:
+def battery(speeds: FourRotors, charge_ah: float, parameters: PlantParameters) -> tuple[float, float]:
     """Return the battery's terminal voltage, V, and its current, A.
 
     V² - V0 V + R P = 0, with V0 falling linearly with the charge used. At most V0² / 4R can be drawn.
@@ -212,7 +212,7 @@ def attitude_of(state: Sequence[float]) -> Quaternion:
 
 
 @compiled
-def write_derivative(change: Array, x: Array, target: FourRotors, parameters: Parameters) -> None:
+def write_derivative(change: Array, x: Array, target: FourRotors, parameters: PlantParameters) -> None:
     speeds = (x[13], x[14], x[15], x[16])
     voltage_v, current_a = battery(speeds, x[17], parameters)
     speed_rates = _speed_rates(speeds, target, voltage_v, parameters)
@@ -227,7 +227,7 @@ def write_derivative(change: Array, x: Array, target: FourRotors, parameters: Pa
 
 
 @compiled
-def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: Parameters) -> Wrench:
+def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: PlantParameters) -> Wrench:
     velocity, rate = (x[0], x[1], x[2]), (x[3], x[4], x[5])
     wind = _rotated_back(R, parameters.wind_enu_m_s)
     rotors = rotor_wrench(speeds, parameters)
@@ -238,7 +238,7 @@ def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: Parameters) -> 
 
 
 @compiled
-def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters: Parameters) -> None:
+def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters: PlantParameters) -> None:
     u, v, w, p, q, r = x[0], x[1], x[2], x[3], x[4], x[5]
     qw, qx, qy, qz = x[9], x[10], x[11], x[12]
     fx, fy, fz = wrench.force_n
@@ -254,7 +254,7 @@ def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters
 
 
 @compiled
-def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, parameters: Parameters) -> FourRotors:
+def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, parameters: PlantParameters) -> FourRotors:
     maximum = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
     return (
         _lag(speeds[0], min(target[0], maximum), parameters),
@@ -265,12 +265,12 @@ def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, param
 
 
 @compiled
-def _lag(speed: float, target: float, parameters: Parameters) -> float:
+def _lag(speed: float, target: float, parameters: PlantParameters) -> float:
     return (target - speed) / (parameters.lag_up_s if target > speed else parameters.lag_down_s)
 
 
 @compiled
-def _share_held(target: FourRotors, charge_ah: float, parameters: Parameters) -> float:
+def _share_held(target: FourRotors, charge_ah: float, parameters: PlantParameters) -> float:
     """Return the share of the top speed at which rotors that follow `target` leave just the voltage for it."""
     low, high = 0.0, 1.0
     if _voltage_share(target, high, charge_ah, parameters) >= high:
@@ -285,7 +285,7 @@ def _share_held(target: FourRotors, charge_ah: float, parameters: Parameters) ->
 
 
 @compiled
-def _voltage_share(target: FourRotors, share: float, charge_ah: float, parameters: Parameters) -> float:
+def _voltage_share(target: FourRotors, share: float, charge_ah: float, parameters: PlantParameters) -> float:
     maximum = share * parameters.top_speed
     speeds = (min(target[0], maximum), min(target[1], maximum), min(target[2], maximum), min(target[3], maximum))
     return battery(speeds, charge_ah, parameters)[0] / parameters.full_voltage_v

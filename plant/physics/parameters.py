@@ -3,15 +3,15 @@
 import numpy as np
 
 from colibri.common.types import Array, FourRotors, Vector
-from colibri.plant.physics.equations import Parameters
+from colibri.plant.physics.equations import PlantParameters
 from colibri.plant.vehicle.description import Vehicle
 
 
-def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> Parameters:
+def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
     thrust, _, _, yaw_moment = vehicle.allocation()
     east, north, up = wind_enu_m_s
     x_m, y_m = np.array(vehicle.rotors.position_m).T
-    numbers = Parameters(
+    numbers = PlantParameters(
         mass_kg=vehicle.body.mass_kg,
         gravity_m_s2=vehicle.gravity_m_s2,
         inertia_kg_m2=vehicle.body.inertia_kg_m2,

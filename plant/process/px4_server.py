@@ -24,7 +24,7 @@ from colibri.plant.process.reports import (
     closing,
     report_end,
 )
-from colibri.plant.process.server import Pace
+from colibri.plant.process.server import FramePacer
 from colibri.plant.process.start import nudged
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.spec import PlantSpec
@@ -87,7 +87,7 @@ class Simulator:
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
         world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
-        pace, progress, frames = Pace(self._speed, began_s), Progress(self._status), 0
+        pace, progress, frames = FramePacer(self._speed, began_s), Progress(self._status), 0
         silence = Silence(self._status, SILENT_AFTER_S, "PX4 answers again", began_s)
         while not self._stop and self._end.peer is not None and self._end.calls == call:
             if world.time_us > self._duration_us:
@@ -111,7 +111,7 @@ class Simulator:
         report_end(self._status, world.time_us, began_s, text, event=event, **figures)
         return not gone
 
-    def _due_s(self, pace: Pace, world: World) -> float:
+    def _due_s(self, pace: FramePacer, world: World) -> float:
         now_s = perf_counter()
         due_s = pace.due_s(world.time_us - self._interval_us, now_s)
         return due_s if self._end.lockstep else max(due_s, now_s + self._interval_us * 1e-6)

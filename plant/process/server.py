@@ -9,7 +9,7 @@ from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
-from colibri.mavlink.hil.lockstep_plant import Outgoing, PlantEnd
+from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.links.udp import UdpLink
@@ -22,7 +22,7 @@ _CATCH_UP_S = 0.1
 _STANDING = (0.0, 0.0, 0.0, 0.0)
 
 
-class Pace:
+class FramePacer:
     """Wall-clock deadlines of frames; a flight held up for longer than a moment stays late instead of hurrying."""
 
     def __init__(self, speed: float, now_s: float) -> None:
@@ -69,7 +69,7 @@ class Server:
         """Fly for `duration_s` at `speed` times real time, or until a signal."""
         self._ends = isfinite(duration_s)
         self._began_s = began_s = perf_counter()
-        pace, frames = Pace(speed, began_s), 0
+        pace, frames = FramePacer(speed, began_s), 0
         while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
             if not self._advance(plant, pace):
                 break
@@ -86,7 +86,7 @@ class Server:
     def _own_figures(self) -> tuple[str, dict[str, float]]:
         return "", {}
 
-    def _advance(self, plant: Plant, pace: Pace) -> bool:
+    def _advance(self, plant: Plant, pace: FramePacer) -> bool:
         if isfinite(pace.speed):
             self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
         command = self._exchange(plant)
@@ -147,7 +147,7 @@ class Server:
         self._send_and_log()
         return command
 
-    def _send(self) -> list[Outgoing]:
+    def _send(self) -> list[PlantDatagram]:
         sent = self._end.take_outbox()
         for outgoing in sent:
             self._link.send(outgoing.datagram, outgoing.address)
@@ -158,7 +158,7 @@ class Server:
         if sent:
             self._log_traffic(sent)
 
-    def _log_traffic(self, sent: list[Outgoing]) -> None:
+    def _log_traffic(self, sent: list[PlantDatagram]) -> None:
         received, time_us = self._end.received, self._time_us
         if self._logs is not None and self._logs.has_tlog:
             frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
@@ -194,7 +194,7 @@ class FreeServer(Server):
         figures = {"answers": self._answers, "round_trip_ms": round_trip_ms}
         return f", {self._answers} of them answered", figures
 
-    def _advance(self, plant: Plant, pace: Pace) -> bool:
+    def _advance(self, plant: Plant, pace: FramePacer) -> bool:
         begin_us = plant.world.time_us
         due_s = pace.due_s(begin_us + plant.interval_us, self._offer(plant))
         faults: list[Fault | WorldChange] = []

@@ -6,11 +6,11 @@ from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Barometer
 
 
-def _switched_on(part: Barometer, setting: Setting, chance: Chance) -> Measure:
+def _switched_on(part: Barometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     drift, rate = GaussMarkov(part.drift_pa, part.drift_time_s, chance), Rate(part.rate_hz)
     ground_m, measured_us = setting.origin.altitude_m, None
 

@@ -6,13 +6,13 @@ from typing import Any
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import DELAYED, GARBAGE, OFF, OK, SENSORS, SLOW, STUCK, WRONG, Fault
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.plant.environment.random_streams import Chance, Source, streams
+from colibri.plant.environment.random_streams import Chance, RandomStream, streams
 from colibri.plant.sensors.instrument import Instrument
 from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.sensors import Sensors
 
 
-class Reading:
+class SensorReading:
     """The output of one sensor, with or without a fault."""
 
     def __init__(self, row: Instrument, chance: Chance) -> None:
@@ -64,9 +64,9 @@ class SensorFaults:
     """Faults of all sensors of one vehicle, by FAILURE_UNIT."""
 
     def __init__(self, seed: int, parts: Sensors | None) -> None:
-        chances = dict(zip(SENSORS, streams(seed, Source.FAULTS, len(SENSORS)), strict=True))
+        chances = dict(zip(SENSORS, streams(seed, RandomStream.FAULTS, len(SENSORS)), strict=True))
         rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
-        self._readings = {row.unit: (row, Reading(row, chances[row.unit])) for row in rows}
+        self._readings = {row.unit: (row, SensorReading(row, chances[row.unit])) for row in rows}
         self.units = frozenset(self._readings)
         self._own = [row.field for row in rows if not row.group]
         self._reported: SensorFrame | None = None

@@ -13,11 +13,11 @@ from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Gps
 
 
-def _switched_on(part: Gps, setting: Setting, chance: Chance) -> Measure:
+def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Measure:
     """Measure position with white and correlated errors, velocity with white ones; report after the delay."""
     rate, delay_us = Rate(part.rate_hz), round(part.delay_s * 1e6)
     sideways, upward = part.horizontal_drift_m, part.vertical_drift_m

@@ -23,7 +23,7 @@ def vector_sum(value: Vector, error: Vector) -> Vector:
     return (value[0] + error[0], value[1] + error[1], value[2] + error[2])
 
 
-class Setting(NamedTuple):
+class SensorSurroundings(NamedTuple):
     """The surroundings of a vehicle's sensors."""
 
     physics: Physics
@@ -38,7 +38,7 @@ class Instrument(NamedTuple):
     field: str  # of `SensorFrame`
     group: int  # bit of `Updated` if the field keeps its last output; 0 if it is None between outputs
     unit: int  # FAILURE_UNIT
-    switched_on: Callable[[Any, Setting, Chance], Measure]
+    switched_on: Callable[[Any, SensorSurroundings, Chance], Measure]
     add: Callable[[Any, Vector], Any] = vector_sum  # (value, error of a fault) -> erroneous value
     at: Callable[[Any, int], Any] = as_it_is  # (value, time in µs) -> value with that time stamp
 

@@ -8,11 +8,11 @@ from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Magnetometer
 
 
-def _switched_on(part: Magnetometer, setting: Setting, chance: Chance) -> Measure:
+def _switched_on(part: Magnetometer, setting: SensorSurroundings, chance: Chance) -> Measure:
     earth_gauss, rate, noise = field_enu_gauss(setting.origin), Rate(part.rate_hz), part.noise_gauss
     own = part.hard_iron_gauss
     iron = (own * next(chance), own * next(chance), own * next(chance))

@@ -8,13 +8,13 @@ from colibri.mavlink.hil.sensors import Distance
 from colibri.plant.environment.random_streams import Chance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, SensorSurroundings
 from colibri.plant.vehicle.sensors import Rangefinder
 
 _FLATTEST_COSINE = 1e-3
 
 
-def _switched_on(part: Rangefinder, _setting: Setting, chance: Chance) -> Measure:
+def _switched_on(part: Rangefinder, _setting: SensorSurroundings, chance: Chance) -> Measure:
     rate, half_beam_rad = Rate(part.rate_hz), 0.5 * part.field_of_view_rad
 
     def measure(world: World) -> Distance | None:

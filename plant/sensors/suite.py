@@ -6,10 +6,10 @@ from colibri.common.earth.atmosphere import temperature_c
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.plant.environment.random_streams import Source, streams
+from colibri.plant.environment.random_streams import RandomStream, streams
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
-from colibri.plant.sensors.instrument import Setting
+from colibri.plant.sensors.instrument import SensorSurroundings
 from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.description import Vehicle
 from colibri.plant.vehicle.sensors import Sensors
@@ -37,8 +37,8 @@ class SensorSuite:
     ) -> None:
         self._faults = faults
         self._origin = origin
-        setting = Setting(physics, origin, interval_us * 1e-6)
-        chances = streams(seed, Source.SENSORS, len(ROWS))
+        setting = SensorSurroundings(physics, origin, interval_us * 1e-6)
+        chances = streams(seed, RandomStream.SENSORS, len(ROWS))
         self._instruments = [
             (_PLACE[row.field], row.group, row.switched_on(getattr(parts, row.part), setting, chance))
             for row, chance in zip(ROWS, chances, strict=True)

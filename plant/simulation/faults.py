@@ -1,6 +1,6 @@
 """Faults of one vehicle by MAV_CMD_INJECT_FAILURE, each at an instant between two frames."""
 
-from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, Part, judged
+from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Equipment, Fault, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_UNSUPPORTED
@@ -17,11 +17,11 @@ class Faults:
         self._physics = physics
         self._battery = vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)
-        self.parts = {Part.ROTORS}
+        self.parts = {Equipment.ROTORS}
         if vehicle.battery is not None:
-            self.parts.add(Part.BATTERY)
+            self.parts.add(Equipment.BATTERY)
         if feedback is Feedback.SENSORS:
-            self.parts.add(Part.SENSORS)
+            self.parts.add(Equipment.SENSORS)
         self._taken_ah = 0.0
 
     def inject(self, asked: Fault, world: World) -> tuple[World, FaultResult]:

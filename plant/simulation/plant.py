@@ -20,7 +20,7 @@ from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import Vehicle
 
 
-class Actuation:
+class DelayedCommands:
     """Delayed commands: the rotors follow the last one that has arrived, also between two frames."""
 
     def __init__(self, first: ActuatorCommand) -> None:
@@ -68,7 +68,7 @@ class Plant:
             suite = SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults)
             self._measure = suite.measure
             physics.specific_force(world)  # loads it, before any frame
-        self._actuation = Actuation(_held(world, vehicle))
+        self._actuation = DelayedCommands(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
 

@@ -7,7 +7,7 @@ ArduPilot, AP_Motors_Thrust_Linearization.cpp, AP_Motors_Class.h, AP_GPS and SIT
 from collections.abc import Callable
 from typing import Final, NamedTuple, TypeAlias
 
-from colibri.mavlink.parameters.store import Kind
+from colibri.mavlink.parameters.store import ParamType
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 from colibri.plant.vehicle.description import Rotors, Vehicle, VehicleError
 
@@ -107,7 +107,7 @@ def px4_file(vehicle: Vehicle, remark: str) -> str:
     """Return PX4's parameters as QGroundControl reads them."""
     lines = [f"# {remark}", "#", "# Vehicle-Id Component-Id Name Value Type"]
     for name, value in px4_parameters(vehicle).items():
-        kind = Kind.INT if isinstance(value, int) else Kind.REAL
+        kind = ParamType.INT if isinstance(value, int) else ParamType.REAL
         if name == PX4_DELAYS[0]:
             lines.append("# The delay of GPS by its three names: a PX4 has one of them, and passes over the others.")
         lines.append("\t".join(("1", str(AUTOPILOT_COMPONENT), name, _px4_text(name, value), str(kind.value))))

@@ -11,14 +11,14 @@ import msgspec
 from colibri.common.config import NotNegative, Positive, Table
 
 
-class Part(Table, frozen=True, kw_only=True):
+class SensorPart(Table, frozen=True, kw_only=True):
     """A part that can be bought."""
 
     part: str
     """What it is, with maker."""
 
 
-class Accelerometer(Part, frozen=True, kw_only=True):
+class Accelerometer(SensorPart, frozen=True, kw_only=True):
     """Measures specific force along the FLU axes, at every frame."""
 
     noise_density_m_s2_rthz: NotNegative
@@ -27,7 +27,7 @@ class Accelerometer(Part, frozen=True, kw_only=True):
     range_m_s2: Positive
 
 
-class Gyroscope(Part, frozen=True, kw_only=True):
+class Gyroscope(SensorPart, frozen=True, kw_only=True):
     """Measures rates about the FLU axes, at every frame."""
 
     noise_density_rad_s_rthz: NotNegative
@@ -36,7 +36,7 @@ class Gyroscope(Part, frozen=True, kw_only=True):
     range_rad_s: Positive
 
 
-class Magnetometer(Part, frozen=True, kw_only=True):
+class Magnetometer(SensorPart, frozen=True, kw_only=True):
     """Measures the magnetic field along the FLU axes."""
 
     rate_hz: Positive
@@ -45,7 +45,7 @@ class Magnetometer(Part, frozen=True, kw_only=True):
     """Standard deviation, along each axis, of the field of the vehicle itself that calibration has left."""
 
 
-class Barometer(Part, frozen=True, kw_only=True):
+class Barometer(SensorPart, frozen=True, kw_only=True):
     """Measures static pressure."""
 
     rate_hz: Positive
@@ -55,7 +55,7 @@ class Barometer(Part, frozen=True, kw_only=True):
     drift_time_s: Positive
 
 
-class Gps(Part, frozen=True, kw_only=True):
+class Gps(SensorPart, frozen=True, kw_only=True):
     """Measures position, with noise and drift, and velocity, with noise, some time ago."""
 
     rate_hz: Positive
@@ -72,7 +72,7 @@ class Gps(Part, frozen=True, kw_only=True):
     satellites: Annotated[int, msgspec.Meta(ge=4, le=64)]
 
 
-class Rangefinder(Part, frozen=True, kw_only=True):
+class Rangefinder(SensorPart, frozen=True, kw_only=True):
     """Measures the distance to the ground along the vehicle's own axis, downward."""
 
     rate_hz: Positive

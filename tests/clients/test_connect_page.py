@@ -13,7 +13,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.flights.fleet_spec import GROUND_PORT, SDK_PORT
 from tests.clients.support.geometry import closest_m, place
 from tests.clients.support.mavproxy import MavProxy
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 PAGE = Path(__file__).parents[2] / "docs" / "connect.md"
 GIVE_UP_AFTER_S = 120.0
@@ -42,7 +42,7 @@ def run(code: str, default_port: int, port: int, folder: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def assert_landed(flown: Vehicle) -> None:
+def assert_landed(flown: SitlProcess) -> None:
     landed = flown.seen.wait_until_disarmed()
     assert abs(landed.height_m) < 0.05
 

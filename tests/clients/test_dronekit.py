@@ -9,14 +9,14 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from tests.clients.support.geometry import place
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 PROGRAMS = Path(__file__).parent / "programs"
 SPEED = 4.0
 GIVE_UP_AFTER_S = 180.0
 
 
-def said(program: str, flown: Vehicle) -> list[str]:
+def said(program: str, flown: SitlProcess) -> list[str]:
     command = [sys.executable, str(PROGRAMS / program), f"udpout:127.0.0.1:{flown.port}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GIVE_UP_AFTER_S)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -15,7 +15,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.processes import wait_for
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 pytestmark = pytest.mark.clients
 
@@ -23,7 +23,7 @@ SPEED = 4.0
 
 
 @contextmanager
-def connected(folder: Path, *options: str) -> Iterator[tuple[MavProxy, Vehicle]]:
+def connected(folder: Path, *options: str) -> Iterator[tuple[MavProxy, SitlProcess]]:
     with vehicle(folder, *options, speed=SPEED) as flown, MavProxy(folder, f"udpout:127.0.0.1:{flown.port}") as proxy:
         yield proxy, flown
 

@@ -15,7 +15,7 @@ from tests.clients.mavsdk_scripts import flights, offboard, services
 from tests.clients.support.client import Client
 from tests.clients.support.geometry import away_m, closest_m, during, heading_deg, speed_m_s, swept_rad
 from tools.harness.observer import Observer
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 ROOT = Path(__file__).parents[2]
 SPEED = 3.0
@@ -28,7 +28,7 @@ ACCEPTANCE_M = 0.3
 HOME: Vector = (0.0, 0.0, 0.0)
 
 
-def run(name: str, flown: Vehicle, folder: Path) -> None:
+def run(name: str, flown: SitlProcess, folder: Path) -> None:
     room = folder / name
     room.mkdir()
     command = [sys.executable, "-m", "tests.clients.mavsdk_scripts", name, flown.mavsdk_url]
@@ -37,7 +37,7 @@ def run(name: str, flown: Vehicle, folder: Path) -> None:
 
 
 @contextmanager
-def after(name: str, folder: Path) -> Iterator[Vehicle]:
+def after(name: str, folder: Path) -> Iterator[SitlProcess]:
     with vehicle(folder, speed=SPEED) as flown:
         for parameter in ("COM_OF_LOSS_T", "COM_RC_LOSS_T"):
             flown.seen.set_parameter(parameter, PATIENT_S)

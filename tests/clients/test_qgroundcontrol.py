@@ -13,7 +13,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.observer import Sight
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 CUSTOM = mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -23,7 +23,7 @@ SPEED = 4.0
 
 
 @contextmanager
-def connected(folder: Path) -> Iterator[tuple[GroundStation, Vehicle]]:
+def connected(folder: Path) -> Iterator[tuple[GroundStation, SitlProcess]]:
     with GroundStation() as station, vehicle(folder, links=(station.url,), speed=SPEED) as flown:
         station.wait("HEARTBEAT")
         yield station, flown
@@ -35,7 +35,7 @@ def set_mode(station: GroundStation, mode: Mode) -> None:
     station.wait("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and beat.custom_mode == custom_mode(mode))
 
 
-def take_off(station: GroundStation, flown: Vehicle, height_m: float) -> None:
+def take_off(station: GroundStation, flown: SitlProcess, height_m: float) -> None:
     """Slide to take off: NAV_TAKEOFF with a height above sea level, then arm, once that is acknowledged."""
     assert station.command(mavlink2.MAV_CMD_NAV_TAKEOFF, -1, 0, 0, nan, nan, nan, GROUND_M + height_m) == ACCEPTED
     assert station.command(mavlink2.MAV_CMD_COMPONENT_ARM_DISARM, 1, 0, 0, 0, 0, 0, 0) == ACCEPTED

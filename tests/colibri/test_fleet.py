@@ -26,7 +26,7 @@ from colibri.mavlink.wire.tlog import decode
 from colibri.plant.spec import PlantSpec
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import wait_for
-from tools.harness.sitl_process import WAITING, Vehicle, vehicle
+from tools.harness.sitl_process import WAITING, SitlProcess, vehicle
 
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 
@@ -43,7 +43,7 @@ def test_who_only_starts_vehicles_does_not_load_what_flies() -> None:
 
 
 @contextmanager
-def standing(folder: Path, *links: str) -> Iterator[tuple[Vehicle, list[psutil.Process]]]:
+def standing(folder: Path, *links: str) -> Iterator[tuple[SitlProcess, list[psutil.Process]]]:
     with vehicle(folder, links=links) as flown:
         children = psutil.Process(flown.process.pid).children(recursive=True)
         assert len(children) == 2

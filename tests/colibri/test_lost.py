@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from colibri.analysis.limits import KEYS, Limit, exceeded
+from colibri.analysis.limits import KEYS, ReportLimit, exceeded
 from colibri.analysis.lost import Lost, ground_contact_s, impact, lost
 from colibri.analysis.recording import COLUMNS, Samples
 from colibri.analysis.series.flight_series import FlightSeries
@@ -139,5 +139,5 @@ def test_numbers_of_the_report_have_limits(tmp_path: Path, refused: Refused) -> 
 def test_every_number_that_may_have_a_limit_is_in_the_report(tmp_path: Path) -> None:
     options = ("--link", "memory", "--duration", "21", "--feedback", "sensors")
     report = fly(tmp_path, "hover", *options)
-    assert exceeded([Limit(key, 1e9) for key in KEYS], report) == []
-    assert len(exceeded([Limit(key, -1.0) for key in KEYS], report)) == len(KEYS)
+    assert exceeded([ReportLimit(key, 1e9) for key in KEYS], report) == []
+    assert len(exceeded([ReportLimit(key, -1.0) for key in KEYS], report)) == len(KEYS)

@@ -14,7 +14,7 @@ from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import COMMAND
-from colibri.mavlink.ulog.inputs import Kind, encode_input
+from colibri.mavlink.ulog.inputs import RecordKind, encode_input
 from colibri.mavlink.ulog.reader import FlightFile
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.tlog import decode
@@ -104,7 +104,7 @@ def test_another_autopilot_is_found_out(copy: Path) -> None:
     log = FlightFile(copy / "flight.ulg")
     (setup,) = read_inputs(log.inputs()).setups.values()
     other = msgspec.structs.replace(setup, controller="geometric-se3", profile_tables=load_profile("se3"))
-    content = b"".join(log.encoded()) + encode_input(0, Kind.SETUP, encoded(other))  # the last one holds
+    content = b"".join(log.encoded()) + encode_input(0, RecordKind.SETUP, encoded(other))  # the last one holds
     (copy / "flight.ulg").write_bytes(content)
     difference = replay_flight(copy).difference
     assert difference is not None
@@ -116,7 +116,7 @@ def test_another_autopilot_is_found_out(copy: Path) -> None:
     [
         (None, "flight.ulg: No such file"),
         (BEGINNING, "flight.ulg: no autopilot has begun in it"),
-        (BEGINNING + encode_input(0, Kind.SETUP, b'{"what": "began"}'), "flight.ulg: input at t = 0.000 s: "),
+        (BEGINNING + encode_input(0, RecordKind.SETUP, b'{"what": "began"}'), "flight.ulg: input at t = 0.000 s: "),
         (b"x" * 100, "flight.ulg: not a ULog"),
     ],
 )
@@ -131,7 +131,7 @@ def test_a_log_without_frames_is_not_replayed(copy: Path, refused: Refused) -> N
     log = FlightFile(copy / "flight.ulg")
     (setup,) = read_inputs(log.inputs()).setups.values()
     commands = b"".join(map(COMMAND.encode, log.blocks(COMMAND)))
-    (copy / "flight.ulg").write_bytes(BEGINNING + encode_input(0, Kind.SETUP, encoded(setup)) + commands)
+    (copy / "flight.ulg").write_bytes(BEGINNING + encode_input(0, RecordKind.SETUP, encoded(setup)) + commands)
     assert "flight.ulg: no frame of state feedback is answered in it" in refused("replay", copy)
 
 

@@ -13,7 +13,7 @@ from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.campaigns.definition import CampaignTables, campaign_of
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.values import shown
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
@@ -96,7 +96,7 @@ def test_the_figure_has_a_dot_for_each_flight(estimated: bool, monkeypatch: pyte
     planned = campaign_of(CampaignTables(seeds="1-2", grid=grid, metrics=METRICS))
     verdicts = {names[0]: Verdict.LOST, names[1]: Verdict.FLOWN}
     flown = {
-        point.flight: Flown(point.flight, verdicts[shown(point.factors["contender"])], "", values, "")
+        point.flight: FlightResult(point.flight, verdicts[shown(point.factors["contender"])], "", values, "")
         for point in planned.points()
     }
     seed_figures.draw_seeds(FlightTable(planned, flown), Path())

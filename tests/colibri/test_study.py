@@ -16,7 +16,7 @@ from colibri.campaigns.flights import common_of, plan_point
 from colibri.cli.main import main
 from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import load_vehicle
-from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Settings, Study, campaign, table, write
+from colibri.studies.studies import FORMATS, STUDIES, Measure, Settings, Study, StudyCase, campaign, table, write
 from colibri.studies.study_flights import Flown, fly
 from tests.support.campaigns import Here
 from tests.support.commands import Ran
@@ -127,7 +127,7 @@ def test_the_time_from_which_a_bound_holds(short: Flown) -> None:
 
 def test_a_table_has_rows_of_names_and_columns_of_groups(short: Flown) -> None:
     measures = (Measure("one", lambda _flown: "1"), Measure("two", lambda flown: flown.failure or ""))
-    cases = tuple(Case((row,), group, {"track": row + group}) for row in "ab" for group in ("g", "h"))
+    cases = tuple(StudyCase((row,), group, {"track": row + group}) for row in "ab" for group in ("g", "h"))
     flown = [replace(short, failure=case.flight["track"]) for case in cases]
     headings, rows = table(Study("", ("name",), measures, cases, lambda _results: {}), flown)
     assert headings == ("name", "g: one", "g: two", "h: one", "h: two")
@@ -166,7 +166,7 @@ _LEVEL: Settings = {"track": "hover:height=20", "start": {"x": 0.0, "y": 0.0, "z
 @pytest.mark.long
 def test_a_study_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ran: Ran) -> None:
     flown = {"6": {"track": "lemniscate:lap=6", "duration": 0.4}, "level": _LEVEL}
-    cases = tuple(Case((name, ""), "", flight) for name, flight in flown.items())
+    cases = tuple(StudyCase((name, ""), "", flight) for name, flight in flown.items())
     brief = of_name("recovery")._replace(cases=cases)
     monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief,))
     said = ran("study", "recovery", "--out", tmp_path).out
@@ -187,7 +187,7 @@ def test_a_flight_of_two_studies_is_flown_once(tmp_path: Path, monkeypatch: pyte
             done.append(each)
             yield each
 
-    cases = tuple(Case((name, ""), "", _LEVEL) for name in ("one", "two"))
+    cases = tuple(StudyCase((name, ""), "", _LEVEL) for name in ("one", "two"))
     brief = of_name("recovery")._replace(cases=cases)
     monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief, brief._replace(name="again")))
     monkeypatch.setattr(Pool, "each", counted)

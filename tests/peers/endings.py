@@ -17,7 +17,7 @@ from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.px4 import HOLD
 from colibri.companion.supervision.limits import FlightLimits
-from colibri.companion.supervision.phases import Phase
+from colibri.companion.supervision.phases import CompanionPhase
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from tests.peers.half_speed import PATIENT, Bench, own_physics
@@ -72,9 +72,9 @@ def fly(bench: Bench, case: Case, *, may_arm: bool) -> dict[str, Any]:
     flying_us = disturbed_us = limited_us = 0
     while companion.ended is None and bench.now_us < give_up_us:
         bench.turn()
-        if companion.phase is Phase.CHECKING and not may_arm and companion.peer.report.mode != HOLD.custom:
+        if companion.phase is CompanionPhase.CHECKING and not may_arm and companion.peer.report.mode != HOLD.custom:
             bench.order(mav.MAV_CMD_DO_SET_MODE, *HOLD.command)
-        if companion.phase is Phase.FLYING and not flying_us:
+        if companion.phase is CompanionPhase.FLYING and not flying_us:
             flying_us = bench.now_us
         if flying_us and not disturbed_us and bench.now_us - flying_us > FLIES_S * 1e6:
             disturbed_us = bench.now_us

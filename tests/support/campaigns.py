@@ -12,7 +12,7 @@ import numpy as np
 import colibri
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
 from colibri.campaigns.engines.engine import Job, Killed, Result
-from colibri.campaigns.flights import Flown, common_of, fly_point
+from colibri.campaigns.flights import FlightResult, common_of, fly_point
 from colibri.campaigns.journal import JOURNAL
 from colibri.campaigns.results import CampaignResults
 
@@ -34,7 +34,7 @@ def planned(**tables: Any) -> Campaign:
     return campaign_of(CampaignTables(**({"fly": SHORT} | tables)))
 
 
-def flown(**tables: Any) -> list[Flown]:
+def flown(**tables: Any) -> list[FlightResult]:
     campaign = planned(**tables)
     common = common_of(campaign)
     return [fly_point(common, point) for point in campaign.points()]

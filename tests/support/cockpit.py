@@ -20,14 +20,14 @@ from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.guidance import RESTS, Guidance
 from colibri.autopilot.guidance.sample_grid import instants
-from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
+from colibri.autopilot.guidance.tasks.task import NOT_STEERED, ClientInputs
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem, plan_of
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import ACCEPTED, Command
+from colibri.mavlink.services.command import ACCEPTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.vehicle.description import load_vehicle
@@ -82,7 +82,7 @@ class Cockpit:
         self.commands = Commands(self.pilot, self.fence, self)
         self.now_us = 0
         self.state = at(place)
-        self.steered: Steered = NOT_STEERED
+        self.steered: ClientInputs = NOT_STEERED
         self.guidance = RESTS
         self.pilot.begin(0, self.state, mode=mode)
         self.stock()
@@ -117,7 +117,7 @@ class Cockpit:
         p1, p2, p3, p4 = (*params, *(nan,) * (4 - len(params)))
         number = getattr(mav, f"MAV_CMD_{command}")
         x, y, z = (places.get(axis, nan) for axis in "xyz")
-        asked = Command(number, p1, p2, p3, p4, x, y, z, frame, GROUND, self.now_us)
+        asked = ReceivedCommand(number, p1, p2, p3, p4, x, y, z, frame, GROUND, self.now_us)
         return self.commands.handlers()[number](asked) or Refusal(result=ACCEPTED)
 
     def load(self, plan_type: int, *items: MissionItem) -> None:

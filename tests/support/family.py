@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Array
-from colibri.flights.flight import Direct, Flight
+from colibri.flights.flight import Direct, SteppedFlight
 from colibri.flights.in_process import put_together
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
@@ -65,7 +65,7 @@ def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     autopilot, plant = put_together(replace(plan, start=start), lambda: 0.0)
     states, fallback = [], []
     with gc_frozen():
-        for step, _, world, *_ in Flight(plant, autopilot, Direct()).samples(duration_s):
+        for step, _, world, *_ in SteppedFlight(plant, autopilot, Direct()).samples(duration_s):
             states.append((world.time_us * 1e-6, *world.state))
             fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)
     return _flown(plan, np.array(states), np.array(fallback))

@@ -4,7 +4,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from colibri.mavlink.files.ftp import Ftp
-from colibri.mavlink.files.ftp_wire import DATA_BYTES, Error, Opcode
+from colibri.mavlink.files.ftp_wire import DATA_BYTES, FtpError, Opcode
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Codec
 
@@ -28,7 +28,7 @@ class Reply(NamedTuple):
     @property
     def error(self) -> int:
         assert self.opcode == Opcode.NAK
-        assert self.size == len(self.data) == (2 if self.data[0] == Error.FAIL_ERRNO else 1)
+        assert self.size == len(self.data) == (2 if self.data[0] == FtpError.FAIL_ERRNO else 1)
         return self.data[0]
 
 
@@ -85,7 +85,7 @@ class Client:
         while True:
             reply = self.ask(opcode, path, offset=len(entries))
             if reply.opcode == Opcode.NAK:
-                assert reply.error == Error.END_OF_FILE
+                assert reply.error == FtpError.END_OF_FILE
                 return entries
             assert reply.data.endswith(b"\0")
             entries += reply.data[:-1].split(b"\0")

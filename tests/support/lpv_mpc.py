@@ -6,7 +6,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
 from colibri.autopilot.control.lpv_mpc import model
-from colibri.autopilot.control.lpv_mpc.law import LpvMpc, Memory
+from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc
 from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.profile import load_profile
@@ -34,7 +34,7 @@ class Flight:
     def __init__(self, start: Start, vehicle: Vehicle = VEHICLE, plant: Vehicle = VEHICLE) -> None:
         self.law, self.physics = law(vehicle), Physics(plant, "rk4")
         self.world: World = starting_world(start, plant)
-        self.memory: Memory = self.law.initial(vehicle.hover_speed)
+        self.memory: LawMemory = self.law.initial(vehicle.hover_speed)
         self.decisions: list[Decision] = []
         self.yaw_rad = radians(start.psi)
         self.off_m: Vector = (0.0, 0.0, 0.0)
@@ -47,7 +47,7 @@ class Flight:
         x, y, z = (true + off for true, off in zip(frame.position_enu_m, self.off_m, strict=True))
         return VehicleState((x, y, z), frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
 
-    def take(self, memory: Memory, decision: Decision) -> None:
+    def take(self, memory: LawMemory, decision: Decision) -> None:
         self.memory = memory
         self.decisions.append(decision)
         c1, c2, c3, c4 = (decision.rotor_speeds / VEHICLE.rotors.max_speed).tolist()

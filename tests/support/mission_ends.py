@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from struct import pack
 from typing import Any
 
-from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, Plan
-from colibri.mavlink.mission.service import MissionService, Progress, Vehicle
+from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, StoredPlan
+from colibri.mavlink.mission.service import MissionProgress, MissionService, MissionVehicle
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.statustext import StatusText
@@ -28,13 +28,13 @@ ITEMS = [some_item(number) for number in range(3)]
 
 class Ground:
     def __init__(self, rules: Rules = VALID) -> None:
-        self.loaded: list[tuple[int, Plan]] = []
-        self.progress = Progress()
+        self.loaded: list[tuple[int, StoredPlan]] = []
+        self.progress = MissionProgress()
         self.set: list[tuple[int, bool]] = []
         self.refuses: Refusal | None = None
         self.flown_to: list[tuple[float, float, float, int]] = []
         self.guided: Refusal | None = None
-        vehicle = Vehicle(
+        vehicle = MissionVehicle(
             lambda plan_type, plan: self.loaded.append((plan_type, plan)),
             lambda: self.progress,
             self._set_current,

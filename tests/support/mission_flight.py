@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, MissionExecutor, Reached, SetHome
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
+from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
@@ -85,7 +85,7 @@ class Flight:
                 self.landed = self.arrived = self._towards((there[0], there[1], HOME[2]), 5.0)
             case Return():
                 self.landed = self.arrived = self._towards(HOME, 5.0)
-            case Circle((east, north, up), radius, speed, _):
+            case Orbit((east, north, up), radius, speed, _):
                 angle = atan2(y - north, x - east) - (speed or 5.0) * STEP_US * 1e-6 / radius
                 self.position = (east + abs(radius) * cos(angle), north + abs(radius) * sin(angle), up)
                 self.turns += (speed or 5.0) * STEP_US * 1e-6 / (abs(radius) * tau)

@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.telemetry.encoder import Encoder
-from colibri.mavlink.telemetry.snapshot import BatteryState, Forecast, Home, Setpoint, Snapshot, SolverState
+from colibri.mavlink.telemetry.snapshot import (
+    BatteryState,
+    Forecast,
+    HomePosition,
+    Setpoint,
+    SolverState,
+    TelemetrySnapshot,
+)
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Codec
 
@@ -19,7 +26,7 @@ FORECASTS = tuple(
     Forecast(0.1 * k, (k, 2.0 * k, 3.0 * k), (0.1 * k, 0.0, 0.0), (0.0, 0.1 * k, 0.0), YAW_NORTH, 0.5)
     for k in range(1, 11)
 )
-FLYING = Snapshot(
+FLYING = TelemetrySnapshot(
     time_us=12_345_678,
     armed=True,
     custom_mode=3 << 16,
@@ -31,7 +38,7 @@ FLYING = Snapshot(
     attitude=quaternion_from_euler(0.1, 0.2, YAW_NORTH),
     rate_flu_rad_s=(0.1, 0.2, 0.3),
     origin=ORIGIN,
-    home=Home((1.0, 2.0, 5.0), 0.0),
+    home=HomePosition((1.0, 2.0, 5.0), 0.0),
     rotor_speeds_rad_s=(100.0, 200.0, 100.0, 200.0),
     controls=(0.5, 0.6, 0.7, 0.8),
     battery=BatteryState(3, 11.1, 14.0, 0.5, 0.1, 240.0, 5.0, 2),
@@ -54,10 +61,12 @@ FLYING = Snapshot(
 )
 
 NOT_TOLD: dict[str, Any] = {"sensed": st.none(), "fix": st.none(), "latest": st.just({}), "estimator": st.none()}
-ARBITRARY = st.builds(Snapshot, **dict.fromkeys(set(Snapshot._fields) - set(NOT_TOLD), ...), **NOT_TOLD)
+ARBITRARY = st.builds(
+    TelemetrySnapshot, **dict.fromkeys(set(TelemetrySnapshot._fields) - set(NOT_TOLD), ...), **NOT_TOLD
+)
 
 
-def sent(name: str, snapshot: Snapshot, table: dict[str, Encoder] = TELEMETRY) -> list[Any]:
+def sent(name: str, snapshot: TelemetrySnapshot, table: dict[str, Encoder] = TELEMETRY) -> list[Any]:
     """Return the fields that arrive when `snapshot` is told by messages `name`."""
     fields = table[name](snapshot)
     messages = [] if fields is None else fields if isinstance(fields, list) else [fields]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
@@ -58,5 +58,5 @@ def files_in(folder: Path) -> Mapping[str, str]:
     return {name: (folder / name).read_text(encoding="utf-8") for name in ("profile.toml", "trials.csv")}
 
 
-def flown(*metrics: float | None, verdict: Verdict = Verdict.FLOWN, flight: int = 0) -> Flown:
-    return Flown(flight, verdict, "" if verdict is Verdict.FLOWN else "why", metrics, "")
+def flown(*metrics: float | None, verdict: Verdict = Verdict.FLOWN, flight: int = 0) -> FlightResult:
+    return FlightResult(flight, verdict, "" if verdict is Verdict.FLOWN else "why", metrics, "")

@@ -6,13 +6,13 @@ import pytest
 
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import SITUATIONS, Flown, airborne
+from tools.chaos.flights import SITUATIONS, ChaosFlight, airborne
 from tools.chaos.places import Thrower
 
 
 def flown(flight: Sitl, situation: str, place: str, times: float) -> tuple[str, str]:
     SITUATIONS[situation](flight)
-    verdict = Flown(flight, situation, Thrower(place, times)).judged()
+    verdict = ChaosFlight(flight, situation, Thrower(place, times)).judged()
     return verdict.outcome, verdict.said
 
 

@@ -20,7 +20,7 @@ from colibri.mavlink.streaming.service import MAX_STREAMED
 from colibri.mavlink.wire.dialect import mav
 from tools.frames.requests import REQUESTS, Sender, in_the_air
 from tools.fuzz.flight import BareFlight
-from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 ALL_ARE_USED = """
 import sys
@@ -128,7 +128,7 @@ def test_a_frame_streams_few_messages(counted: Counted) -> None:
 def test_a_flood_does_not_lock_out_other_stations(flood: str) -> None:
     flight = BareFlight()
     in_the_air(flight)
-    other = flight.add(Client(system=254, port=20_000))
+    other = flight.add(HarnessClient(system=254, port=20_000))
     datagram = max((b"".join(messages)[:4096] for messages in REQUESTS[flood](flight)), key=len)
     parameter = next(each for each in flight.copter.parameters if each.name == "VEH_MASS")
     for frame in range(150):

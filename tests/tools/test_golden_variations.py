@@ -7,7 +7,7 @@ import pytest
 from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
 from tools.golden.__main__ import main as golden_main
-from tools.golden.variations import Flown, Variation, fly, variations
+from tools.golden.variations import GoldenHashes, Variation, fly, variations
 from tools.harness.processes import begins_as_recorded
 
 FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mpc", "crown", "tumbling-by-se3")
@@ -15,7 +15,7 @@ FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mp
 ALL = {variation.name: variation for variation in variations()}
 
 
-def check(variation: Variation, flown: Flown) -> None:
+def check(variation: Variation, flown: GoldenHashes) -> None:
     differing = [
         f"{flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}"
         for flight, (expected, found) in flown.differing().items()
@@ -23,7 +23,7 @@ def check(variation: Variation, flown: Flown) -> None:
     assert not differing, f"not the golden flights, {variation.name}, {flown.took_s:.0f} s:\n" + "\n".join(differing)
 
 
-def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: tuple[str, ...] = ()) -> Flown:
+def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: tuple[str, ...] = ()) -> GoldenHashes:
     obstacle = variation.obstacle()
     if obstacle:
         pytest.skip(f"{variation.name}: {obstacle}")

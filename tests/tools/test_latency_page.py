@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import COLUMNS, Recording
-from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, Flight, Merit, Point, fly, merit, tables
+from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, LatencyFlight, Merit, SweepPoint, fly, merit, tables
 
 GOOD, BAD = Merit(0.001, 0.0, 40.0), Merit(0.4, 0.1, 70.0)
 
@@ -27,7 +27,7 @@ def test_flights_off_track_early_or_inverted_are_lost() -> None:
 
 def test_the_page_says_up_to_where_it_flies() -> None:
     flown: dict[float, tuple[Merit | None, Merit | None]] = {0: (GOOD, GOOD), 8: (BAD, GOOD), 16: (GOOD, None)}
-    points = [Point(law, way, ms, *flown[ms]) for law in LAWS for way in WAYS for ms in flown]
+    points = [SweepPoint(law, way, ms, *flown[ms]) for law in LAWS for way in WAYS for ms in flown]
     text = "".join(tables(points))
     assert text.count("| 0 ms | 8 ms |") == len(LAWS) * len(WAYS)
     assert text.count("| lost |") > 0
@@ -36,8 +36,8 @@ def test_the_page_says_up_to_where_it_flies() -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_only_compensation_survives_a_long_round_trip(law: str) -> None:
     case = LEMNISCATE._replace(duration_s=4.0, judged_from_s=3.0)
-    at_once, late = fly(Flight(law, case, 0.0, None)), fly(Flight(law, case, 40.0, None))
+    at_once, late = fly(LatencyFlight(law, case, 0.0, None)), fly(LatencyFlight(law, case, 40.0, None))
     assert at_once is not None
     assert late is not None
     assert late.rms_m < 1.5 * at_once.rms_m
-    assert fly(Flight(law, case, 40.0, 0.0)) is None
+    assert fly(LatencyFlight(law, case, 40.0, 0.0)) is None

@@ -4,13 +4,13 @@ import pytest
 
 from tools.chaos.places import Thrower
 from tools.random_flights.__main__ import main
-from tools.random_flights.cases import Case, Event, case_of
+from tools.random_flights.cases import RandomEvent, RandomFlight, case_of
 from tools.random_flights.flights import fly
 
 
-def case(*events: Event, well: bool = True) -> Case:
-    also = () if well else (Event(0.0, "silence", (0.1,)),)
-    return Case(1, "hummingbird", "state", "0@0", None, {}, 3.0, 25.0, [*events, *also])
+def case(*events: RandomEvent, well: bool = True) -> RandomFlight:
+    also = () if well else (RandomEvent(0.0, "silence", (0.1,)),)
+    return RandomFlight(1, "hummingbird", "state", "0@0", None, {}, 3.0, 25.0, [*events, *also])
 
 
 def test_a_seed_is_always_the_same_case() -> None:
@@ -20,12 +20,12 @@ def test_a_seed_is_always_the_same_case() -> None:
 @pytest.mark.parametrize(
     ("events", "well", "violated"),
     [
-        ([Event(4.0, "goto", (5.0, 0.0, 3.0))], True, ""),
-        ([Event(3.0, "inject", ("motor", "off", 0.0))], False, ""),
-        ([Event(3.0, "disarm")], True, "ValueError at "),
+        ([RandomEvent(4.0, "goto", (5.0, 0.0, 3.0))], True, ""),
+        ([RandomEvent(3.0, "inject", ("motor", "off", 0.0))], False, ""),
+        ([RandomEvent(3.0, "disarm")], True, "ValueError at "),
     ],
 )
-def test_flights_are_judged(events: list[Event], well: bool, violated: str) -> None:
+def test_flights_are_judged(events: list[RandomEvent], well: bool, violated: str) -> None:
     assert fly(case(*events, well=well)).violated[:14] == violated[:14]
 
 
@@ -39,7 +39,7 @@ def test_an_exception_is_a_failure() -> None:
 
 
 def test_a_failing_seed_says_how_to_repeat(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("tools.random_flights.__main__.case_of", lambda _: case(Event(0.1, "disarm")))
+    monkeypatch.setattr("tools.random_flights.__main__.case_of", lambda _: case(RandomEvent(0.1, "disarm")))
     monkeypatch.setattr("sys.argv", ["random_flights", "--seeds", "3"])
     assert main() == 1
     out = capsys.readouterr().out

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 
 from colibri.bench.run import bench
-from colibri.bench.speed import Peer
+from colibri.bench.speed import PeerSimulator
 from colibri.cli.computer.bench import add_options
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail_interrupted, use_one_thread
@@ -16,7 +16,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     add_options(parser)
     args = parser.parse_args(argv)
     use_one_thread()
-    peer = Peer("rotorpy", rotorpy_peer.real_time_factor) if rotorpy_peer.installed() else None
+    peer = PeerSimulator("rotorpy", rotorpy_peer.real_time_factor) if rotorpy_peer.installed() else None
     if peer is None and "flights" in (args.only or ["flights"]):
         sys.stderr.write(f"colibri: {rotorpy_peer.MISSING}\n")
     try:

@@ -16,7 +16,7 @@ from typing import Any
 
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.vehicle import Sitl
-from tools.chaos.flights import SITUATIONS, Flown, airborne
+from tools.chaos.flights import SITUATIONS, ChaosFlight, airborne
 from tools.chaos.places import PLACES, Thrower
 
 SPAN_S = 4.8
@@ -117,7 +117,7 @@ def _go_on(flight: Sitl, situation: str, seconds: float) -> None:
 def _fly(flight: Sitl, place: str, times: float, case: dict[str, Any], out: int) -> None:
     pid = os.fork()
     if pid == 0:
-        verdict = Flown(flight, case["situation"], Thrower(place, times)).judged()
+        verdict = ChaosFlight(flight, case["situation"], Thrower(place, times)).judged()
         facts = {**case, "place": place, "goes_on": times > 1.0, "at_s": round(flight.time_s, 3), **verdict._asdict()}
         os.write(out, (json.dumps({**facts, "bad": not verdict.holds}) + "\n").encode())
         os._exit(0)

@@ -24,7 +24,7 @@ _LOST_M = 60.0
 _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
-class Verdict(NamedTuple):
+class ChaosOutcome(NamedTuple):
     """Outcome of a flight."""
 
     outcome: str  # "flown on", "landed", "not reached", or the violated condition
@@ -74,14 +74,14 @@ SITUATIONS: dict[str, Callable[[Sitl], None]] = {
 }
 
 
-class Flown:
+class ChaosFlight:
     """A flight with a thrower in it."""
 
     def __init__(self, flight: Sitl, situation: str, thrower: Thrower) -> None:
         self._flight, self._situation, self._thrower = flight, situation, thrower
         self._frames = 0
 
-    def judged(self) -> Verdict:
+    def judged(self) -> ChaosOutcome:
         flight, copter = self._flight, self._flight.inside.copter
         flight.gcs.forget()
         self._thrower.arm()
@@ -98,7 +98,7 @@ class Flown:
             outcome = "no record"
         elif not said:
             outcome += ", unsaid"
-        return Verdict(outcome, self._thrower.thrown, said)
+        return ChaosOutcome(outcome, self._thrower.thrown, said)
 
     def _flown(self) -> str:
         flight = self._flight

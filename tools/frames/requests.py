@@ -8,12 +8,12 @@ from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem
-from colibri.mavlink.parameters.store import Kind, Parameter, bits_of
+from colibri.mavlink.parameters.store import Parameter, ParamType, bits_of
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
 from tools.fuzz.flight import BareFlight
 from tools.fuzz.vehicle import HIGH
-from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 TO = (SYSTEM, COMPONENT)
 STATIONS = 32
@@ -65,7 +65,7 @@ class Sender:
         default = parameter.default
         value = default * (1.0 + share) if isinstance(default, float) else default + 1
         value = min(max(value, parameter.minimum), parameter.maximum)
-        if parameter.kind == Kind.INT:
+        if parameter.kind == ParamType.INT:
             value = int(value)
         bits = Bits(bits_of(parameter.kind, value))
         return self("PARAM_SET", *TO, parameter.name.encode(), bits, parameter.kind)
@@ -129,8 +129,8 @@ def _bursts(flight: BareFlight) -> Iterator[list[bytes]]:
     yield [send.file(_BURST, session=i) for i in range(8)]
 
 
-def _others(flight: BareFlight) -> list[Client]:
-    return [flight.add(Client(port=20_000 + i)) for i in range(STATIONS - 1)]
+def _others(flight: BareFlight) -> list[HarnessClient]:
+    return [flight.add(HarnessClient(port=20_000 + i)) for i in range(STATIONS - 1)]
 
 
 def _streams(flight: BareFlight) -> Iterator[list[bytes]]:
@@ -187,7 +187,7 @@ def _tracks(flight: BareFlight) -> Iterator[list[bytes]]:
     send = Sender(flight)
     for index, _ in enumerate(TRACKS):
         yield [
-            send("PARAM_SET", *TO, b"TRACK", Bits(index), Kind.INT),
+            send("PARAM_SET", *TO, b"TRACK", Bits(index), ParamType.INT),
             send.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24),
         ]
         yield []

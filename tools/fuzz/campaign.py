@@ -20,7 +20,7 @@ _LOOK_EVERY_S = 0.1
 _EXIT_CODES = {"plant": 0, "autopilot": 130}
 
 
-class Outcome(NamedTuple):
+class FuzzOutcome(NamedTuple):
     """Outcome of a campaign."""
 
     sent: dict[tuple[str, str], int]  # bad datagrams by receiver and kind
@@ -29,7 +29,7 @@ class Outcome(NamedTuple):
     failures: list[str]
 
 
-def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> Outcome:
+def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> FuzzOutcome:
     """Fly until `quota` datagrams of each kind were sent to each process; compare with an undisturbed flight.
 
     With each good datagram goes a `burst`, half of each kind.
@@ -55,7 +55,7 @@ def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> Outcome:
     failures += [f"{name} said: {process.errors()}" for name, process in processes.items() if process.errors()]
     memory = {name: (before[name], after[name]) for name in processes}
     failures += [f"the {name} grew" for name, (was, now) in memory.items() if now - was > MAX_GROWTH_MIB]
-    return Outcome(relay.sent, lost, memory, failures)
+    return FuzzOutcome(relay.sent, lost, memory, failures)
 
 
 def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:

@@ -10,7 +10,7 @@ from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.types import Vector
-from colibri.flights.flight import Direct, Flight
+from colibri.flights.flight import Direct, SteppedFlight
 from colibri.mavlink.files.tree import Files
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand
@@ -21,7 +21,7 @@ from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.stepping import Steered, Stepped
-from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 STANDING = Start()
 """On its feet: z counts from where the vehicle stands."""
@@ -39,12 +39,12 @@ class BareFlight(Stepped, Steered):
     def __init__(self, files: Files | None = None) -> None:
         self._vehicle = load_vehicle(_PROFILE.simulation.vehicle)
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=DEFAULT_ORIGIN, files=files)
-        self.client = Client()
-        self._clients: list[Client] = []
+        self.client = HarnessClient()
+        self._clients: list[HarnessClient] = []
         autopilot = self._new_autopilot()
         builder = PlantBuilder(WorldSpec(), self._vehicle, {Feedback.STATE: STANDING}, origin=DEFAULT_ORIGIN)
         self.plant = builder.build(Feedback.STATE, autopilot.frame_interval_us)
-        self._flight = Flight(self.plant, autopilot, Direct())
+        self._flight = SteppedFlight(self.plant, autopilot, Direct())
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.add(self.client)
         self.step()
@@ -67,13 +67,13 @@ class BareFlight(Stepped, Steered):
         x, y, z = self.plant.world.state[6:9]
         return (x, y, z)
 
-    def add(self, client: Client) -> Client:
+    def add(self, client: HarnessClient) -> HarnessClient:
         self._clients.append(client)
         self.copter.stations.hub.open(client.link, client.address)
         return client
 
     def restart(self) -> None:
-        self._flight = Flight(self.plant, self._new_autopilot(), Direct())
+        self._flight = SteppedFlight(self.plant, self._new_autopilot(), Direct())
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
 

@@ -12,7 +12,7 @@ import psutil
 
 from colibri.autopilot.commander.rules.modes import State
 from colibri.mavlink.files.tree import Files
-from tools.fuzz.vehicle import SITUATIONS, BrokenError, Target
+from tools.fuzz.vehicle import SITUATIONS, BrokenError, FuzzedVehicle
 
 MAX_GROWTH_MIB = 4.0
 FEWEST_FOR_MEMORY = 200_000
@@ -34,7 +34,7 @@ class GroundOutcome(NamedTuple):
 
 def ground_campaign(quota: int, *, seed: int, files: Files | None = None) -> GroundOutcome:
     chance = random.Random(seed)
-    target = Target(chance, files)
+    target = FuzzedVehicle(chance, files)
     sent = 0
     memory_mib: list[float] = []
     failures: list[str] = []
@@ -66,7 +66,7 @@ def growth_mib(samples: Sequence[float]) -> float:
     return 5.0 * median(median(b) - median(a) for a, b in pairwise(sixths))
 
 
-def _fire(target: Target, situation: State, chance: random.Random, quota: int) -> int:
+def _fire(target: FuzzedVehicle, situation: State, chance: random.Random, quota: int) -> int:
     target.prepare(situation)
     sent = 0
     while sent < quota and not target.lost:

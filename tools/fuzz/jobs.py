@@ -21,30 +21,30 @@ class Job(NamedTuple):
     messages: int  # from ground stations
 
 
-class Result(NamedTuple):
+class JobResult(NamedTuple):
     """Rows of the table, and failures."""
 
     lines: list[str]
     failures: list[str]
 
 
-def fire(job: Job) -> Result:
+def fire(job: Job) -> JobResult:
     started_s = perf_counter()
     with tempfile.TemporaryDirectory() as name:
         return (_lockstep if job.datagrams else _ground)(job, Path(name), started_s)
 
 
-def _lockstep(job: Job, folder: Path, started_s: float) -> Result:
+def _lockstep(job: Job, folder: Path, started_s: float) -> JobResult:
     outcome = campaign(folder, job.datagrams, burst=BURST, seed=job.seed)
     failures = outcome.failures + [f"{outcome.lost} datagrams never arrived"] * (outcome.lost > 0)
     lines = []
     for name, memory_mib in outcome.memory_mib.items():
         sent = sum(count for (whom, _), count in outcome.sent.items() if whom == name)
         lines.append(_line(name, job.seed, sent, memory_mib, started_s, "the flight is unchanged", failures))
-    return Result(lines, [f"seed {job.seed}, lockstep: {failure}" for failure in failures])
+    return JobResult(lines, [f"seed {job.seed}, lockstep: {failure}" for failure in failures])
 
 
-def _ground(job: Job, path: Path, started_s: float) -> Result:
+def _ground(job: Job, path: Path, started_s: float) -> JobResult:
     folder = Folder(path)
     outcome = ground_campaign(job.messages, seed=job.seed, files=folder)
     folder.close()
@@ -54,7 +54,7 @@ def _ground(job: Job, path: Path, started_s: float) -> Result:
     )
     sent = sum(outcome.sent.values())
     line = _line("ground stations", job.seed, sent, outcome.memory_mib, started_s, reached, outcome.failures)
-    return Result([line], [f"seed {job.seed}, ground stations: {failure}" for failure in outcome.failures])
+    return JobResult([line], [f"seed {job.seed}, ground stations: {failure}" for failure in outcome.failures])
 
 
 def _line(

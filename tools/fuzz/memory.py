@@ -3,7 +3,7 @@
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
-from colibri.flights.flight import Flight, InMemory
+from colibri.flights.flight import InMemory, SteppedFlight
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.physics.start import DEFAULT_STARTS
 from colibri.plant.physics.world import State
@@ -45,7 +45,7 @@ def fly(frames: int, wire: HostileWire) -> list[State]:
     vehicle = load_vehicle(profile.simulation.vehicle)
     autopilot = track_autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
     builder = PlantBuilder(WorldSpec(), vehicle, DEFAULT_STARTS)
-    flight = Flight(builder.build(Feedback.STATE, FRAME_US), autopilot, wire)
+    flight = SteppedFlight(builder.build(Feedback.STATE, FRAME_US), autopilot, wire)
     states = []
     for _ in range(frames):
         wire.at(flight.time_us)

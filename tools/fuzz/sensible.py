@@ -13,7 +13,7 @@ MAX_SPEED_M_S = 25.0
 _WITHOUT_PLACE = mav.MAV_FRAME_MISSION
 
 
-class Asked(NamedTuple):
+class CommandParameters(NamedTuple):
     """Parameters of a COMMAND_LONG or COMMAND_INT; x and y in degrees, nan if missing."""
 
     p1: float
@@ -25,13 +25,13 @@ class Asked(NamedTuple):
     z: float
 
 
-def asked(fields: Mapping[str, Any]) -> Asked:
+def asked(fields: Mapping[str, Any]) -> CommandParameters:
     p1, p2, p3, p4 = (fields[f"param{number}"] for number in range(1, 5))
     if "x" not in fields:
-        return Asked(p1, p2, p3, p4, fields["param5"], fields["param6"], fields["param7"])
+        return CommandParameters(p1, p2, p3, p4, fields["param5"], fields["param6"], fields["param7"])
     unknown = fields["frame"] == _WITHOUT_PLACE
     x, y = (nan if unknown or value == NOT_GIVEN else value * 1e-7 for value in (fields["x"], fields["y"]))
-    return Asked(p1, p2, p3, p4, x, y, fields["z"])
+    return CommandParameters(p1, p2, p3, p4, x, y, fields["z"])
 
 
 def _nan_or(value: float, allowed: Callable[[float], bool]) -> bool:
@@ -50,12 +50,12 @@ def _speed(value: float) -> bool:
     return 0.0 < value <= MAX_SPEED_M_S
 
 
-def _place(a: Asked) -> bool:
+def _place(a: CommandParameters) -> bool:
     nowhere = isnan(a.x) and isnan(a.y)
     return (nowhere or is_on_earth(a.x, a.y)) and _nan_or(a.z, lambda z: abs(z) < 20_000.0)
 
 
-SENSIBLE: Mapping[int, Callable[[Asked], bool]] = {
+SENSIBLE: Mapping[int, Callable[[CommandParameters], bool]] = {
     mav.MAV_CMD_COMPONENT_ARM_DISARM: lambda a: a.p1 in (0.0, 1.0),
     mav.MAV_CMD_DO_SET_MODE: lambda a: _whole(1, 255)(a.p1) and _whole(1, 255)(a.p2) and _nan_or(a.p3, _whole(0, 255)),
     mav.MAV_CMD_NAV_TAKEOFF: lambda a: _nan_or(a.z, lambda z: abs(z) < 20_000.0),

@@ -18,7 +18,7 @@ from colibri.sitl.vehicle import FORCE
 from tools.fuzz.flight import ACCEPTED, STANDING, BareFlight
 from tools.fuzz.messages import Messages, Sent
 from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
-from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.client import COMPONENT, SYSTEM, HarnessClient
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
 """Falling: a vehicle at rest has landed."""
@@ -43,7 +43,7 @@ class BrokenError(AssertionError):
     """A condition is violated."""
 
 
-class Shooter(Client):
+class Shooter(HarnessClient):
     """A client that decodes acknowledgements only: all requested telemetry would take too long."""
 
     def receive(self, datagram: bytes) -> None:
@@ -56,7 +56,7 @@ class Shooter(Client):
             at = end
 
 
-class Target:
+class FuzzedVehicle:
     """One vehicle under fire from three places."""
 
     def __init__(self, chance: random.Random, files: Files | None = None) -> None:

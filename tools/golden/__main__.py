@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from tools.golden.pythons import other_pythons, set_up
-from tools.golden.variations import ROOT, Flown, Variation, VariationError, fly, variations
+from tools.golden.variations import ROOT, GoldenHashes, Variation, VariationError, fly, variations
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,7 +22,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail_interrupted(ended)
 
 
-def table(flown: Mapping[str, Flown]) -> str:
+def table(flown: Mapping[str, GoldenHashes]) -> str:
     names = list(flown)
     flights = list(dict.fromkeys(flight for each in flown.values() for flight in each.hashes))
     differing = {name: each.differing() for name, each in flown.items()}
@@ -33,7 +33,7 @@ def table(flown: Mapping[str, Flown]) -> str:
 
 
 def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:
-    flown: dict[str, Flown] = {}
+    flown: dict[str, GoldenHashes] = {}
     failed = False
     for variation in chosen:
         obstacle = variation.obstacle()

@@ -46,7 +46,7 @@ class Variation:
         return self.lacks or (f"this CPU has no {', '.join(missing)}" if missing else "")
 
 
-class Flown(NamedTuple):
+class GoldenHashes(NamedTuple):
     """Hash of each golden flight, empty if it did not end, and the duration with compilation."""
 
     hashes: dict[str, str]
@@ -117,7 +117,7 @@ def cpu_flags() -> frozenset[str]:
     return frozenset(flag for line in lines if line.startswith("flags") for flag in line.partition(":")[2].split())
 
 
-def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> Flown:
+def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> GoldenHashes:
     command = [str(variation.python), "-m", "colibri", "verify", "--golden", str(HASHES), "--link", link]
     command += ["--out", str(out), "--quiet", *(f"--only={name}" for name in only)]
     began_s = perf_counter()
@@ -127,7 +127,7 @@ def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[st
         words = done.stderr.strip().splitlines()
         raise VariationError(f"{variation.name}: exit code {done.returncode}: {words[-1] if words else 'no word'}")
     outcomes = json.loads((out / FOUND).read_text(encoding="utf-8"))
-    flown = Flown({name: outcome["sha256"] for name, outcome in outcomes.items()}, took_s)
+    flown = GoldenHashes({name: outcome["sha256"] for name, outcome in outcomes.items()}, took_s)
     assert done.returncode == (1 if flown.differing() else 0), done.stderr
     return flown
 

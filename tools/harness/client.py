@@ -11,7 +11,7 @@ SYSTEM, COMPONENT = 1, 1
 GCS_PORT, SDK_PORT = 14550, 14540
 
 
-class Client(Inbox):
+class HarnessClient(Inbox):
     """A ground station; received messages are in `Inbox`."""
 
     def __init__(self, system: int = 255, component: int = 190, port: int = GCS_PORT, link: int = 0) -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Vector
-from colibri.mavlink.client.client import Client, Found, Talk
+from colibri.mavlink.client.client import Client, Talk, VehicleFound
 from colibri.mavlink.client.commands import Command, set_message_interval
 from colibri.mavlink.client.parameters import ReadParameter, SetParameter
 from colibri.mavlink.client.plans import Download
@@ -139,7 +139,7 @@ class Observer(OnPort):
             for message in self._client.receive(datagram, now_us):
                 self._take(message)
             for event in self._client.take_events():
-                if isinstance(event, Found):
+                if isinstance(event, VehicleFound):
                     for name, interval_us in _INTERVALS_US.items():
                         self._client.begin(set_message_interval(event.vehicle.target, name, interval_us))
             self._news.notify_all()

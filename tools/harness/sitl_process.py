@@ -18,7 +18,7 @@ _COMPILES_HOURS = 0.05
 """The first start after a change compiles."""
 
 
-class Vehicle:
+class SitlProcess:
     """A running `colibri sitl`."""
 
     def __init__(
@@ -61,7 +61,9 @@ class Vehicle:
 
 
 @contextmanager
-def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0) -> Iterator[Vehicle]:
+def vehicle(
+    folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0
+) -> Iterator[SitlProcess]:
     """Run `colibri sitl` within a block, ready to be armed; its state and output are in `folder`."""
     said, printed, state = folder / "sitl.err", folder / "sitl.out", folder / "state"
     with Observer() as seen, said.open("wb") as errors, printed.open("wb") as output:
@@ -72,7 +74,7 @@ def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), sp
             *options,
         ]
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=errors)
-        flown = Vehicle(process, seen, state, said, printed)
+        flown = SitlProcess(process, seen, state, said, printed)
         try:
             wait_for(lambda: seen.sights or process.poll() is not None, "the vehicle's first word", _COMPILES_HOURS)
             assert process.poll() is None, flown.said

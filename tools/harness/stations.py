@@ -34,7 +34,7 @@ class Ack(NamedTuple):
     target: tuple[int, int]
 
 
-class Station:
+class HarnessStation:
     """A ground station; `max_gap_s` is the longest time between heartbeats."""
 
     def __init__(
@@ -113,7 +113,7 @@ class Station:
         self._outbox.append(self._client.encode(name, *fields))
 
 
-class OffboardTask(Station):
+class CirclingCompanion(HarnessStation):
     """A companion that flies a circle by setpoints; `off_m` is its largest error."""
 
     def __init__(self, system_id: int) -> None:

@@ -39,7 +39,7 @@ def main() -> int:
     return 1 if failures else 0
 
 
-def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
+def failures_of(number: int, flight: autopilots.KilledMission) -> list[str]:
     found = [] if flight.flown else [f"mission {number} did not end"]
     found += [f"mission {number}: {flight.words}"] if flight.words else []
     for kill in flight.kills:
@@ -54,7 +54,7 @@ def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
 
 
 def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    def fly(folder: Path, number: int, maximum: int) -> tuple[list[autopilots.Kill], list[str]]:
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[autopilots.AutopilotKill], list[str]]:
         flight = autopilots.fly(folder, feedback, 1000 * seed + number, maximum)
         return flight.kills, failures_of(number, flight)
 
@@ -75,7 +75,7 @@ def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], l
 
 
 def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    def fly(folder: Path, number: int, maximum: int) -> tuple[list[plants.Kill], list[str]]:
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[plants.PlantKill], list[str]]:
         killed, words = plants.fly(folder, feedback, 1000 * seed + number, min(_PLANTS_A_FLIGHT, maximum))
         found = [f"autopilot {number}: {words}"] if words else []
         for kill in killed:

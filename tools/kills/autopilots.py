@@ -11,8 +11,8 @@ from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.sitl.flight_record import tilt_deg
 from tools.harness.processes import Process, topic_rows
-from tools.kills.between import COMPILES_S, Between, Phase
-from tools.kills.station import HOVERS, LEGS, Station, mission
+from tools.kills.between import COMPILES_S, Between, KillInstant
+from tools.kills.station import HOVERS, LEGS, KillStation, mission
 
 _APART_S, _SPREAD_S = 1.8, 1.6
 _JUDGED_S = 2.0
@@ -21,11 +21,11 @@ _COMPUTES_S = 1.5e-3
 STANDING = "y=0,z=0,psi=90,rotors=0"
 
 
-class Kill(NamedTuple):
+class AutopilotKill(NamedTuple):
     """Outcome of a kill."""
 
     time_s: float  # of the frame, simulated
-    phase: Phase
+    phase: KillInstant
     item: int  # of the mission, current
     hovered: bool  # at the kill
     still: bool  # in the same item at the next kill
@@ -36,18 +36,18 @@ class Kill(NamedTuple):
     went_on: bool  # reported by the autopilot
 
 
-class Flight(NamedTuple):
+class KilledMission(NamedTuple):
     """Outcome of a mission."""
 
-    kills: list[Kill]
+    kills: list[AutopilotKill]
     flown: bool
     duration_s: float
     words: str
 
 
-def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> Flight:
+def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> KilledMission:
     folder.mkdir()
-    station = Station(mission(legs))
+    station = KillStation(mission(legs))
     plant = start_plant(folder, "udpin:127.0.0.1:0", seed, out=folder)
     processes = [plant]
     try:
@@ -67,10 +67,10 @@ def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int =
         station.close()
     words = "".join(process.errors() for process in processes)
     truth = topic_rows(folder)
-    return Flight(judged(truth, killer.kills), station.flown, float(truth["t"][-1]), words)
+    return KilledMission(judged(truth, killer.kills), station.flown, float(truth["t"][-1]), words)
 
 
-def start(folder: Path, url: str, station: Station, feedback: Feedback) -> Process:
+def start(folder: Path, url: str, station: KillStation, feedback: Feedback) -> Process:
     options = ("--plant", url, "--gcs", station.url, "--feedback", feedback, "--state", str(folder / "state"))
     return Process(folder, "autopilot", *options)
 
@@ -82,16 +82,16 @@ def start_plant(folder: Path, url: str, seed: int, out: Path | None = None) -> P
 
 class _Killed(NamedTuple):
     time_s: float
-    phase: Phase
+    phase: KillInstant
     item: int
     went_on: bool
 
 
 class _Killer:
-    def __init__(self, folder: Path, between: Between, station: Station, feedback: Feedback, chance: random.Random):
+    def __init__(self, folder: Path, between: Between, station: KillStation, feedback: Feedback, chance: random.Random):
         self._folder, self._between, self._station = folder, between, station
         self._feedback, self._chance = feedback, chance
-        self._phase, self._died_us = Phase.BEFORE, 0
+        self._phase, self._died_us = KillInstant.BEFORE, 0
         self.kills: list[_Killed] = []
         self.processes: list[Process] = []
 
@@ -104,7 +104,7 @@ class _Killer:
     def kill(self) -> bool:
         """Return False if the mission ends before the kill."""
         between, station, chance = self._between, self._station, self._chance
-        self._phase = chance.choice(list(Phase))
+        self._phase = chance.choice(list(KillInstant))
         due_us = self._died_us + round(1e6 * (_APART_S + chance.uniform(0.0, _SPREAD_S)))
         between.at(due_us, self._phase, self._strike)
         between.fly_until(station, lambda: station.flown or not between.waits, "the instant of the kill")
@@ -124,7 +124,7 @@ class _Killer:
         self.processes.append(start(self._folder, self._between.url, self._station, self._feedback))
 
     def _strike(self) -> None:
-        if self._phase is Phase.DURING:
+        if self._phase is KillInstant.DURING:
             sleep(self._chance.uniform(0.0, _COMPUTES_S))
         self.processes[-1].process.kill()
 
@@ -133,7 +133,7 @@ class _Killer:
         return any("restarted in flight" in text for text in self._station.texts)
 
 
-def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
+def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[AutopilotKill]:
     t, place = truth["t"], np.stack([truth[axis] for axis in "xyz"], axis=1)
     tilt = tilt_deg(truth)
     speed = np.sqrt(truth["u"] ** 2 + truth["v"] ** 2 + truth["w"] ** 2)
@@ -147,7 +147,7 @@ def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
         still = bool(hovered and following is not None and following.item == kill.item)
         away = np.linalg.norm(place[near] - place[now], axis=1)
         found.append(
-            Kill(
+            AutopilotKill(
                 kill.time_s,
                 kill.phase,
                 kill.item,

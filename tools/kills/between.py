@@ -9,7 +9,7 @@ from time import monotonic
 
 from colibri.mavlink.wire import dialect
 from tools.harness.ports import bound_socket
-from tools.kills.station import Station
+from tools.kills.station import KillStation
 
 GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
 """By the clock: bounds for what hangs, never a part of a verdict; the first autopilot may have to compile."""
@@ -23,7 +23,7 @@ _ANSWER = 93
 """HIL_ACTUATOR_CONTROLS."""
 
 
-class Phase(Enum):
+class KillInstant(Enum):
     """Instant of a kill within the exchange of a frame."""
 
     BEFORE = "before the frame comes"
@@ -42,11 +42,11 @@ class Between:
     def __init__(self, plant: tuple[str, int]) -> None:
         self._plant = plant
         self.time_us = 0
-        self._due: tuple[int, Phase, Callable[[], None]] | None = None
+        self._due: tuple[int, KillInstant, Callable[[], None]] | None = None
         self._chance = random.Random(0)
         self._open()
 
-    def at(self, time_us: int, phase: Phase, do: Callable[[], None]) -> None:
+    def at(self, time_us: int, phase: KillInstant, do: Callable[[], None]) -> None:
         """Do something once, with the first frame from `time_us` on."""
         self._due = (time_us, phase, do)
 
@@ -60,7 +60,7 @@ class Between:
         self._open()
 
     def fly_until(
-        self, station: Station, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
+        self, station: KillStation, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
     ) -> None:
         """Relay, and serve the ground station, until `condition()`; raise `HangsError` after a bound."""
         give_up_s = monotonic() + give_up_after_s
@@ -105,23 +105,23 @@ class Between:
         if count:
             payload = datagram[_HEAD : _HEAD + min(count, datagram[1])]  # zeros at a payload's end are left out
             self.time_us = int.from_bytes(payload, "little") * unit_us
-        if self._is_due(Phase.BEFORE):
+        if self._is_due(KillInstant.BEFORE):
             return
         if self._autopilot:
             self._send(self._near, datagram, self._autopilot)
-        self._is_due(Phase.DURING)
+        self._is_due(KillInstant.DURING)
 
     def _from_autopilot(self, datagram: bytes) -> None:
         is_answer = _number(datagram) == _ANSWER
         far = self._far
-        if is_answer and self._is_due(Phase.LOST):
+        if is_answer and self._is_due(KillInstant.LOST):
             return
         if far.fileno() >= 0:
             self._send(far, datagram, self._plant)
         if is_answer:
-            self._is_due(Phase.AFTER)
+            self._is_due(KillInstant.AFTER)
 
-    def _is_due(self, phase: Phase) -> bool:
+    def _is_due(self, phase: KillInstant) -> bool:
         """Do the planned action if it is due in this phase; return whether it was."""
         if self._due is None or self._due[1] is not phase or self.time_us < self._due[0]:
             return False

@@ -38,7 +38,7 @@ HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))
 """Items of the mission with a hover."""
 
 
-class Station:
+class KillStation:
     """A ground station on a port of this computer."""
 
     def __init__(self, items: Sequence[MissionItem]) -> None:

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from colibri.analysis.tables import markdown
-from colibri.autopilot.commander.rules.failsafe_table import MEANINGS, NAMES, TABLE, Action, Row
+from colibri.autopilot.commander.rules.failsafe_table import MEANINGS, NAMES, TABLE, Action, FailsafeRow
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.mavlink.parameters.store import Kind, Parameter
+from colibri.mavlink.parameters.store import Parameter, ParamType
 from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_tables
 
@@ -40,13 +40,13 @@ def tables() -> list[str]:
 
 
 def _shown(parameter: Parameter) -> str:
-    whole = parameter.kind == Kind.INT
+    whole = parameter.kind == ParamType.INT
     value = str(int(parameter.default)) if whole else f"{parameter.default:.6g}"
     unit = "" if parameter.unit in ("", "norm") else f" {parameter.unit}"
     return f"`{parameter.name}` {value}{unit}"
 
 
-def _choices(row: Row) -> str:
+def _choices(row: FailsafeRow) -> str:
     shown = (f"{number} {NAMES[action]}" for number, action in row.choices)
     return ", ".join(
         f"**{text}**" if number == row.default else text for text, (number, _) in zip(shown, row.choices, strict=True)

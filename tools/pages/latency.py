@@ -27,7 +27,7 @@ _SETTLED = 3.0
 _WELL_M = 1e-3
 
 
-class Case(NamedTuple):
+class LatencyCase(NamedTuple):
     """A flight of the sweep."""
 
     name: str
@@ -37,10 +37,10 @@ class Case(NamedTuple):
     judged_from_s: float
 
 
-STEP = Case("step", "hover:height=10", {"x": 1.0, "y": 0.0, "z": 10.0}, 12.0, 8.0)
+STEP = LatencyCase("step", "hover:height=10", {"x": 1.0, "y": 0.0, "z": 10.0}, 12.0, 8.0)
 _SPEED_M_S = 4.0 * 2.0 * pi / 6.0
 _ON_IT = {"x": 0.0, "y": 0.0, "z": 10.0, "vx": _SPEED_M_S, "vy": _SPEED_M_S}
-LEMNISCATE = Case("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
+LEMNISCATE = LatencyCase("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
 
 
 class Merit(NamedTuple):
@@ -51,16 +51,16 @@ class Merit(NamedTuple):
     tilt_deg: float  # largest
 
 
-class Flight(NamedTuple):
+class LatencyFlight(NamedTuple):
     """A flight of the sweep; `told_ms` is the delay to compensate, `None` to measure it."""
 
     law: str
-    case: Case
+    case: LatencyCase
     round_trip_ms: float
     told_ms: float | None
 
 
-class Point(NamedTuple):
+class SweepPoint(NamedTuple):
     """Both flights of a law at one round trip; `None` if the vehicle was lost."""
 
     law: str
@@ -84,7 +84,7 @@ def told_ms(way: str, round_trip_ms: float) -> float | None:
     return None if told is None else max(told, 0.0)
 
 
-def merit(recording: Recording, case: Case) -> Merit | None:
+def merit(recording: Recording, case: LatencyCase) -> Merit | None:
     error, t = recording.position_error_m, recording["t"]
     upright = np.cos(recording["phi"]) * np.cos(recording["theta"])
     judged = t >= case.judged_from_s
@@ -97,7 +97,7 @@ def merit(recording: Recording, case: Case) -> Merit | None:
     )
 
 
-def fly(flight: Flight) -> Merit | None:
+def fly(flight: LatencyFlight) -> Merit | None:
     law, case, round_trip_ms, told = flight
     spec = FlightSpec.of(
         case.track,
@@ -116,16 +116,17 @@ def fly(flight: Flight) -> Merit | None:
         return None
 
 
-def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
+def sweep(round_trips_ms: Sequence[float]) -> list[SweepPoint]:
     points = [(law, way, ms) for law in LAWS for way in WAYS for ms in round_trips_ms]
-    flights = [Flight(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
+    flights = [LatencyFlight(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
     merits = in_order(fly, flights, "latency", quiet=False)
     return [
-        Point(*point, *pair) for point, pair in zip(points, zip(merits[::2], merits[1::2], strict=True), strict=True)
+        SweepPoint(*point, *pair)
+        for point, pair in zip(points, zip(merits[::2], merits[1::2], strict=True), strict=True)
     ]
 
 
-def tables(points: Sequence[Point]) -> Iterator[str]:
+def tables(points: Sequence[SweepPoint]) -> Iterator[str]:
     headings = ("round trip (ms)", *(f"{name}: {way}" for name in ("step", "lemniscate") for way in WAYS))
     for law in LAWS:
         yield markdown(headings, [_row(points, law, ms) for ms in sorted({p.round_trip_ms for p in points})], names=1)
@@ -137,17 +138,17 @@ def tables(points: Sequence[Point]) -> Iterator[str]:
         yield markdown(("delay", "flown well up to", "kept up to"), limits, names=1)
 
 
-def _row(points: Sequence[Point], law: str, ms: float) -> tuple[str, ...]:
+def _row(points: Sequence[SweepPoint], law: str, ms: float) -> tuple[str, ...]:
     those = {point.way: point for point in points if point.law == law and point.round_trip_ms == ms}
     steps, tracks = ([_cell(getattr(those[way], name)) for way in WAYS] for name in ("step", "lemniscate"))
     return f"{ms:g}", *steps, *tracks
 
 
-def _is_kept(point: Point) -> bool:
+def _is_kept(point: SweepPoint) -> bool:
     return point.step is not None and point.lemniscate is not None
 
 
-def _is_well(point: Point, points: Sequence[Point]) -> bool:
+def _is_well(point: SweepPoint, points: Sequence[SweepPoint]) -> bool:
     """Whether the errors are within three times the errors without delay, or a millimetre."""
     first = next(it for it in points if (it.law, it.way, it.round_trip_ms) == (point.law, "not", 0))
     if point.step is None or point.lemniscate is None or first.step is None or first.lemniscate is None:
@@ -156,7 +157,7 @@ def _is_well(point: Point, points: Sequence[Point]) -> bool:
     return all(flown.rms_m <= max(_SETTLED * at_once.rms_m, _WELL_M) for flown, at_once in both)
 
 
-def _until(points: Sequence[Point], well: Sequence[bool]) -> str:
+def _until(points: Sequence[SweepPoint], well: Sequence[bool]) -> str:
     count = well.index(False) if False in well else len(well)
     return f"{points[count - 1].round_trip_ms:g} ms" if count else "none"
 
@@ -169,7 +170,7 @@ _COLORS = dict(zip(WAYS, ("#555555", "#0072B2", "#D55E00", "#009E73"), strict=Tr
 _FLOOR_M = 1e-7
 
 
-def draw(points: Sequence[Point], path: Path) -> None:
+def draw(points: Sequence[SweepPoint], path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 6.0), layout="constrained")

@@ -7,7 +7,7 @@ from colibri.analysis.tables import markdown
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.mavlink.parameters.store import FLOAT32_MAX, Kind, Parameter
+from colibri.mavlink.parameters.store import FLOAT32_MAX, Parameter, ParamType
 from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_body
 
@@ -30,7 +30,7 @@ def _row(p: Parameter) -> tuple[str, ...]:
 
 
 def _number(parameter: Parameter, value: float) -> str:
-    if parameter.kind == Kind.INT:
+    if parameter.kind == ParamType.INT:
         return str(int(value))
     return "" if abs(value) >= FLOAT32_MAX else f"{value:.6g}"
 

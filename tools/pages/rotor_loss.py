@@ -12,20 +12,24 @@ from colibri.analysis.figures import GRID, put_head, write_figure
 from colibri.analysis.tables import markdown
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
-from tools.pages.rotor_loss_flights import COLUMNS, HEIGHT_M, UPRIGHT_DEG, Case, Flown, fly_all
+from tools.pages.rotor_loss_flights import COLUMNS, HEIGHT_M, UPRIGHT_DEG, RotorLossCase, RotorLossFlight, fly_all
 from tools.pages.tables import with_tables
 
 SEEDS = range(50)
 CASES = (
-    Case("state told, calm; the blades fly off", Feedback.STATE),
-    Case("sensors, calm; the blades fly off", Feedback.SENSORS),
-    Case("sensors, calm; the motor runs down", Feedback.SENSORS, runs_down=True),
-    Case("sensors, 3 m/s and light turbulence; the blades fly off", Feedback.SENSORS, wind_m_s=3.0, turbulence="light"),
-    Case("sensors, 5 m/s and moderate turbulence; the same", Feedback.SENSORS, wind_m_s=5.0, turbulence="moderate"),
+    RotorLossCase("state told, calm; the blades fly off", Feedback.STATE),
+    RotorLossCase("sensors, calm; the blades fly off", Feedback.SENSORS),
+    RotorLossCase("sensors, calm; the motor runs down", Feedback.SENSORS, runs_down=True),
+    RotorLossCase(
+        "sensors, 3 m/s and light turbulence; the blades fly off", Feedback.SENSORS, wind_m_s=3.0, turbulence="light"
+    ),
+    RotorLossCase(
+        "sensors, 5 m/s and moderate turbulence; the same", Feedback.SENSORS, wind_m_s=5.0, turbulence="moderate"
+    ),
 )
 _DRAWN = CASES[3]
 _THICK_SEED = 5
-_MEASURES: tuple[tuple[str, Callable[[Flown], float], str], ...] = (
+_MEASURES: tuple[tuple[str, Callable[[RotorLossFlight], float], str], ...] = (
     ("noticed after (ms)", lambda flown: 1e3 * flown.noticed_s, ".0f"),
     ("largest tilt (°)", lambda flown: flown.peak_deg, ".1f"),
     ("below 20° for good after (s)", lambda flown: flown.upright_s, ".2f"),
@@ -40,13 +44,13 @@ _ROTORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
 
 
-def table(flown: Mapping[Case, Sequence[Flown]]) -> str:
+def table(flown: Mapping[RotorLossCase, Sequence[RotorLossFlight]]) -> str:
     headings = ("50 flights each", "well", *(name for name, _, _ in _MEASURES))
     rows = [(case.name, f"{sum(one.well for one in of)} of {len(of)}", *_cells(of)) for case, of in flown.items()]
     return markdown(headings, rows, names=1)
 
 
-def draw(flown: Sequence[Flown], title: str) -> Figure:
+def draw(flown: Sequence[RotorLossFlight], title: str) -> Figure:
     figure = Figure(figsize=(10.0, 9.6), dpi=130)
     grid = figure.add_gridspec(5, 2, top=0.9, bottom=0.055, left=0.08, right=0.985, hspace=0.14, wspace=0.13)
     quantities: tuple[tuple[str, Callable[[Array], Array]], ...] = (
@@ -75,7 +79,7 @@ def draw(flown: Sequence[Flown], title: str) -> Figure:
     return figure
 
 
-def _draw_rotors(axes: Axes, flown: Flown) -> None:
+def _draw_rotors(axes: Axes, flown: RotorLossFlight) -> None:
     for rotor, color in enumerate(_ROTORS):
         label = f"rotor {rotor + 1}"
         axes.plot(flown.path[:, 0], flown.path[:, COLUMNS.index("c1") + rotor], color=color, linewidth=0.7, label=label)
@@ -90,7 +94,7 @@ def _finish(axes: Axes, name: str, shown: tuple[float, float], *, last: bool = F
         axes.set_xlabel("since the loss (s)")
 
 
-def _cells(flown: Sequence[Flown]) -> list[str]:
+def _cells(flown: Sequence[RotorLossFlight]) -> list[str]:
     cells = []
     for _, measure, form in _MEASURES:
         values = [measure(one) for one in flown]

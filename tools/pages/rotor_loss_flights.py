@@ -14,7 +14,7 @@ from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
 from colibri.common.types import Array
-from colibri.flights.flight import Direct, Flight
+from colibri.flights.flight import Direct, SteppedFlight
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import Intensity, Wind
@@ -39,7 +39,7 @@ _LOW_M = 0.3
 _FULL_TURN_DEG = 360.0
 
 
-class Case(NamedTuple):
+class RotorLossCase(NamedTuple):
     """Settings of the flights in a row."""
 
     name: str
@@ -49,7 +49,7 @@ class Case(NamedTuple):
     turbulence: Intensity | None = None
 
 
-class Flown(NamedTuple):
+class RotorLossFlight(NamedTuple):
     """One flight."""
 
     seed: int  # of everything random; the rotor is seed mod 4
@@ -108,7 +108,7 @@ def _knock(path: Array) -> float:
     return float(9.81 * (path[1, _T] - path[0, _T]))
 
 
-def fly(case: Case, seed: int) -> Flown:
+def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
     profile = load_profile("flight")
     vehicle = load_vehicle(profile.simulation.vehicle)
     wind = Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0)
@@ -118,24 +118,24 @@ def fly(case: Case, seed: int) -> Flown:
     autopilot = copter_autopilot(profile, vehicle, settings, lambda: 0.0, values=values)
     starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
     plant = PlantBuilder(world, vehicle, starts).build(case.feedback, autopilot.frame_interval_us)
-    flight = Flight(plant, autopilot, Direct())
+    flight = SteppedFlight(plant, autopilot, Direct())
     _take_off(flight)
     return _lose(flight, seed, _fault(case, seed % 4))
 
 
-def fly_all(cases: Iterable[Case], seeds: Iterable[int]) -> dict[Case, list[Flown]]:
+def fly_all(cases: Iterable[RotorLossCase], seeds: Iterable[int]) -> dict[RotorLossCase, list[RotorLossFlight]]:
     numbers = list(seeds)
     with ProcessPoolExecutor(_WORKERS) as pool:
         return {case: list(pool.map(fly, [case] * len(numbers), numbers)) for case in cases}
 
 
-def _fault(case: Case, rotor: int) -> Fault:
+def _fault(case: RotorLossCase, rotor: int) -> Fault:
     if case.runs_down:
         return Fault(MOTOR, OFF, rotor + 1)
     return Fault(MOTOR, WRONG, rotor + 1, (_BLADES_LEFT, 0.0, 0.0, 0.0))
 
 
-def _take_off(flight: Flight[Copter]) -> None:
+def _take_off(flight: SteppedFlight[Copter]) -> None:
     copter, plant = flight.autopilot.stages, flight.plant
     while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
         flight.step()
@@ -148,7 +148,7 @@ def _take_off(flight: Flight[Copter]) -> None:
         assert plant.world.time_us < began_us + _MAX_DURATION_S * 1e6, "it must reach its height"
 
 
-def _lose(flight: Flight[Copter], seed: int, fault: Fault) -> Flown:
+def _lose(flight: SteppedFlight[Copter], seed: int, fault: Fault) -> RotorLossFlight:
     copter, plant = flight.autopilot.stages, flight.plant
     lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
     rows: list[tuple[float, ...]] = []
@@ -166,7 +166,7 @@ def _lose(flight: Flight[Copter], seed: int, fault: Fault) -> Flown:
     path = np.array(rows)
     at_loss = int(np.argmin(np.abs(path[:, _T])))
     path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
-    return Flown(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
+    return RotorLossFlight(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
 
 
 def _seen(plant: Plant) -> tuple[float, ...]:

@@ -10,8 +10,8 @@ import sys
 from time import perf_counter
 
 from colibri.common.process.lifecycle import use_one_thread
-from tools.random_flights.cases import Case, case_of
-from tools.random_flights.flights import Verdict, fly
+from tools.random_flights.cases import RandomFlight, case_of
+from tools.random_flights.flights import RandomFlightOutcome, fly
 
 MAX_FRAME_MS = 20.0
 
@@ -38,7 +38,7 @@ def main() -> int:
     return 1 if failed else 0
 
 
-def _flown(case: Case) -> tuple[Verdict, float]:
+def _flown(case: RandomFlight) -> tuple[RandomFlightOutcome, float]:
     """Return a flight and its longest frame, ms; one that seems too long counts only if it is so again."""
     verdict = _fly(case)
     frames_s = verdict.frames_s
@@ -47,7 +47,7 @@ def _flown(case: Case) -> tuple[Verdict, float]:
     return verdict, max(frames_s, default=0.0) * 1e3
 
 
-def _fly(case: Case) -> Verdict:
+def _fly(case: RandomFlight) -> RandomFlightOutcome:
     gc.collect()
     gc.disable()
     try:

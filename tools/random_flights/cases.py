@@ -8,7 +8,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.hil import faults
-from colibri.mavlink.parameters.store import Kind, Parameter, Value
+from colibri.mavlink.parameters.store import Parameter, ParamType, Value
 from colibri.plant.vehicle.description import load_vehicle
 
 VEHICLES = ("hummingbird", "hummingbird-rangefinder", "iris", "jmavsim")
@@ -20,7 +20,7 @@ _BY_STATE = (faults.MOTOR, faults.BATTERY)
 """Faults that act on flights without sensors."""
 
 
-class Event(NamedTuple):
+class RandomEvent(NamedTuple):
     """An event `after_s` seconds of the one before."""
 
     after_s: float
@@ -31,7 +31,7 @@ class Event(NamedTuple):
         return " ".join((self.what, *(f"{value:.3g}" if isinstance(value, float) else value for value in self.values)))
 
 
-class Case(NamedTuple):
+class RandomFlight(NamedTuple):
     """A flight, and its events from the take-off on."""
 
     seed: int
@@ -42,7 +42,7 @@ class Case(NamedTuple):
     params: dict[str, Value]
     height_m: float
     radius_m: float  # of the fence around home
-    events: list[Event]
+    events: list[RandomEvent]
 
     @property
     def well(self) -> bool:
@@ -62,7 +62,7 @@ class Case(NamedTuple):
         return f"{self.vehicle}, {self.feedback}, {weather}; {params or 'no parameters'}; {events}"
 
 
-def case_of(seed: int) -> Case:
+def case_of(seed: int) -> RandomFlight:
     chance = random.Random(seed)
     vehicle, feedback = chance.choice(VEHICLES), chance.choice(("state", "sensors", "sensors"))
     wind = f"{chance.choice((0.0, chance.uniform(0.0, 6.0), chance.uniform(0.0, 10.0))):.1f}@{chance.randrange(360)}"
@@ -72,32 +72,34 @@ def case_of(seed: int) -> Case:
     params = {it.name: _value(chance, it) for it in chance.sample(known, chance.randrange(6))}
     events = [_mode(chance) for _ in range(chance.randint(2, 4))]
     events += [_failure(chance, feedback) for _ in range(chance.choice((0, 1, 1, 2)))]
-    events += [Event(chance.uniform(1.0, 5.0), "wind", (f"{chance.uniform(0.0, 10.0):.1f}@{chance.randrange(360)}",))]
+    events += [
+        RandomEvent(chance.uniform(1.0, 5.0), "wind", (f"{chance.uniform(0.0, 10.0):.1f}@{chance.randrange(360)}",))
+    ]
     chance.shuffle(events)
-    return Case(seed, vehicle, feedback, wind, turbulence, params, chance.uniform(3.0, 12.0), 25.0, events)
+    return RandomFlight(seed, vehicle, feedback, wind, turbulence, params, chance.uniform(3.0, 12.0), 25.0, events)
 
 
-def _mode(chance: random.Random) -> Event:
+def _mode(chance: random.Random) -> RandomEvent:
     after_s = chance.uniform(0.5, 8.0)
     if chance.random() < 0.35:
         east_m, north_m = chance.uniform(-20.0, 20.0), chance.uniform(-20.0, 20.0)
-        return Event(after_s, "goto", (east_m, north_m, chance.uniform(2.0, 15.0)))
+        return RandomEvent(after_s, "goto", (east_m, north_m, chance.uniform(2.0, 15.0)))
     if chance.random() < 0.2:
-        return Event(after_s, "fly", (chance.choice(TRACKS),))
-    return Event(after_s, chance.choice(MODES), (chance.uniform(-1.0, 1.0), chance.uniform(-1.0, 1.0)))
+        return RandomEvent(after_s, "fly", (chance.choice(TRACKS),))
+    return RandomEvent(after_s, chance.choice(MODES), (chance.uniform(-1.0, 1.0), chance.uniform(-1.0, 1.0)))
 
 
-def _failure(chance: random.Random, feedback: str) -> Event:
+def _failure(chance: random.Random, feedback: str) -> RandomEvent:
     after_s = chance.uniform(0.5, 8.0)
     if chance.random() < 0.15:
-        return Event(after_s, "silence", (chance.uniform(1.0, 20.0),))
+        return RandomEvent(after_s, "silence", (chance.uniform(1.0, 20.0),))
     rows = [row for row in faults.ROWS if row.kind != faults.OK]
     row = chance.choice([row for row in rows if feedback == "sensors" or row.unit in _BY_STATE])
     usual = [it.usual for it in row.values]
     times = chance.choice((1.0, 2.0 ** chance.uniform(-2.0, 4.0)))
     values = [min(max(it.usual * times, it.minimum), it.maximum) for it in row.values] if any(usual) else usual
     instance = float(chance.randint(1, row.instances))
-    return Event(after_s, "inject", (faults.unit_name(row.unit), faults.kind_name(row.kind), instance, *values))
+    return RandomEvent(after_s, "inject", (faults.unit_name(row.unit), faults.kind_name(row.kind), instance, *values))
 
 
 def _value(chance: random.Random, parameter: Parameter) -> Value:
@@ -106,4 +108,4 @@ def _value(chance: random.Random, parameter: Parameter) -> Value:
     low, high = max(parameter.minimum, -1e3), min(parameter.maximum, 1e3)
     drawn = parameter.default * 2.0 ** chance.uniform(-2.0, 2.0) if parameter.default else chance.uniform(low, high)
     drawn = min(max(drawn, low), high)
-    return round(drawn) if parameter.kind is Kind.INT else drawn
+    return round(drawn) if parameter.kind is ParamType.INT else drawn

@@ -14,7 +14,7 @@ from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.session import Flights
 from colibri.sitl.stepping import NotInTimeError
 from colibri.sitl.vehicle import Sitl
-from tools.random_flights.cases import Case, Event
+from tools.random_flights.cases import RandomEvent, RandomFlight
 
 MAX_IMPACT_M_S = 4.0
 """What the vehicle calls an impact is 3 m/s, by its estimate."""
@@ -24,7 +24,7 @@ AFTER_S = 5.0
 LAND_WITHIN_S = 150.0
 
 
-class Verdict(NamedTuple):
+class RandomFlightOutcome(NamedTuple):
     """Outcome of a flight."""
 
     violated: str  # the condition, or empty
@@ -33,18 +33,18 @@ class Verdict(NamedTuple):
     texts: list[str]  # with their times
 
 
-def fly(case: Case) -> Verdict:
+def fly(case: RandomFlight) -> RandomFlightOutcome:
     named = {name: getattr(case, name) for name in ("vehicle", "feedback", "wind", "seed")}
     turbulence = {"turbulence": case.turbulence} if case.turbulence else {}
     with Flights(setting_of([named, turbulence]), None) as flights:
         flown = _Flown(flights.begin(), case)
         violated = flown.judged()
         texts = [f"{time_s:.2f} s: {text}" for time_s, text in flown.flight.timed_texts]
-        return Verdict(violated, flown.frames_s, flown.flight.time_s, texts)
+        return RandomFlightOutcome(violated, flown.frames_s, flown.flight.time_s, texts)
 
 
 class _Flown:
-    def __init__(self, flight: Sitl, case: Case) -> None:
+    def __init__(self, flight: Sitl, case: RandomFlight) -> None:
         self.flight, self._case = flight, case
         self.frames_s = _timed(flight)
         self._feed: Callable[[], object] = _nothing
@@ -93,7 +93,7 @@ class _Flown:
         self.flight.run(AFTER_S)
         return self._come_down()
 
-    def _happen(self, event: Event) -> None:
+    def _happen(self, event: RandomEvent) -> None:
         flight, values = self.flight, event.values
         numbers = [value for value in values if isinstance(value, float)]
         if event.what == "wind":

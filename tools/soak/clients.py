@@ -15,7 +15,7 @@ import psutil
 from colibri import plant
 from tools.harness.ports import OnPort
 from tools.harness.sitl_process import vehicle
-from tools.harness.stations import OffboardTask, Station
+from tools.harness.stations import CirclingCompanion, HarnessStation
 
 MAX_GAP_S = 1.5
 MAX_GROWTH_BYTES = 2_000_000
@@ -35,11 +35,11 @@ class Look(NamedTuple):
     cpu_s: dict[str, float]
 
 
-def crew() -> tuple[Station, Station, OffboardTask]:
-    return Station(255), Station(254), OffboardTask(245)
+def crew() -> tuple[HarnessStation, HarnessStation, CirclingCompanion]:
+    return HarnessStation(255), HarnessStation(254), CirclingCompanion(245)
 
 
-def faults(crew: Iterable[Station]) -> list[str]:
+def faults(crew: Iterable[HarnessStation]) -> list[str]:
     found = []
     for client in crew:
         name = f"{client.identity[0]}/{client.identity[1]}"
@@ -49,7 +49,7 @@ def faults(crew: Iterable[Station]) -> list[str]:
         acknowledged = sum(client.acks.values())
         if not sum(client.sent.values()) - 2 <= acknowledged <= sum(client.sent.values()):
             found.append(f"{name}: {acknowledged} of {sum(client.sent.values())} commands acknowledged")
-        if isinstance(client, OffboardTask) and not 0.0 < client.off_m < MAX_ERROR_M:
+        if isinstance(client, CirclingCompanion) and not 0.0 < client.off_m < MAX_ERROR_M:
             found.append(f"{name}: {client.off_m:.2f} m off its circle")
     return found
 
@@ -86,7 +86,7 @@ def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
     return figures, wrong
 
 
-def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> dict[str, Any]:
+def _figures(clients: Sequence[HarnessStation], looks: Sequence[Look], warm: Look) -> dict[str, Any]:
     last = looks[-1]
     lasted_s = last.wall_s - warm.wall_s
     return {
@@ -104,7 +104,7 @@ def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> d
             }
             for client in clients
         },
-        "off_m": max(client.off_m for client in clients if isinstance(client, OffboardTask)),
+        "off_m": max(client.off_m for client in clients if isinstance(client, CirclingCompanion)),
         "looks": looks,
     }
 

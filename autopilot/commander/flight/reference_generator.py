@@ -18,7 +18,7 @@ from colibri.autopilot.guidance.reference import (
     still_target,
 )
 from colibri.autopilot.guidance.sample_grid import Instants
-from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
+from colibri.autopilot.guidance.tasks.task import PlannedMotion, PositionMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
 
 
@@ -76,11 +76,11 @@ class ReferenceGenerator:
             self.reference = Reference(np.concatenate((p, v, a, j)), np.concatenate((yaw, yaw_rate)))
             self._waited = True
 
-    def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
+    def lead(self, context: TaskContext, wanted: PositionMotion | PlannedMotion) -> Horizon:
         reference, waited = context.reference, self._waited
         if wanted.pace is Pace.CLOCK and self._path_speed != 1.0:
             reference = slowed(reference, self._path_speed)
-        if isinstance(wanted, Motion):
+        if isinstance(wanted, PositionMotion):
             self._led = led = self._lead_to(reference, wanted, waited=waited)
             self._ahead, self._waited, self.reference = led.horizon, False, led.reference
             return led.for_law
@@ -91,7 +91,7 @@ class ReferenceGenerator:
             return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
         return self._instants.for_law(horizon)
 
-    def _lead_to(self, reference: Reference, wanted: Motion, *, waited: bool) -> Led:
+    def _lead_to(self, reference: Reference, wanted: PositionMotion, *, waited: bool) -> Led:
         before, (target, limits, _) = self._led, wanted
         if before is not None and not waited and before.is_again(reference, target, limits):
             return before

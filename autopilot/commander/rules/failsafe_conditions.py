@@ -9,7 +9,7 @@ from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
 from colibri.autopilot.estimation.estimate import Estimate, Health
-from colibri.autopilot.estimation.sensing.rejection import Source
+from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.autopilot.guidance.integrator_chain import Limits as Pace
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint
@@ -179,8 +179,8 @@ HOLDS_ON_STATE = {condition: holds for condition, holds in HOLDS.items() if cond
 SENSORS: Mapping[Condition, Callable[[Health], bool]] = {
     Condition.GYROSCOPE_LOST: lambda health: not health.gyroscope,
     Condition.ACCELEROMETER_LOST: lambda health: not health.accelerometer,
-    Condition.BAROMETER_LOST: lambda health: Source.BAROMETER in health.not_accepted,
-    Condition.MAGNETOMETER_LOST: lambda health: Source.MAGNETOMETER in health.not_accepted,
+    Condition.BAROMETER_LOST: lambda health: RejectedSource.BAROMETER in health.not_accepted,
+    Condition.MAGNETOMETER_LOST: lambda health: RejectedSource.MAGNETOMETER in health.not_accepted,
 }
 """Sensors that have failed; GPS is silent instead."""
 

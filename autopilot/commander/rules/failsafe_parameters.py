@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.commander.rules.failsafe_rule import Setting
+from colibri.autopilot.commander.rules.failsafe_rule import FailsafeSetting
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 
 Limits: TypeAlias = Mapping[str, float]
 """Parameter name -> value, in the parameter's unit."""
@@ -14,7 +14,7 @@ GROUP = "Failsafes"
 _US = 1e6
 
 
-class Number(NamedTuple):
+class FailsafeNumber(NamedTuple):
     """A limit or delay, with the fields of its parameter; an int `default` makes a switch."""
 
     name: str
@@ -29,7 +29,7 @@ class Number(NamedTuple):
         switch = isinstance(self.default, int)
         return Parameter(
             name=self.name,
-            kind=Kind.INT if switch else Kind.REAL,
+            kind=ParamType.INT if switch else ParamType.REAL,
             default=self.default,
             minimum=self.minimum,
             maximum=self.maximum,
@@ -43,31 +43,35 @@ class Number(NamedTuple):
 
 
 NUMBERS = (
-    Number("COM_ATT_LOSS_T", 0.5, 0.0, 60.0, "s", "Attitude loss delay"),
-    Number("FD_FAIL_R", 80.0, 30.0, 180.0, "deg", "Largest roll", "Beyond it the vehicle is tilted too far."),
-    Number("FD_FAIL_P", 80.0, 30.0, 180.0, "deg", "Largest pitch", "Beyond it the vehicle is tilted too far."),
-    Number("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "Tilt delay", "Of roll and of pitch."),
-    Number("COM_POS_FS_EPH", 5.0, 0.1, 400.0, "m", "Position loss limit", "Horizontal standard deviation."),
-    Number("COM_VEL_FS_EVH", 1.0, 0.1, 30.0, "m/s", "Velocity loss limit", "Horizontal standard deviation."),
-    Number("COM_POS_FS_DELAY", 1.0, 0.0, 100.0, "s", "Position loss delay"),
-    Number("COM_EST_LOSS_T", 1.0, 0.0, 60.0, "s", "Estimate loss delay"),
-    Number("BAT_LOW_THR", 0.15, 0.0, 1.0, "norm", "Low battery", "Part of its charge."),
-    Number("BAT_CRIT_THR", 0.07, 0.0, 1.0, "norm", "Critical battery", "Part of its charge."),
-    Number("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "norm", "Nearly empty battery", "Part of its charge."),
-    Number("BAT_LOW_VOLT", 0.0, 0.0, 100.0, "V", "Low battery voltage", "At its terminals; 0: not looked at."),
-    Number("BAT_CRIT_VOLT", 0.0, 0.0, 100.0, "V", "Critical battery voltage", "At its terminals; 0: not looked at."),
-    Number("BAT_EMERGEN_VOLT", 0.0, 0.0, 100.0, "V", "Nearly empty voltage", "At its terminals; 0: not looked at."),
-    Number("BAT_LOW_T", 1.0, 0.0, 120.0, "s", "Battery delay", "Voltage sags while it climbs."),
-    Number("COM_QP_LOSS_T", 0.5, 0.0, 60.0, "s", "Plan loss delay"),
-    Number("COM_LATE_T", 1.0, 0.0, 60.0, "s", "Deadline delay"),
-    Number("COM_TEL_LOSS_T", 0.5, 0.0, 60.0, "s", "Telemetry loss timeout", "The plant may be silent so long."),
-    Number("COM_DL_LOSS_T", 10.0, 0.5, 300.0, "s", "Ground station loss timeout", "All may be silent so long."),
-    Number("GF_MARGIN", 0.0, 0.0, 1000.0, "m", "Fence margin", "So close to its edge counts as a breach."),
-    Number(
+    FailsafeNumber("COM_ATT_LOSS_T", 0.5, 0.0, 60.0, "s", "Attitude loss delay"),
+    FailsafeNumber("FD_FAIL_R", 80.0, 30.0, 180.0, "deg", "Largest roll", "Beyond it the vehicle is tilted too far."),
+    FailsafeNumber("FD_FAIL_P", 80.0, 30.0, 180.0, "deg", "Largest pitch", "Beyond it the vehicle is tilted too far."),
+    FailsafeNumber("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "Tilt delay", "Of roll and of pitch."),
+    FailsafeNumber("COM_POS_FS_EPH", 5.0, 0.1, 400.0, "m", "Position loss limit", "Horizontal standard deviation."),
+    FailsafeNumber("COM_VEL_FS_EVH", 1.0, 0.1, 30.0, "m/s", "Velocity loss limit", "Horizontal standard deviation."),
+    FailsafeNumber("COM_POS_FS_DELAY", 1.0, 0.0, 100.0, "s", "Position loss delay"),
+    FailsafeNumber("COM_EST_LOSS_T", 1.0, 0.0, 60.0, "s", "Estimate loss delay"),
+    FailsafeNumber("BAT_LOW_THR", 0.15, 0.0, 1.0, "norm", "Low battery", "Part of its charge."),
+    FailsafeNumber("BAT_CRIT_THR", 0.07, 0.0, 1.0, "norm", "Critical battery", "Part of its charge."),
+    FailsafeNumber("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "norm", "Nearly empty battery", "Part of its charge."),
+    FailsafeNumber("BAT_LOW_VOLT", 0.0, 0.0, 100.0, "V", "Low battery voltage", "At its terminals; 0: not looked at."),
+    FailsafeNumber(
+        "BAT_CRIT_VOLT", 0.0, 0.0, 100.0, "V", "Critical battery voltage", "At its terminals; 0: not looked at."
+    ),
+    FailsafeNumber(
+        "BAT_EMERGEN_VOLT", 0.0, 0.0, 100.0, "V", "Nearly empty voltage", "At its terminals; 0: not looked at."
+    ),
+    FailsafeNumber("BAT_LOW_T", 1.0, 0.0, 120.0, "s", "Battery delay", "Voltage sags while it climbs."),
+    FailsafeNumber("COM_QP_LOSS_T", 0.5, 0.0, 60.0, "s", "Plan loss delay"),
+    FailsafeNumber("COM_LATE_T", 1.0, 0.0, 60.0, "s", "Deadline delay"),
+    FailsafeNumber("COM_TEL_LOSS_T", 0.5, 0.0, 60.0, "s", "Telemetry loss timeout", "The plant may be silent so long."),
+    FailsafeNumber("COM_DL_LOSS_T", 10.0, 0.5, 300.0, "s", "Ground station loss timeout", "All may be silent so long."),
+    FailsafeNumber("GF_MARGIN", 0.0, 0.0, 1000.0, "m", "Fence margin", "So close to its edge counts as a breach."),
+    FailsafeNumber(
         "GF_PREDICT", 0, 0, 1, "", "Fence prediction", "Act where the vehicle would come to rest beyond the margin."
     ),
-    Number("COM_SENS_LOSS_T", 0.5, 0.0, 60.0, "s", "Sensor loss delay", "Of all but GPS."),
-    Number("COM_GNSSLOSS_T", 1.0, 1.0, 300.0, "s", "GPS loss timeout"),
+    FailsafeNumber("COM_SENS_LOSS_T", 0.5, 0.0, 60.0, "s", "Sensor loss delay", "Of all but GPS."),
+    FailsafeNumber("COM_GNSSLOSS_T", 1.0, 1.0, 300.0, "s", "GPS loss timeout"),
 )
 
 ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
@@ -115,10 +119,10 @@ def limits(parameters: Parameters) -> Limits:
     return found
 
 
-def settings(parameters: Parameters) -> dict[Condition, Setting]:
+def settings(parameters: Parameters) -> dict[Condition, FailsafeSetting]:
     known = limits(parameters)
     return {
-        row.condition: Setting(
+        row.condition: FailsafeSetting(
             round(known[row.delay] * _US) if row.delay else 0,
             dict(row.choices)[int(parameters[row.parameter])],
         )
@@ -131,7 +135,7 @@ def _actions() -> list[Parameter]:
     return [
         Parameter(
             name=name,
-            kind=Kind.INT,
+            kind=ParamType.INT,
             default=row.default,
             minimum=min(number for number, _ in row.choices),
             maximum=max(number for number, _ in row.choices),

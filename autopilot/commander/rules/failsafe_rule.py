@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, Row
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, FailsafeRow
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
@@ -22,14 +22,14 @@ _SEVERITIES: Mapping[Action, int] = {
 _RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.LAND}
 
 
-class Setting(NamedTuple):
+class FailsafeSetting(NamedTuple):
     """Delay and action of a failsafe."""
 
     delay_us: int
     action: Action
 
 
-class Flight(NamedTuple):
+class FlightState(NamedTuple):
     """State of the flight; `saving` is the active failsafe."""
 
     armed: bool
@@ -43,28 +43,28 @@ class Flight(NamedTuple):
         return max(self.saving, _RANKS.get(self.mode, Action.NONE))
 
 
-class Memory(NamedTuple):
+class FailsafeMemory(NamedTuple):
     """Memory between samples: when each ongoing condition, past its delay, last held."""
 
     held_us: Mapping[Condition, int] = {}
     armed: bool = False
 
 
-class Verdict(NamedTuple):
+class FailsafeDecision(NamedTuple):
     """Action to begin, and MAV_SEVERITY and text of each report."""
 
-    memory: Memory
+    memory: FailsafeMemory
     action: Action
     lines: tuple[tuple[int, str], ...]
 
 
 def following(
-    memory: Memory,
+    memory: FailsafeMemory,
     now_us: int,
     since_us: Mapping[Condition, int],
-    settings: Mapping[Condition, Setting],
-    flight: Flight,
-) -> Verdict:
+    settings: Mapping[Condition, FailsafeSetting],
+    flight: FlightState,
+) -> FailsafeDecision:
     """Decide which failsafes begin and end; arming restarts all holding conditions.
 
     An action begins with its condition: a mode selected later stays until another condition begins.
@@ -75,7 +75,7 @@ def following(
         for condition, at_us in memory.held_us.items()
         if not newly_armed and (flight.armed or ROWS[condition].grounded)
     }
-    begun: list[Row] = []
+    begun: list[FailsafeRow] = []
     cleared: list[tuple[int, str]] = []
     for condition in sorted({*since_us, *held_us}, key=_ORDER.__getitem__):
         row, setting, began_us = ROWS[condition], settings[condition], since_us.get(condition)
@@ -88,12 +88,12 @@ def following(
             del held_us[condition]
             cleared.append((NOTICE, f"{condition}: cleared"))
     if not begun:
-        return Verdict(Memory(held_us, flight.armed), Action.NONE, tuple(cleared))
+        return FailsafeDecision(FailsafeMemory(held_us, flight.armed), Action.NONE, tuple(cleared))
     action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
-    return Verdict(Memory(held_us, flight.armed), action, (*lines, *cleared))
+    return FailsafeDecision(FailsafeMemory(held_us, flight.armed), action, (*lines, *cleared))
 
 
-def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, list[tuple[int, str]]]:
+def _begin(begun: list[tuple[FailsafeRow, Action]], flight: FlightState) -> tuple[Action, list[tuple[int, str]]]:
     begins, lines = Action.NONE, []
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)
@@ -108,7 +108,7 @@ def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, lis
     return begins, lines
 
 
-def _fitting(action: Action, flight: Flight) -> Action:
+def _fitting(action: Action, flight: FlightState) -> Action:
     if action is Action.WARN or not flight.armed:
         return Action.WARN
     return Action.TERMINATE if flight.standing else action

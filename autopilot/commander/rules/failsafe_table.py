@@ -62,7 +62,7 @@ class Condition(StrEnum):
     BATTERY_LOW = "battery low"
 
 
-class Row(NamedTuple):
+class FailsafeRow(NamedTuple):
     """A failsafe; its texts and parameters appear on the page.
 
     Attributes:
@@ -94,24 +94,24 @@ FLIGHT_TERMINATION_OFF = 121212
 _FULL_AGAIN = "never in flight"
 
 
-def _battery(condition: Condition, holds: str, limits: tuple[str, ...], actions: tuple[Action, ...]) -> Row:
+def _battery(condition: Condition, holds: str, limits: tuple[str, ...], actions: tuple[Action, ...]) -> FailsafeRow:
     choices = tuple(enumerate(actions))
-    return Row(
+    return FailsafeRow(
         *(condition, holds, limits, "BAT_LOW_T", "COM_LOW_BAT_ACT", choices, 0, _FULL_AGAIN), grounded=True, kept=True
     )
 
 
-def _sensor(condition: Condition, holds: str, parameter: str, default: Action) -> Row:
+def _sensor(condition: Condition, holds: str, parameter: str, default: Action) -> FailsafeRow:
     choices = (_WARN, _LAND, _DESCEND, _TERMINATE)
     number = next(number for number, action in choices if action is default)
-    return Row(
+    return FailsafeRow(
         *(condition, f"on sensors: {holds}", (), "COM_SENS_LOSS_T", parameter, choices, number, "it is well again"),
         grounded=True,
     )
 
 
-TABLE: tuple[Row, ...] = (
-    Row(
+TABLE: tuple[FailsafeRow, ...] = (
+    FailsafeRow(
         Condition.ATTITUDE_LOST,
         "on sensors: roll and pitch are known no better than to 10°; on states: they stay the same to the last bit "
         "though their rates are not zero",
@@ -122,7 +122,7 @@ TABLE: tuple[Row, ...] = (
         5,
         "the attitude is known again",
     ),
-    Row(
+    FailsafeRow(
         Condition.TILTED,
         "roll or pitch beyond the limit",
         ("FD_FAIL_R", "FD_FAIL_P"),
@@ -132,7 +132,7 @@ TABLE: tuple[Row, ...] = (
         FLIGHT_TERMINATION_OFF,
         "both are within it",
     ),
-    Row(
+    FailsafeRow(
         Condition.ROTOR_FAILED,
         "the vehicle moves as with one rotor missing; it then lands on the other three, whatever is chosen",
         (),
@@ -144,7 +144,7 @@ TABLE: tuple[Row, ...] = (
         kept=True,
         reported=False,
     ),
-    Row(
+    FailsafeRow(
         Condition.POSITION_LOST,
         "on sensors, in a mode that flies by place: standard deviation of position or velocity beyond the limit",
         ("COM_POS_FS_EPH", "COM_VEL_FS_EVH"),
@@ -154,7 +154,7 @@ TABLE: tuple[Row, ...] = (
         4,
         "both are known again",
     ),
-    Row(
+    FailsafeRow(
         Condition.ESTIMATE_INVALID,
         "on sensors: heading, height or climb is not known",
         (),
@@ -176,7 +176,7 @@ TABLE: tuple[Row, ...] = (
         ("BAT_CRIT_THR", "BAT_CRIT_VOLT"),
         (Action.WARN, Action.LAND, Action.LAND, Action.RETURN),
     ),
-    Row(
+    FailsafeRow(
         Condition.PLAN_FAILED,
         "the QP is not solved, and a fallback decides",
         (),
@@ -186,7 +186,7 @@ TABLE: tuple[Row, ...] = (
         1,
         "plans are found",
     ),
-    Row(
+    FailsafeRow(
         Condition.DEADLINE_MISSED,
         "the declared solve time (`SIM_SOLVE_MS`) is longer than a control sample",
         (),
@@ -196,7 +196,7 @@ TABLE: tuple[Row, ...] = (
         0,
         "it is shorter",
     ),
-    Row(
+    FailsafeRow(
         Condition.TELEMETRY_MISSED,
         "the time of the plant's frames leaps",
         (),
@@ -206,7 +206,7 @@ TABLE: tuple[Row, ...] = (
         0,
         "frames follow one another",
     ),
-    Row(
+    FailsafeRow(
         Condition.STATION_LOST,
         "no HEARTBEAT of a ground station (MAV_TYPE_GCS), where there ever was one",
         (),
@@ -216,7 +216,7 @@ TABLE: tuple[Row, ...] = (
         0,
         "a HEARTBEAT of any is received",
     ),
-    Row(
+    FailsafeRow(
         Condition.FENCE_BREACHED,
         "closer to the edge than the margin, or beyond: of the fence that was uploaded, of a circle around home, of a "
         "height above it; with GF_PREDICT, where it would come to rest",
@@ -258,7 +258,7 @@ TABLE: tuple[Row, ...] = (
         "COM_MAG_LOSS_ACT",
         Action.WARN,
     ),
-    Row(
+    FailsafeRow(
         Condition.GPS_LOST,
         "on sensors: no fix is accepted",
         (),
@@ -270,7 +270,7 @@ TABLE: tuple[Row, ...] = (
         grounded=True,
         warns="position by dead reckoning",
     ),
-    Row(
+    FailsafeRow(
         Condition.STICKS_LOST,
         "in a mode flown by hand: no MANUAL_CONTROL of who flies",
         (),
@@ -280,7 +280,7 @@ TABLE: tuple[Row, ...] = (
         1,
         "sticks are received",
     ),
-    Row(
+    FailsafeRow(
         Condition.SETPOINTS_LOST,
         "in mode offboard: no setpoint of the companion",
         (),
@@ -297,4 +297,4 @@ TABLE: tuple[Row, ...] = (
         (Action.WARN, Action.RETURN, Action.WARN, Action.WARN),
     ),
 )
-ROWS: Mapping[Condition, Row] = {row.condition: row for row in TABLE}
+ROWS: Mapping[Condition, FailsafeRow] = {row.condition: row for row in TABLE}

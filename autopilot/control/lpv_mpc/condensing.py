@@ -31,7 +31,7 @@ MOTION_ROWS = 7  # of each checked step: tilt, and both sides of p, q and r
 PREDICTED = 16  # position and velocity, ENU; phi, theta, psi; p, q, r; squared rotor speeds
 
 
-class Weights(NamedTuple):
+class CostWeights(NamedTuple):
     """Weights of errors and corrections."""
 
     position: float  # 1/m²
@@ -50,7 +50,7 @@ class Problem(NamedTuple):
     starts: Integers  # step of each block, and N, (b + 1,)
     counted: Integers  # steps with errors in the cost, (c,)
     checked: Integers  # steps with soft limits, (d,)
-    weights: Weights
+    weights: CostWeights
     terminal: Array  # S on the error at the end, (16, 16), symmetric
     allocation: Array  # thrust of each rotor at its largest speed, N, (4,)
     levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
@@ -58,7 +58,7 @@ class Problem(NamedTuple):
     max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
 
 
-class Target(NamedTuple):
+class PlanReferences(NamedTuple):
     """References from now to one sample past the horizon, n = N + 2."""
 
     position: Array  # m, ENU, (n, 3)
@@ -78,7 +78,7 @@ def cost(
     motion: Array,
     speeds: Array,
     responses: Array,
-    target: Target,
+    target: PlanReferences,
     corrections: Array,  # the last one flown, then the nominal ones, (b + 1, 4)
     problem: Problem,
     qp: Qp,
@@ -110,7 +110,15 @@ def _blocks(starts: Integers, step: int) -> int:
 
 @inlined
 def _add_motion(
-    motion: Array, responses: Array, n: int, target: Target, weights: Weights, used: int, row: Array, H: Array, f: Array
+    motion: Array,
+    responses: Array,
+    n: int,
+    target: PlanReferences,
+    weights: CostWeights,
+    used: int,
+    row: Array,
+    H: Array,
+    f: Array,
 ) -> None:
     """Add ½ weight (error + row z)² of position, velocity, rates and heading at step n.
 
@@ -144,8 +152,8 @@ def _add_motion(
 
 @compiled
 def _add_demand(
-    x: Array, squared: Array, X: Array, step: int, target: Target, problem: Problem, used: int, row: Array, H: Array,
-    f: Array,
+    x: Array, squared: Array, X: Array, step: int, target: PlanReferences, problem: Problem, used: int, row: Array,
+    H: Array, f: Array,
 ) -> None:  # fmt: skip
     weights = problem.weights
     away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])))
@@ -181,7 +189,9 @@ def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) ->
 
 
 @inlined
-def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
+def _add_terminal(
+    x: Array, squared: Array, X: Array, target: PlanReferences, problem: Problem, H: Array, f: Array
+) -> None:
     """Add ½ eᵀ S e of the final error in body axes; four rows in a loop, as in `_add_motion`."""
     S = problem.terminal
     steps, moved = target.rates.shape[0], X.shape[1]

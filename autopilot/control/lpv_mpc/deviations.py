@@ -21,7 +21,7 @@ DEVIATIONS = 12
 POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
 
 
-class Transition(NamedTuple):
+class StepTransition(NamedTuple):
     """Blocks of the transition of every step, (3, 3, N), or (3, 4, N) from the rotors."""
 
     drag: Array  # velocity to velocity, without the unit matrix
@@ -48,13 +48,13 @@ class Transition(NamedTuple):
     GG: Array
 
 
-def empty_transition(steps: int) -> Transition:
+def empty_transition(steps: int) -> StepTransition:
     nine, twelve = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, ROTORS, steps)) for _ in range(4)]
-    return Transition._make([*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:]])
+    return StepTransition._make([*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:]])
 
 
 @inlined
-def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
+def _linearise(motion: Array, speeds: Array, model: Model, out: StepTransition) -> None:
     _differentiate(motion, speeds, model, out)
     V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
     _multiply(V, W, VW)
@@ -80,7 +80,7 @@ def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> N
 
 
 @inlined
-def _differentiate(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
+def _differentiate(motion: Array, speeds: Array, model: Model, out: StepTransition) -> None:
     """Fill V, W, G, drag, spin and up at the middle of each step."""
     airframe, inertia, allocation, h = model.airframe, model.inertia, model.allocation, model.interval_s
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
@@ -121,7 +121,7 @@ def _multiply(A: Array, B: Array, product: Array) -> None:
 
 
 @inlined
-def _drive(model: Model, out: Transition) -> None:
+def _drive(model: Model, out: StepTransition) -> None:
     inertia, allocation, h = model.inertia, model.allocation, model.interval_s
     for i in range(3):
         for rotor in range(ROTORS):
@@ -142,7 +142,7 @@ def _drive(model: Model, out: Transition) -> None:
 
 @inlined
 def respond(
-    motion: Array, speeds: Array, means: Array, levels: Array, packed: Packed, T: Transition, responses: Array
+    motion: Array, speeds: Array, means: Array, levels: Array, packed: Packed, T: StepTransition, responses: Array
 ) -> None:
     """Write the deviations by a unit change of one rotor's command in one block.
 
@@ -174,7 +174,7 @@ def respond(
 
 
 @inlined
-def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
+def _advance(X: Array, n: int, T: StepTransition, h: float, used: int) -> None:
     for i in range(3):
         pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
         pw0, pw1, pw2 = T.position_rate[i, 0, n], T.position_rate[i, 1, n], T.position_rate[i, 2, n]
@@ -198,7 +198,7 @@ def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
 
 
 @compiled
-def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
+def _hover(thrust_n: float, packed: Packed, T: StepTransition, X: Array) -> None:
     model = packed[0]
     level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
     level[:, 6] = 1.0

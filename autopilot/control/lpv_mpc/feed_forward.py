@@ -22,7 +22,7 @@ from colibri.common.types import Array
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
-class Guidance(NamedTuple):
+class Approach(NamedTuple):
     """Constants of the approach to references."""
 
     k1_s2: float  # on a large position error
@@ -245,7 +245,7 @@ def approach(
 
 
 @compiled
-def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
+def slowed_by(error_m: float, error_rate_m_s: float, law: Approach) -> float:
     half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
     return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
 

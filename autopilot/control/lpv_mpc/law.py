@@ -19,7 +19,7 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.lpv_mpc import planning
-from colibri.autopilot.control.lpv_mpc.feed_forward import Guidance
+from colibri.autopilot.control.lpv_mpc.feed_forward import Approach
 from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
@@ -76,7 +76,7 @@ class LpvMpcSettings(TrackingSettings, frozen=True, forbid_unknown_fields=True, 
     fallback: FallbackSettings
 
 
-class Memory(NamedTuple):
+class LawMemory(NamedTuple):
     """State of the law between two control samples."""
 
     tracked: Tracked
@@ -85,7 +85,7 @@ class Memory(NamedTuple):
     lag_us: int  # of path time behind the clock
 
 
-class Inputs(NamedTuple):
+class LawInputs(NamedTuple):
     """Inputs of a decision."""
 
     observed: Observed
@@ -93,7 +93,7 @@ class Inputs(NamedTuple):
     max_n: float  # largest thrust
 
 
-class LpvMpc(TrackingLaw[Memory]):
+class LpvMpc(TrackingLaw[LawMemory]):
     """The control law; its predicted outputs are `condensing.PREDICTED`."""
 
     plan_columns = PlanColumns(6, 7, 8, 11)
@@ -109,7 +109,7 @@ class LpvMpc(TrackingLaw[Memory]):
         self._span_n = float(self.tracker.allocation[0].sum())
         self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
         k1_s2, k2_s = gains(settings.guidance.poles)
-        guidance = Guidance(
+        guidance = Approach(
             k1_s2,
             k2_s,
             settings.guidance.approach_speed_m_s * k2_s / k1_s2,
@@ -136,27 +136,29 @@ class LpvMpc(TrackingLaw[Memory]):
         super().warm_up()
         self._mpc.warm_up()
 
-    def initial(self, rotor_speed: float) -> Memory:
-        return Memory(self.tracker.initial(rotor_speed), None, 0, 0)
+    def initial(self, rotor_speed: float) -> LawMemory:
+        return LawMemory(self.tracker.initial(rotor_speed), None, 0, 0)
 
-    def lag_us(self, memory: Memory) -> int:
+    def lag_us(self, memory: LawMemory) -> int:
         return memory.lag_us
 
-    def path_speed(self, memory: Memory) -> float:
+    def path_speed(self, memory: LawMemory) -> float:
         plan = memory.plan
         return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
 
-    def with_lag(self, memory: Memory, lag_us: int) -> Memory:
+    def with_lag(self, memory: LawMemory, lag_us: int) -> LawMemory:
         return memory._replace(lag_us=lag_us)
 
-    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+    def step(
+        self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[LawMemory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
         return self._decide(memory, inputs, self._targets.on_clock(self._now, references))
 
     def step_on_path(
-        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
-    ) -> tuple[Memory, Decision]:
+        self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[LawMemory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
         kept = memory.plan.speeds if memory.plan else None
@@ -165,14 +167,14 @@ class LpvMpc(TrackingLaw[Memory]):
         return self._decide(memory, inputs, wanted)
 
     def step_attitude(
-        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
-    ) -> tuple[Memory, Decision]:
+        self, memory: LawMemory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[LawMemory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
         wanted = self._targets.of_demand(self._filled(inputs), demand)
         return self._decide(memory, inputs, wanted, on_track=False)
 
-    def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
+    def _inputs(self, memory: LawMemory, state: VehicleState) -> LawInputs:
         tracked, battery = memory.tracked, self.tracker.battery
         observed = self.tracker.observe(tracked, state)
         self._model_kg[0] = observed.mass_kg
@@ -189,14 +191,14 @@ class LpvMpc(TrackingLaw[Memory]):
             battery.numbers,
             self._now,
         )
-        return Inputs(observed, float(state.euler[2]), max_n)
+        return LawInputs(observed, float(state.euler[2]), max_n)
 
-    def _filled(self, inputs: Inputs) -> Now:
+    def _filled(self, inputs: LawInputs) -> Now:
         return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
 
     def _decide(
-        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool = True
-    ) -> tuple[Memory, Decision]:
+        self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool = True
+    ) -> tuple[LawMemory, Decision]:
         squared, plan, age, diagnostics = self._choose(memory, inputs, wanted, on_track=on_track)
         tracked, observed = memory.tracked, inputs.observed
         commands, after = self.tracker.actuate(tracked, observed, squared)
@@ -204,7 +206,7 @@ class LpvMpc(TrackingLaw[Memory]):
         phi, theta, psi = planning.first_angles(wanted.target)
         path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
         how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
-        return Memory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
+        return LawMemory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         if plan is None or plan.speeds is None:
@@ -213,7 +215,7 @@ class LpvMpc(TrackingLaw[Memory]):
         return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
 
     def _choose(
-        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
+        self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Return squared rotor speeds, the plan to continue, its age, and diagnostics."""
         target, force, path = wanted
@@ -232,14 +234,14 @@ class LpvMpc(TrackingLaw[Memory]):
         return self._recover(inputs, force, diagnostics)
 
     def _recover(
-        self, inputs: Inputs, force: Array, diagnostics: Diagnostics
+        self, inputs: LawInputs, force: Array, diagnostics: Diagnostics
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         least, most = self._arrays.limits[0].tolist()
         squared = self.recovered(force, inputs.observed, self._mpc.from_wrench, least, most)
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
 
 
-def _planned(memory: Memory, inputs: Inputs) -> bool:
+def _planned(memory: LawMemory, inputs: LawInputs) -> bool:
     if memory.plan is None:
         return False
     planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))

@@ -8,10 +8,10 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
 from colibri.autopilot.control.lpv_mpc import condensing, deviations, model, planning
-from colibri.autopilot.control.lpv_mpc.condensing import Problem, Weights
+from colibri.autopilot.control.lpv_mpc.condensing import CostWeights, Problem
 from colibri.autopilot.control.lpv_mpc.model import ROTORS, Lag, Model
 from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
-from colibri.autopilot.control.lpv_mpc.planning import Kind, Workspace
+from colibri.autopilot.control.lpv_mpc.planning import QpKind, Workspace
 from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
@@ -74,7 +74,7 @@ class Corrections(NamedTuple):
 
 
 class _Qps(NamedTuple):
-    """A packed `Kind`, and the two QPs in its memory."""
+    """A packed `QpKind`, and the two QPs in its memory."""
 
     kind: Packed
     free: Qp
@@ -100,7 +100,7 @@ class Mpc:
         self.from_wrench = exact_inverse(numbers.allocation)  # U1..U4, N, N m, to squared speeds, (4, 4)
         starts = np.cumsum((0, *settings.blocks))
         means, levels = lagging(starts, numbers.lag)
-        on_hold = Weights(
+        on_hold = CostWeights(
             0.0, 0.0, weights.tilt, weights.heading, weights.rate, weights.thrust,
             weights.first_correction, weights.next_correction,
         )  # fmt: skip
@@ -122,7 +122,7 @@ class Mpc:
         )
         self._on_clock, self._on_path, self._on_hold = (
             _opened(
-                Kind(
+                QpKind(
                     Problem(
                         starts,
                         np.arange(settings.count_every, n + 1, settings.count_every),
@@ -143,7 +143,7 @@ class Mpc:
         )
         self._none = np.empty((0, ROTORS))
 
-    def _terminal(self, weights: Weights, count_every: int, thrust_n: float) -> Array:
+    def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
         """Return S, (16, 16), of the LQR in level flight after the horizon."""
         A, B = deviations.hover_transition(thrust_n, self.model)
         Q = np.zeros((condensing.STATES, condensing.STATES))
@@ -251,6 +251,6 @@ def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
     return means, levels
 
 
-def _opened(kind: Kind) -> _Qps:
+def _opened(kind: QpKind) -> _Qps:
     record = packed(kind)
     return _Qps(record, opened(record["qp"], Qp), opened(record["limited"], Qp))

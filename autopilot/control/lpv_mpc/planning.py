@@ -11,15 +11,15 @@ import numpy as np
 from colibri.autopilot.control.lpv_mpc.condensing import (
     MOTION_ROWS,
     Integers,
+    PlanReferences,
     Problem,
-    Target,
     bound,
     cost,
     exceeds,
     limit_motion,
     read_plan,
 )
-from colibri.autopilot.control.lpv_mpc.deviations import Transition, respond
+from colibri.autopilot.control.lpv_mpc.deviations import StepTransition, respond
 from colibri.autopilot.control.lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
@@ -52,13 +52,13 @@ class Workspace(NamedTuple):
     motion: Array  # nominal, (N + 1, 13)
     speeds: Array  # nominal, squared, (N + 1, 4)
     drive: Drive
-    transition: Transition
+    transition: StepTransition
     responses: Array  # (N + 1, 12, 4 b)
     means: Array  # of `deviations.respond`, (b, N)
     levels: Array  # of `deviations.respond`, (b, N + 1)
 
 
-class Kind(NamedTuple):
+class QpKind(NamedTuple):
     """QPs of one kind."""
 
     problem: Problem
@@ -130,7 +130,7 @@ def condense_on_path(
 
 
 @inlined
-def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) -> None:
+def _expect(now: Now, target: PlanReferences, last: Array, vehicle: Packed, kind: QpKind) -> None:
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
     commands, corrections = work.commands, work.corrections
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)

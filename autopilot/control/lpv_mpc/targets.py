@@ -6,8 +6,8 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import feed_forward
-from colibri.autopilot.control.lpv_mpc.condensing import Target
-from colibri.autopilot.control.lpv_mpc.feed_forward import Flat, Guidance
+from colibri.autopilot.control.lpv_mpc.condensing import PlanReferences
+from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
 from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
@@ -22,7 +22,7 @@ _STILL_M_S = 1e-3
 class Wanted(NamedTuple):
     """The target of a plan."""
 
-    target: Packed  # the `Target`
+    target: Packed  # the `PlanReferences`
     force: Array  # to align thrust with now, N, ENU, (3,)
     path: PathNow | None = None  # nominal speeds along the path, if free
 
@@ -30,16 +30,16 @@ class Wanted(NamedTuple):
 class TargetBuilder:
     """Builds the targets of plans."""
 
-    def __init__(self, guidance: Guidance, path: PathSettings, mpc: Mpc) -> None:
+    def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc) -> None:
         self._guidance, self._path, self._mpc = guidance, path, mpc
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2
         track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, ROTORS))
         attitudes, scalars = np.zeros((n, 3, 3)), np.zeros(n)
         self._record = packed(
-            Target(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(ROTORS))
+            PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(ROTORS))
         )
-        self._target = target = opened(self._record, Target)
+        self._target = target = opened(self._record, PlanReferences)
         self._near = (target.position, target.velocity, target.acceleration)
         self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
 

@@ -15,7 +15,7 @@ from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     observer_of,
 )
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
-from colibri.autopilot.control.vehicle_model.rotor_lag import Rotors
+from colibri.autopilot.control.vehicle_model.rotor_lag import RotorModel
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, packed
@@ -63,7 +63,7 @@ class VehicleTracker:
         self.inertia = observing.inertia
         self._interval_s = interval_s
         self._observer, self._mass = packed(observing), packed(mass_model(mass, vehicle, interval_s))
-        self._rotors = packed(Rotors(self.lag, self.allocation))
+        self._rotors = packed(RotorModel(self.lag, self.allocation))
 
     def initial(self, rotor_speed: float) -> Tracked:
         speeds = np.full(4, rotor_speed / self.vehicle.rotors.max_speed)

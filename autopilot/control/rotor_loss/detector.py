@@ -15,7 +15,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AT_REST, VehicleState
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, terminal
-from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, rotor_lag
+from colibri.autopilot.control.vehicle_model.rotor_lag import SampledLag, follow, rotor_lag
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, opened, packed
@@ -65,15 +65,15 @@ def signature_of(vehicle: Vehicle) -> Signature:
     )
 
 
-class Numbers(NamedTuple):
+class DetectorModel(NamedTuple):
     """Constants of the detector."""
 
     signature: Signature
-    lag: RotorLag
+    lag: SampledLag
     interval_s: float
 
 
-class Memory(NamedTuple):
+class DetectorState(NamedTuple):
     """State of the detector."""
 
     speeds: Array  # of the rotors, parts of the largest, (4,)
@@ -91,8 +91,8 @@ class RotorWatch:
         self._interval_s = interval_s
         self.lost: int | None = None  # 0..3, permanently
         self.max_evidence = 0.0
-        self._memory = packed(Memory(*map(np.zeros, (4, 9, 4, 4, 4, 1))))
-        self._kept = opened(self._memory, Memory)
+        self._memory = packed(DetectorState(*map(np.zeros, (4, 9, 4, 4, 4, 1))))
+        self._kept = opened(self._memory, DetectorState)
         self.adopt(vehicle)
         controls = (0.0, 0.0, 0.0, 0.0)
         self._take_in(AT_REST, controls, 0.0, counts=True)
@@ -118,7 +118,7 @@ class RotorWatch:
         signature = signature_of(vehicle)
         inertia = np.array([signature.mass_kg, *signature.inertia])
         self._accelerations = signature.effect * signature.full_thrust_n / inertia[:, None]
-        self._numbers = packed(Numbers(signature, lag, self._interval_s))
+        self._numbers = packed(DetectorModel(signature, lag, self._interval_s))
 
     def begin(self, controls: FourRotors) -> None:
         kept = self._kept
@@ -165,7 +165,7 @@ def _take_in(
     battery: Packed,
     memory: Packed,
 ) -> tuple[int, float]:
-    """Advance the `Memory` by a sample; return the likeliest lost rotor and its evidence."""
+    """Advance the `DetectorState` by a sample; return the likeliest lost rotor and its evidence."""
     kept, known = memory[0], numbers[0]
     speeds_before, before = kept.speeds.copy(), kept.motion.copy()
     put(_followed(speeds_before, controls, open_v, known.lag, battery), kept.speeds)
@@ -179,7 +179,7 @@ def _take_in(
 
 
 @compiled
-def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag, battery: Packed) -> Array:
+def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: SampledLag, battery: Packed) -> Array:
     max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
@@ -189,7 +189,7 @@ def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: RotorLag,
 
 @compiled
 def _add_evidence(
-    memory: Memory, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
+    memory: DetectorState, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
 ) -> tuple[int, float]:
     """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value."""
     evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise

@@ -34,7 +34,7 @@ class ThreeRotorsError(AutopilotError):
     """A vehicle that cannot land on three rotors, with the reason."""
 
 
-class Weights(NamedTuple):
+class Tolerances(NamedTuple):
     """Tolerated deviations; the cost weighs with one over their squares."""
 
     direction: float = 0.12  # rad
@@ -52,7 +52,7 @@ class Trio(NamedTuple):
     sign: float  # +1 if their torque spins the vehicle counter-clockwise seen from above, else -1
 
 
-class Solution(NamedTuple):
+class SpinSolution(NamedTuple):
     """The periodic solution of a spin."""
 
     h: Array  # direction of the mean thrust in body x and y, (2,)
@@ -64,7 +64,7 @@ class ReducedAttitude:
     """The law for one vehicle that has lost one rotor."""
 
     def __init__(
-        self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
+        self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Tolerances
     ) -> None:
         """Compute the gains in some ms, or raise a ThreeRotorsError."""
         self.trio = trio_without(vehicle, lost)
@@ -93,20 +93,20 @@ class ReducedAttitude:
         d, f_o = matvec(-self._gain(spin), deviation).tolist()
         return d, f_o + solution.opposite_n
 
-    def solution(self, spin: float) -> Solution:
+    def solution(self, spin: float) -> SpinSolution:
         """Return the solution of a spin, rad/s, positive along the rotors' torque."""
         opened = (spin - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         if opened <= 0.0:
-            return Solution(np.zeros(2), np.zeros(2), 0.0)
+            return SpinSolution(np.zeros(2), np.zeros(2), 0.0)
         tangent = tan(min(opened, 1.0) * self.cone_rad)
         r = spin * self.trio.sign
         per_newton = self._steady_rate(r)
         length = hypot(per_newton[0], per_newton[1])
         if length == 0.0:  # an opposite rotor without an arm opens no cone
-            return Solution(np.zeros(2), np.zeros(2), 0.0)
+            return SpinSolution(np.zeros(2), np.zeros(2), 0.0)
         opposite_n = tangent * spin / length
         rate = per_newton * opposite_n
-        return Solution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
+        return SpinSolution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
 
     def _steady_rate(self, r: float) -> Array:
         """Return p and q for each N of the opposite rotor, with p' = q' = 0 at spin r."""
@@ -121,7 +121,7 @@ class ReducedAttitude:
         gain: Array = self._gains[first] + (place - first) * (self._gains[first + 1] - self._gains[first])
         return gain
 
-    def _designed(self, interval_s: float, follows: float, weights: Weights) -> Array:
+    def _designed(self, interval_s: float, follows: float, weights: Tolerances) -> Array:
         opened = (_SPINS_RAD_S - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         newton = weights.force_part * self._weight_n / 4.0
         Q = np.diag(1.0 / np.array([weights.direction, weights.direction, weights.rate, weights.rate, inf, inf]) ** 2)

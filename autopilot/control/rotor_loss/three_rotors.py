@@ -5,7 +5,7 @@ from math import hypot, radians
 import numpy as np
 
 from colibri.autopilot.control.interface import Decision, Diagnostics, Fallback, VehicleState
-from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, Trio, Weights
+from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, Tolerances, Trio
 from colibri.autopilot.control.vehicle_model import disturbance_observer
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.rotor_lag import follow, lead, rotor_lag
@@ -146,7 +146,7 @@ class ThreeRotors:
 def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
     measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
     follows = rotor_lag(vehicle, interval_s).planned
-    return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Weights())
+    return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Tolerances())
 
 
 def shared(

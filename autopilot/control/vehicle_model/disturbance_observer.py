@@ -31,7 +31,7 @@ class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     max_moment_n_m: Positive
 
 
-class Observer(NamedTuple):
+class ObserverModel(NamedTuple):
     """Gains and limits of the observers, and the vehicle."""
 
     velocity: float  # gain of the innovation
@@ -45,10 +45,10 @@ class Observer(NamedTuple):
     interval_s: float
 
 
-def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> Observer:
+def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> ObserverModel:
     on_velocity, on_acceleration = gains(settings.acceleration_rad_s, interval_s)
     on_rate, on_turn = gains(settings.moment_rad_s, interval_s)
-    return Observer(
+    return ObserverModel(
         on_velocity,
         on_acceleration,
         on_rate,

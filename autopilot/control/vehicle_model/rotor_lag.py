@@ -16,7 +16,7 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 
-class RotorLag(NamedTuple):
+class SampledLag(NamedTuple):
     """Response of a rotor in one control sample, and its limit."""
 
     up: float  # part of the way to a higher command
@@ -25,22 +25,22 @@ class RotorLag(NamedTuple):
     min_speed: float
 
 
-class Rotors(NamedTuple):
+class RotorModel(NamedTuple):
     """The rotors of a vehicle."""
 
-    lag: RotorLag
+    lag: SampledLag
     allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4)
 
 
-def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
+def rotor_lag(vehicle: Vehicle, interval_s: float) -> SampledLag:
     lag = vehicle.rotors.lag
     up = 1.0 - exp(-interval_s / lag.time_constant_up_s) if lag else 1.0
     down = 1.0 - exp(-interval_s / lag.time_constant_down_s) if lag else 1.0
-    return RotorLag(up, down, min(up, down), vehicle.rotors.idle_speed / vehicle.rotors.max_speed)
+    return SampledLag(up, down, min(up, down), vehicle.rotors.idle_speed / vehicle.rotors.max_speed)
 
 
 @compiled
-def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
+def follow(speeds: Array, commands: Array, lag: SampledLag) -> Array:
     after = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
         way = commands[i] - speeds[i]
@@ -49,7 +49,7 @@ def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
 
 
 @compiled
-def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float) -> Array:
+def lead(speeds: Array, squared_commands: Array, lag: SampledLag, max_speed: float) -> Array:
     """Return the commands that bring squared speeds to their planned values a sample later."""
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):

@@ -3,7 +3,7 @@
 from typing import Final, NamedTuple
 
 
-class Part(NamedTuple):
+class DefendedPart(NamedTuple):
     """A part.
 
     Attributes:
@@ -49,31 +49,31 @@ PROCESS: Final = "process"
 PARTS: Final = {
     part.name: part
     for part in (
-        Part(BATTERY, "charge no longer known", optional=True),
-        Part(RESTART, "nothing goes on of the flight before"),
-        Part(START, "begun anew"),
-        Part(ESTIMATOR, "inertial sensors carry on"),
-        Part(STANDBY, "attitude stays as it was"),
-        Part(DELAY, "the delay is not compensated", optional=True),
-        Part(ROTOR_WATCH, "lost rotors may go unnoticed", optional=True),
-        Part(SETPOINTS, "none are taken"),
-        Part(FAILSAFES, "none may act", optional=True),
-        Part(TASK, "hold"),
-        Part(GUIDANCE, "descending"),
-        Part(LAW, "plain law flies"),
-        Part(THREE_ROTORS, "last command stays"),
-        Part(PLAIN_LAW, "last command stays"),
-        Part(FAULTS, "none are injected"),
-        Part(STEP, "descending"),
-        Part(TELEMETRY, "old values are sent", optional=True),
-        Part(STATIONS, "not served in this frame"),
-        Part(DATAGRAM, "dropped"),
-        Part(PARAMETERS, "old values stay"),
-        Part(PROGRESS, "not reported"),
-        Part(HUB, "not polled in this frame"),
-        Part(LOG, "not recorded"),
-        Part(CHECKPOINT, "none for a restart", optional=True),
-        Part(PROCESS, "left out"),
+        DefendedPart(BATTERY, "charge no longer known", optional=True),
+        DefendedPart(RESTART, "nothing goes on of the flight before"),
+        DefendedPart(START, "begun anew"),
+        DefendedPart(ESTIMATOR, "inertial sensors carry on"),
+        DefendedPart(STANDBY, "attitude stays as it was"),
+        DefendedPart(DELAY, "the delay is not compensated", optional=True),
+        DefendedPart(ROTOR_WATCH, "lost rotors may go unnoticed", optional=True),
+        DefendedPart(SETPOINTS, "none are taken"),
+        DefendedPart(FAILSAFES, "none may act", optional=True),
+        DefendedPart(TASK, "hold"),
+        DefendedPart(GUIDANCE, "descending"),
+        DefendedPart(LAW, "plain law flies"),
+        DefendedPart(THREE_ROTORS, "last command stays"),
+        DefendedPart(PLAIN_LAW, "last command stays"),
+        DefendedPart(FAULTS, "none are injected"),
+        DefendedPart(STEP, "descending"),
+        DefendedPart(TELEMETRY, "old values are sent", optional=True),
+        DefendedPart(STATIONS, "not served in this frame"),
+        DefendedPart(DATAGRAM, "dropped"),
+        DefendedPart(PARAMETERS, "old values stay"),
+        DefendedPart(PROGRESS, "not reported"),
+        DefendedPart(HUB, "not polled in this frame"),
+        DefendedPart(LOG, "not recorded"),
+        DefendedPart(CHECKPOINT, "none for a restart", optional=True),
+        DefendedPart(PROCESS, "left out"),
     )
 }
 """All of them; services of the hub are parts under names of their own."""

@@ -2,10 +2,10 @@
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
-from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
 from colibri.common.elementary import square
 from colibri.common.types import Array, Vector
@@ -21,16 +21,16 @@ _INFLATED_M = 100.0
 _TYPICAL_PA = 95e3
 
 
-class Barometer(Instrument):
+class BarometerFusion(FusedInstrument):
     """The barometer of one flight; `height_m` is of the last pressure."""
 
     part, name, numbers = "barometer", "pressure", 1
-    source, bit, ratio = Source.BAROMETER, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Ratio.HEIGHT
+    source, bit, ratio = RejectedSource.BAROMETER, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Ratio.HEIGHT
     group = Updated.BAROMETER
 
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
         self._noise_pa = sensors.barometer.noise_pa
-        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
+        self.kind = MeasurementKind(self.name, self.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
         self._watch = Watch(self.source, _MIN_PA, _MAX_PA, _FROZEN_US)
         self.height_m = 0.0
 

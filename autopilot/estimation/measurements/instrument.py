@@ -3,7 +3,7 @@
 from enum import IntEnum
 from typing import ClassVar, Protocol, TypeAlias
 
-from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import SensorFrame
@@ -24,7 +24,7 @@ class Ratio(IntEnum):
     AIRSPEED = 5
 
 
-class Instrument(Protocol):
+class FusedInstrument(Protocol):
     """A sensor fused without delay; one instance for each flight.
 
     Attributes:
@@ -44,7 +44,7 @@ class Instrument(Protocol):
     ratio: ClassVar[Ratio]
     group: ClassVar[int] = 0
     smoothed: ClassVar[bool] = False
-    kind: Kind
+    kind: MeasurementKind
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None: ...
 

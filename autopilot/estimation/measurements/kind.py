@@ -22,7 +22,7 @@ class KindRecord(NamedTuple):
     resets: int
 
 
-class Kind:
+class MeasurementKind:
     """One kind of measurement; `resets` counts forced acceptances."""
 
     def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import HARD_IRON
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
-from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.elementary import square
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
@@ -25,17 +25,17 @@ _PATIENCE_US = 10_000_000
 _INFLATED_GAUSS = 0.3
 
 
-class Magnetometer(Instrument):
+class MagnetometerFusion(FusedInstrument):
     """The magnetometer of one flight; `variance` in gauss²."""
 
     part, name, numbers = "magnetometer", "field", 3
-    source, bit, ratio = Source.MAGNETOMETER, mav.MAV_SYS_STATUS_SENSOR_3D_MAG, Ratio.FIELD
+    source, bit, ratio = RejectedSource.MAGNETOMETER, mav.MAV_SYS_STATUS_SENSOR_3D_MAG, Ratio.FIELD
     group = Updated.MAGNETOMETER
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
         self._field = np.array(field_enu_gauss)
         self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
-        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
+        self.kind = MeasurementKind(self.name, self.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
         self._watch = Watch(self.source, -_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:

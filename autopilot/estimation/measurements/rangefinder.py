@@ -9,8 +9,8 @@ import numpy as np
 
 from colibri.autopilot.estimation.eskf_predict import ATTITUDE, ERRORS, POSITION
 from colibri.autopilot.estimation.eskf_update import fuse_rows
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
-from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
+from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
 from colibri.common.elementary import square
@@ -31,7 +31,7 @@ _FROZEN_US = 500_000
 _PATIENCE_US = 7_000_000
 
 
-class RangefinderBelow(Instrument):
+class RangefinderBelow(FusedInstrument):
     """The rangefinder of one flight; smoothed, because first corrections may be decimetres."""
 
     part, name, numbers = "rangefinder", "distance", 1
@@ -45,7 +45,7 @@ class RangefinderBelow(Instrument):
         self._beam = np.array([cos(0.5 * part.field_of_view_rad), sin(0.5 * part.field_of_view_rad)])
         self._watch = Watch(self.source, part.min_m, part.max_m, _FROZEN_US if part.noise_m > 0.0 else inf)
         self._y = np.zeros(1)
-        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (POSITION, 0, 0.0))
+        self.kind = MeasurementKind(self.name, self.numbers, _PATIENCE_US, (POSITION, 0, 0.0))
         self.ground_m = 0.0
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:

@@ -1,20 +1,20 @@
 """The table of fused sensors: a row here, a file beside."""
 
-from colibri.autopilot.estimation.measurements.barometer import Barometer
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio
-from colibri.autopilot.estimation.measurements.magnetometer import Magnetometer
+from colibri.autopilot.estimation.measurements.barometer import BarometerFusion
+from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio
+from colibri.autopilot.estimation.measurements.magnetometer import MagnetometerFusion
 from colibri.autopilot.estimation.measurements.rangefinder import RangefinderBelow
 from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
-ROWS: tuple[type[Instrument], ...] = (Magnetometer, Barometer, RangefinderBelow)
+ROWS: tuple[type[FusedInstrument], ...] = (MagnetometerFusion, BarometerFusion, RangefinderBelow)
 """In the order of fusion within an instant; every vehicle has the first two."""
 
 GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}
 """The three measurements of a fix."""
 KINDS: dict[str, int] = {
     **GPS_KINDS,
-    Barometer.name: Barometer.numbers,
+    BarometerFusion.name: BarometerFusion.numbers,
     **{row.name: row.numbers for row in ROWS},
 }
 """Values in each kind of measurement, in the order of logs and tables."""
@@ -31,7 +31,9 @@ def kinds_of(sensors: Sensors) -> list[str]:
     return [kind for kind in KINDS if kind not in missing]
 
 
-def instruments_of(sensors: Sensors, field_enu_gauss: Vector) -> tuple[Magnetometer, Barometer, tuple[Instrument, ...]]:
-    field, pressure = Magnetometer(sensors, field_enu_gauss), Barometer(sensors, field_enu_gauss)
+def instruments_of(
+    sensors: Sensors, field_enu_gauss: Vector
+) -> tuple[MagnetometerFusion, BarometerFusion, tuple[FusedInstrument, ...]]:
+    field, pressure = MagnetometerFusion(sensors, field_enu_gauss), BarometerFusion(sensors, field_enu_gauss)
     others = [row(sensors, field_enu_gauss) for row in ROWS[2:] if getattr(sensors, row.part) is not None]
     return field, pressure, (field, pressure, *others)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.estimation.sensing.inertial import Reading
+from colibri.autopilot.estimation.sensing.inertial import InertialReading
 from colibri.common.matrices import matmul, norm
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix
@@ -62,7 +62,7 @@ class Alignment:
         self._fix: GpsFix | None = None
 
     def feed(
-        self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
+        self, time_us: int, reading: InertialReading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Aligned | None:
         if not (reading.force_good and reading.rate_good):
             self._begin()

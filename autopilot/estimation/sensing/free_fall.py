@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation.sensing.alignment import attitude_of
-from colibri.autopilot.estimation.sensing.inertial import Reading
+from colibri.autopilot.estimation.sensing.inertial import InertialReading
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix
 
@@ -46,7 +46,7 @@ class Falling:
         self._height_m: float | None = None
 
     def feed(
-        self, time_us: int, reading: Reading, field: Vector | None, height_m: float | None, fix: GpsFix | None
+        self, time_us: int, reading: InertialReading, field: Vector | None, height_m: float | None, fix: GpsFix | None
     ) -> Caught | None:
         if self._begins_in_flight is None:
             self._begins_in_flight = time_us > 0

@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.estimation.eskf_predict import MODELLED, UNKNOWN
 from colibri.autopilot.estimation.sensing.plausibility import Watch
-from colibri.autopilot.estimation.sensing.rejection import Rejected, Source
+from colibri.autopilot.estimation.sensing.rejection import Rejected, RejectedSource
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
@@ -27,10 +27,10 @@ _FAILED_US = 100_000
 """A sensor without values for so long has failed: those that come later may be late."""
 
 
-class Axes:
+class InertialSensor:
     """One of the two sensors; one that has `failed`, or is `noisy` beside, stays so until it is trusted again."""
 
-    def __init__(self, source: Source, group: int, maximum: float, noise: float) -> None:
+    def __init__(self, source: RejectedSource, group: int, maximum: float, noise: float) -> None:
         self._group = group
         maximum *= _BEYOND_RANGE
         self._watch = Watch(source, -maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
@@ -49,7 +49,7 @@ class Axes:
         return late_us <= _BRIDGED_US and not self.failed
 
 
-class Reading(NamedTuple):
+class InertialReading(NamedTuple):
     """Inertial values, m/s² and rad/s, FLU, whether each is usable, and whether it is modelled."""
 
     force: Vector
@@ -68,15 +68,17 @@ class Inertial:
         self._rejected = rejected
         self.expected: Expected | None = None
         self._turns: tuple[int, Vector] | None = None
-        self.accelerometer = Axes(
-            Source.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2, accel.noise_density_m_s2_rthz
+        self.accelerometer = InertialSensor(
+            RejectedSource.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2, accel.noise_density_m_s2_rthz
         )
-        self.gyroscope = Axes(Source.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz)
+        self.gyroscope = InertialSensor(
+            RejectedSource.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz
+        )
 
-    def read(self, frame: SensorFrame) -> Reading:
+    def read(self, frame: SensorFrame) -> InertialReading:
         force_good = self.accelerometer.read(frame, frame.specific_force_flu_m_s2, self._rejected)
         rate_good = self.gyroscope.read(frame, frame.rate_flu_rad_s, self._rejected)
-        reading = Reading(self.accelerometer.value, self.gyroscope.value, force_good, rate_good)
+        reading = InertialReading(self.accelerometer.value, self.gyroscope.value, force_good, rate_good)
         if (force_good and rate_good) or self.expected is None:
             self._turns = None
             return reading
@@ -96,7 +98,7 @@ class Inertial:
         return reading
 
 
-def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
+def sample_between(before: InertialReading, now: InertialReading, interval_s: float) -> Sample:
     """Return the sample between two frames (trapezoidal rule)."""
     (ax, ay, az), (bx, by, bz) = before.force, now.force
     (ap, aq, ar), (bp, bq, br) = before.rate, now.rate

@@ -2,7 +2,7 @@
 
 from math import inf, isfinite
 
-from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, RejectedSource
 from colibri.common.earth.geodesy import is_on_earth
 from colibri.mavlink.hil.sensors import GpsFix
 
@@ -46,16 +46,16 @@ class GpsWatch:
 
     def __init__(self) -> None:
         self.time_us: int | None = None
-        self._alive = Watch(Source.GPS, -inf, inf, _GPS_PATIENCE_US)
+        self._alive = Watch(RejectedSource.GPS, -inf, inf, _GPS_PATIENCE_US)
 
     def accepts(self, fix: GpsFix, now_us: int, rejected: Rejected) -> bool:
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
-            rejected.add(Source.GPS, Reason.NO_FIX)
+            rejected.add(RejectedSource.GPS, Reason.NO_FIX)
         elif not _possible(*numbers):
-            rejected.add(Source.GPS, _reason(numbers))
+            rejected.add(RejectedSource.GPS, _reason(numbers))
         elif fix.time_us > now_us or (self.time_us is not None and fix.time_us <= self.time_us):
-            rejected.add(Source.GPS, Reason.TIME)
+            rejected.add(RejectedSource.GPS, Reason.TIME)
         else:
             self.time_us = fix.time_us
             return self._alive.accepts(numbers, fix.time_us, rejected)

@@ -5,7 +5,7 @@ from enum import StrEnum
 from types import MappingProxyType
 
 
-class Source(StrEnum):
+class RejectedSource(StrEnum):
     """Source of a rejected value; optional sensors use names."""
 
     CLOCK = "clock"

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.guidance.mission.items import place_of
-from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, MissionContext, Phase, phases_of
+from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, LegPhase, MissionContext, phases_of
 from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
-from colibri.mavlink.mission.service import Progress
+from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -45,7 +45,7 @@ class SetHome(NamedTuple):
 MissionEvent: TypeAlias = Reached | SetHome
 
 
-class Step(NamedTuple):
+class MissionStep(NamedTuple):
     """Output of a step; `flying` is false once complete, paused or cleared."""
 
     order: Order
@@ -85,11 +85,11 @@ class MissionExecutor:
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
         self.defaults = defaults
         self.items: tuple[MissionItem, ...] = ()
-        self.progress = Progress()
+        self.progress = MissionProgress()
         self._order: Order = _HOLD
         self._speed_m_s: float | None = None
         self._jumps: dict[int, int] = {}
-        self._phases: list[Phase] | None = None
+        self._phases: list[LegPhase] | None = None
         self._context: ItemContext | None = None
         self._since_us = 0
         self._fresh = True
@@ -147,14 +147,14 @@ class MissionExecutor:
         self._show(seq, PAUSED if self.progress.state == COMPLETE else self.progress.state)
         return None
 
-    def step(self, mission_context: MissionContext, now_us: int) -> Step:
+    def step(self, mission_context: MissionContext, now_us: int) -> MissionStep:
         events: list[MissionEvent] = []
         for _ in range(MAX_ITEMS_A_STEP):
             if not self.active or now_us < self._rest_until_us or not self._fly(mission_context, now_us, events):
                 break
         if not self.active and self.progress.state != COMPLETE:
             self._order = _HOLD
-        return Step(self._order, tuple(events), self.active)
+        return MissionStep(self._order, tuple(events), self.active)
 
     def record(self) -> MissionRecord:
         context = self._context if self._phases else None
@@ -265,4 +265,4 @@ class MissionExecutor:
         self._order = _HOLD
 
     def _show(self, seq: int, state: int) -> None:
-        self.progress = Progress(seq, state, _FLYING if state == ACTIVE else _SUSPENDED)
+        self.progress = MissionProgress(seq, state, _FLYING if state == ACTIVE else _SUSPENDED)

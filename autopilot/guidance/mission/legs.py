@@ -5,7 +5,7 @@ from math import dist, inf, isfinite, isnan, nan, pi, radians, remainder, tau
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.guidance.mission.items import height_of, is_here, place_of
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, Order, Return, TakeOff
+from colibri.autopilot.guidance.tasks.orders import GoTo, Land, Orbit, Order, Return, TakeOff
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
@@ -50,7 +50,7 @@ class ItemContext(NamedTuple):
         return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
 
 
-class Phase(NamedTuple):
+class LegPhase(NamedTuple):
     """A part of an item: order (None keeps the previous), end condition, and whether it reaches the item."""
 
     order: Order | None
@@ -58,66 +58,66 @@ class Phase(NamedTuple):
     reaches: bool = False
 
 
-Leg: TypeAlias = Callable[[MissionItem, ItemContext], tuple[Phase, ...]]
+Leg: TypeAlias = Callable[[MissionItem, ItemContext], tuple[LegPhase, ...]]
 
 
-def phases_of(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def phases_of(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     leg = _LEGS.get(item.command)
     return () if leg is None else leg(item, context)
 
 
-def _waypoint(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _waypoint(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     radius = item.p2 if item.p2 > 0.0 else context.defaults.acceptance_m
     return _there(item, context, radius, _or_zero(item.p1))
 
 
-def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Phase, ...]:
+def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[LegPhase, ...]:
     return _there(item, context, context.defaults.acceptance_m, stay_s)
 
 
-def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
+def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[LegPhase, ...]:
     """Fly to a place and stay; stay_s 0 flies through."""
     place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
-    stay = (Phase(None, _after(stay_s)),) if stay_s > 0.0 else ()
-    return (*climb, Phase(go, _within(place, radius_m), reaches=True), *stay)
+    stay = (LegPhase(None, _after(stay_s)),) if stay_s > 0.0 else ()
+    return (*climb, LegPhase(go, _within(place, radius_m), reaches=True), *stay)
 
 
-def _circle(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _circle(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     center = context.place(item)
     radius = item.p3 if abs(item.p3) > 0.0 else context.defaults.orbit_radius_m
     radius = max(radius, MIN_RADIUS_M) if radius > 0.0 else min(radius, -MIN_RADIUS_M)
     turns = 1.0 if isnan(item.p1) else item.p1
-    order = Circle(center, radius, context.speed_m_s, mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER)
-    around = Phase(order, lambda now, _: abs(now.turns) >= turns, reaches=True)
+    order = Orbit(center, radius, context.speed_m_s, mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER)
+    around = LegPhase(order, lambda now, _: abs(now.turns) >= turns, reaches=True)
     return (*_off_the_ground(center[2], context), around)
 
 
-def _take_off(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _take_off(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     mission_context, defaults = context.mission_context, context.defaults
     height = height_of(item, mission_context.home_enu_m, mission_context.origin)
     yaw = _yaw(item.p4)
     high = mission_context.position_enu_m[2] >= height - defaults.acceptance_m and not mission_context.landed
-    up = () if high else (Phase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
+    up = () if high else (LegPhase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
     if is_here(item):
         return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))
     place = context.place(item)
     go = GoTo(place, yaw, context.speed_m_s)
-    return (*up, Phase(go, _within(place, defaults.acceptance_m), reaches=True))
+    return (*up, LegPhase(go, _within(place, defaults.acceptance_m), reaches=True))
 
 
-def _land(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _land(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     place = None if is_here(item) else context.place(item)
-    return (Phase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
+    return (LegPhase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
 
 
-def _delay(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _delay(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     del context
-    return (Phase(None, _after(_or_zero(item.p1)), reaches=True),)
+    return (LegPhase(None, _after(_or_zero(item.p1)), reaches=True),)
 
 
-def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     """Turn clockwise from north, or from the heading if p4 is 1."""
     mission_context = context.mission_context
     if mission_context.landed:
@@ -131,7 +131,7 @@ def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     def turned(now: MissionContext, since_s: float) -> bool:
         return abs(remainder(now.yaw_rad - yaw, tau)) <= _TURNED_RAD or now.arrived or since_s >= _TURN_WITHIN_S
 
-    return (Phase(GoTo(place, yaw, context.speed_m_s), turned, reaches=True),)
+    return (LegPhase(GoTo(place, yaw, context.speed_m_s), turned, reaches=True),)
 
 
 _LEGS: Mapping[int, Leg] = {
@@ -143,20 +143,20 @@ _LEGS: Mapping[int, Leg] = {
     mav.MAV_CMD_NAV_LOITER_TO_ALT: lambda item, context: _loiter(item._replace(p4=nan), context, 0.0),
     mav.MAV_CMD_NAV_TAKEOFF: _take_off,
     mav.MAV_CMD_NAV_LAND: _land,
-    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: (Phase(Return(), _landed, reaches=True),),
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: (LegPhase(Return(), _landed, reaches=True),),
     mav.MAV_CMD_NAV_DELAY: _delay,
     mav.MAV_CMD_CONDITION_DELAY: _delay,
     mav.MAV_CMD_CONDITION_YAW: _turn,
 }
 
 
-def _off_the_ground(height_m: float, context: ItemContext) -> tuple[Phase, ...]:
+def _off_the_ground(height_m: float, context: ItemContext) -> tuple[LegPhase, ...]:
     """Take off first: MAVSDK's missions begin with a waypoint."""
     mission_context, defaults = context.mission_context, context.defaults
     if not mission_context.landed:
         return ()
     up = max(height_m, mission_context.position_enu_m[2] + defaults.takeoff_height_m)
-    return (Phase(TakeOff(up), _above(up - defaults.acceptance_m)),)
+    return (LegPhase(TakeOff(up), _above(up - defaults.acceptance_m)),)
 
 
 def _yaw(clockwise_from_north_deg: float) -> float | None:

@@ -5,10 +5,10 @@ import numpy as np
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, ReferenceMemory, tilt_command
 from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
-from colibri.autopilot.guidance.reference import Kind, Reference, Target, lead, moving_with, still_target
+from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, lead, moving_with, still_target
 from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
 from colibri.autopilot.guidance.tasks.sticks import stick_climb, without_play
-from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, Motion, TaskContext, lifts
+from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, PositionMotion, TaskContext, lifts
 from colibri.common.kernels import cos
 from colibri.mavlink.setpoints.setpoints import Sticks
 
@@ -47,7 +47,7 @@ class StabilizedTask(EndlessTask):
         self._tilt = TiltLoop(generator)
         self._stop = HoldTask()
 
-    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
+    def update(self, context: TaskContext) -> PositionMotion | AttitudeMotion:
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
@@ -63,7 +63,7 @@ class AltitudeTask(EndlessTask):
         self._loop = HeightLoop(generator.weight_n, gravity_m_s2)
         self._height_m: float | None = None
 
-    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
+    def update(self, context: TaskContext) -> PositionMotion | AttitudeMotion:
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
@@ -122,9 +122,11 @@ class HeightLoop:
 
 def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
     """Return reference and target of a climb, or of a height if given; horizontally at the vehicle."""
-    kind = Kind.VELOCITY if height_m is None else Kind.POSITION
+    kind = BindingDerivative.VELOCITY if height_m is None else BindingDerivative.POSITION
     place = (*context.place[:2], context.place[2] if height_m is None else height_m)
-    target = still_target(place, context.yaw_rad, context.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))
+    target = still_target(
+        place, context.yaw_rad, context.samples, (BindingDerivative.VELOCITY, BindingDerivative.VELOCITY, kind)
+    )
     target.motion[:, 1, 2] = climb_m_s
     _, after = lead(context.reference, target, context.behaviour.limits, context.interval_s)
     moved = moving_with(context.state).motion

@@ -7,7 +7,7 @@ import numpy as np
 from colibri.autopilot.guidance.reference import still_target
 from colibri.autopilot.guidance.tasks.offboard import allowed_velocity
 from colibri.autopilot.guidance.tasks.position import HoldTask
-from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
+from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
@@ -24,7 +24,7 @@ class FollowTargetTask(EndlessTask):
         self._stop = HoldTask()
         self._ahead_rad: float | None = None
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         followed = context.steered.followed
         if followed is None:
             return self._stop.update(context)
@@ -46,4 +46,4 @@ class FollowTargetTask(EndlessTask):
         target = still_target((x, y, height_m), side + pi, context.samples)
         target.motion[:, 1] = vx, vy, vz
         target.motion[:, 0] += np.outer(context.interval_s * np.arange(context.samples), (vx, vy, vz))
-        return Motion(target, behaviour.limits)
+        return PositionMotion(target, behaviour.limits)

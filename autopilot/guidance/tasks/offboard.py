@@ -5,10 +5,10 @@ from math import hypot, isnan
 import numpy as np
 
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
-from colibri.autopilot.guidance.reference import Kind, Target, still_target
+from colibri.autopilot.guidance.reference import BindingDerivative, Target, still_target
 from colibri.autopilot.guidance.tasks.attitude import TiltLoop
 from colibri.autopilot.guidance.tasks.position import HoldTask
-from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, Motion, TaskContext
+from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, PositionMotion, TaskContext
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
 
@@ -24,13 +24,15 @@ class OffboardTask(EndlessTask):
         self._tilt = TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()
 
-    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
+    def update(self, context: TaskContext) -> PositionMotion | AttitudeMotion:
         setpoint = context.steered.setpoint
         if isinstance(setpoint, PositionSetpoint):
             if self._tilt:
                 self._tilt.forget()
             self._hold = HoldTask()
-            return Motion(position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits)
+            return PositionMotion(
+                position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits
+            )
         if isinstance(setpoint, AttitudeSetpoint) and self._tilt:
             self._hold = HoldTask()
             return self._tilt.by_command(self._tilt.generator.from_setpoint(setpoint), context)
@@ -47,12 +49,12 @@ def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
         p, v, a = setpoint.position_enu_m[axis], velocity[axis], setpoint.acceleration_m_s2[axis]
         v_or_0 = 0.0 if isnan(v) else v
         if not isnan(p):
-            kinds.append(Kind.POSITION)
+            kinds.append(BindingDerivative.POSITION)
             target.motion[:, 0, axis] = p + v_or_0 * ahead_s
         elif not isnan(v) or isnan(a):
-            kinds.append(Kind.VELOCITY)
+            kinds.append(BindingDerivative.VELOCITY)
         else:
-            kinds.append(Kind.ACCELERATION)
+            kinds.append(BindingDerivative.ACCELERATION)
         target.motion[:, 1, axis] = v_or_0
         if not isnan(a):
             target.motion[:, 2, axis] = allowed_acceleration(a, axis, context)

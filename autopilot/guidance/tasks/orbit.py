@@ -6,9 +6,9 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Pace
 from colibri.autopilot.guidance.reference import ALL_BOUND, Target
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
+from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
 from colibri.autopilot.guidance.tasks.position import GoToTask
-from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
+from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.common import elementwise
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array, Vector
@@ -23,7 +23,7 @@ _ON_IT_M, _ON_IT_M_S = 0.3, 0.5
 class OrbitTask(EndlessTask):
     """Fly to the nearest point of the circle, then along it."""
 
-    def __init__(self, order: Circle, context: TaskContext) -> None:
+    def __init__(self, order: Orbit, context: TaskContext) -> None:
         self.order = order
         self._radius_m = abs(order.radius_m)
         self._turn = -copysign(1.0, order.radius_m)
@@ -36,7 +36,7 @@ class OrbitTask(EndlessTask):
         self._circles, self._rate = False, 0.0
         self.turns = 0.0
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         if not self._circles:
             if not self._joins(context):
                 return self._way.update(context)
@@ -47,7 +47,7 @@ class OrbitTask(EndlessTask):
         self._angle = float(angles[1])
         self.turns += abs(rate) * context.interval_s / (2.0 * pi)
         target = Target(self._motion(angles, rate), ALL_BOUND, self._heading(angles, rate))
-        return Motion(target, context.behaviour.limits, Pace.WAITING)
+        return PositionMotion(target, context.behaviour.limits, Pace.WAITING)
 
     def _angle_of(self, place: Vector) -> float:
         """Return the direction from the centre, counter-clockwise from east."""

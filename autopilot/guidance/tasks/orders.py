@@ -16,7 +16,7 @@ class GoTo(NamedTuple):
     speed_m_s: float | None = None
 
 
-class Circle(NamedTuple):
+class Orbit(NamedTuple):
     """Fly around a centre; positive radii are clockwise."""
 
     center_enu_m: Vector
@@ -47,8 +47,8 @@ class Hold(NamedTuple):
     """Stop and stay."""
 
 
-Order: TypeAlias = GoTo | Circle | TakeOff | Land | Return | Hold
-_KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Circle, TakeOff, Land, Return, Hold)}
+Order: TypeAlias = GoTo | Orbit | TakeOff | Land | Return | Hold
+_KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Orbit, TakeOff, Land, Return, Hold)}
 
 
 class OrderRecord(NamedTuple):

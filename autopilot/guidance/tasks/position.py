@@ -6,13 +6,13 @@ from typing import TypeAlias
 
 from colibri.autopilot.control.interface import Pace
 from colibri.autopilot.guidance.integrator_chain import at_speed, climbing_at
-from colibri.autopilot.guidance.reference import Kind, Reference, Target, still_target
+from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
 from colibri.autopilot.guidance.tasks.task import (
     EndlessTask,
     FlightTask,
-    Motion,
     PlannedMotion,
+    PositionMotion,
     TaskContext,
     TaskOutput,
 )
@@ -48,11 +48,11 @@ class GoToTask:
     def order(self) -> GoTo:
         return GoTo(self._place, self._yaw_rad, self._speed_m_s)
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = at_speed(limits, min(self._speed_m_s, context.behaviour.max_speed_m_s))
-        return Motion(self._target, limits, Pace.WAITING)
+        return PositionMotion(self._target, limits, Pace.WAITING)
 
     def arrived(self, context: TaskContext) -> bool:
         return dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
@@ -70,17 +70,17 @@ class HoldTask:
     def order(self) -> Order:
         return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         limits = context.behaviour.limits
         if self._target is not None:
-            return Motion(self._target, limits)
+            return PositionMotion(self._target, limits)
         turning = abs(float(context.reference.heading[1])) > _REST_RAD_S
         if not turning and hypot(*context.velocity) < _REST_M_S:
             self._place, self._yaw_rad = context.place, context.yaw_rad
             self._target = still_target(self._place, self._yaw_rad, context.samples)
-            return Motion(self._target, limits)
-        braking = still_target(context.place, context.yaw_rad, context.samples, (Kind.VELOCITY,) * 3)
-        return Motion(braking._replace(turns=False), limits)
+            return PositionMotion(self._target, limits)
+        braking = still_target(context.place, context.yaw_rad, context.samples, (BindingDerivative.VELOCITY,) * 3)
+        return PositionMotion(braking._replace(turns=False), limits)
 
     def arrived(self, context: TaskContext) -> bool:
         del context
@@ -102,7 +102,7 @@ class TakeoffTask:
     def order(self) -> TakeOff:
         return TakeOff(self._height_m, self._yaw_rad)
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         """Brake horizontally first."""
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
@@ -111,10 +111,10 @@ class TakeoffTask:
             x, y, _ = context.place
             above = (x, y, self._height_m)
             if hypot(*context.velocity[:2]) >= _REST_M_S:
-                kinds = (Kind.VELOCITY, Kind.VELOCITY, Kind.POSITION)
-                return Motion(still_target(above, self._yaw_rad, context.samples, kinds), limits)
+                kinds = (BindingDerivative.VELOCITY, BindingDerivative.VELOCITY, BindingDerivative.POSITION)
+                return PositionMotion(still_target(above, self._yaw_rad, context.samples, kinds), limits)
             self._way = GoToTask(GoTo(above, self._yaw_rad), context)
-        return Motion(self._way.update(context).target, limits)
+        return PositionMotion(self._way.update(context).target, limits)
 
     def arrived(self, context: TaskContext) -> bool:
         return self._way is not None and self._way.arrived(context)
@@ -127,13 +127,13 @@ class LandTask(EndlessTask):
         self._xy = xy
         self._yaw_rad = yaw_rad
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         behaviour = context.behaviour
         yaw = context.yaw_rad if self._yaw_rad is None else self._yaw_rad
-        kinds = (Kind.POSITION, Kind.POSITION, Kind.VELOCITY)
+        kinds = (BindingDerivative.POSITION, BindingDerivative.POSITION, BindingDerivative.VELOCITY)
         target = still_target((*self._xy, context.place[2]), yaw, context.samples, kinds)
         target.motion[:, 1, 2] = -sinking_m_s(context)
-        return Motion(target._replace(turns=self._yaw_rad is not None), behaviour.limits)
+        return PositionMotion(target._replace(turns=self._yaw_rad is not None), behaviour.limits)
 
 
 def sinking_m_s(context: TaskContext) -> float:

@@ -2,8 +2,8 @@
 
 from math import hypot
 
-from colibri.autopilot.guidance.reference import Kind, Target, still_target
-from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
+from colibri.autopilot.guidance.reference import BindingDerivative, Target, still_target
+from colibri.autopilot.guidance.tasks.task import EndlessTask, PositionMotion, TaskContext
 from colibri.mavlink.setpoints.setpoints import Sticks, turned
 
 _DEADZONE = 0.05
@@ -19,36 +19,36 @@ class PositionTask(EndlessTask):
         self._z: float | None = None
         self._yaw_rad: float | None = None
 
-    def update(self, context: TaskContext) -> Motion:
+    def update(self, context: TaskContext) -> PositionMotion:
         sticks = context.steered.sticks or _MIDDLE
         target = still_target(context.place, context.yaw_rad, context.samples)
         horizontally = self._move(target, stick_velocity(sticks, context), context)
         vertically = self._climb(target, stick_climb(sticks, context), context)
         self._turn(target, stick_yaw_rate(sticks, context), context)
         kinds = (horizontally, horizontally, vertically)
-        return Motion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), context.behaviour.limits)
+        return PositionMotion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), context.behaviour.limits)
 
-    def _move(self, target: Target, velocity: tuple[float, float], context: TaskContext) -> Kind:
+    def _move(self, target: Target, velocity: tuple[float, float], context: TaskContext) -> BindingDerivative:
         if velocity != (0.0, 0.0):
             self._xy = None
         elif self._xy is None and hypot(*context.velocity[:2]) < _SLOW_M_S:
             self._xy = context.place[:2]
         target.motion[:, 1, :2] = velocity
         if self._xy is None:
-            return Kind.VELOCITY
+            return BindingDerivative.VELOCITY
         target.motion[:, 0, :2] = self._xy
-        return Kind.POSITION
+        return BindingDerivative.POSITION
 
-    def _climb(self, target: Target, climb_m_s: float, context: TaskContext) -> Kind:
+    def _climb(self, target: Target, climb_m_s: float, context: TaskContext) -> BindingDerivative:
         if climb_m_s != 0.0:
             self._z = None
         elif self._z is None and abs(context.velocity[2]) < _SLOW_M_S:
             self._z = context.place[2]
         target.motion[:, 1, 2] = climb_m_s
         if self._z is None:
-            return Kind.VELOCITY
+            return BindingDerivative.VELOCITY
         target.motion[:, 0, 2] = self._z
-        return Kind.POSITION
+        return BindingDerivative.POSITION
 
     def _turn(self, target: Target, yaw_rate: float, context: TaskContext) -> None:
         if yaw_rate != 0.0:

@@ -5,14 +5,14 @@ from typing import NamedTuple, Protocol, TypeAlias
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.reference import Kind, Reference, Target, target_of
+from colibri.autopilot.guidance.reference import BindingDerivative, Reference, Target, target_of
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 
 _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
-class Steered(NamedTuple):
+class ClientInputs(NamedTuple):
     """Latest client inputs."""
 
     sticks: Sticks | None = None
@@ -20,7 +20,7 @@ class Steered(NamedTuple):
     followed: TargetState | None = None
 
 
-NOT_STEERED = Steered()
+NOT_STEERED = ClientInputs()
 
 
 class TaskContext(NamedTuple):
@@ -40,7 +40,7 @@ class TaskContext(NamedTuple):
     behaviour: Behaviour
     interval_s: float
     samples: int
-    steered: Steered = NOT_STEERED
+    steered: ClientInputs = NOT_STEERED
     standing: bool = False
     ground_m: float = 0.0
     blind: bool = False
@@ -60,7 +60,7 @@ class TaskContext(NamedTuple):
         return (x, y, z)
 
 
-class Motion(NamedTuple):
+class PositionMotion(NamedTuple):
     """Motion by position and yaw: target, limits and pace."""
 
     target: Target
@@ -91,7 +91,7 @@ class AttitudeMotion(NamedTuple):
     drifts: bool = False
 
 
-TaskOutput: TypeAlias = Motion | PlannedMotion | AttitudeMotion
+TaskOutput: TypeAlias = PositionMotion | PlannedMotion | AttitudeMotion
 
 
 class FlightTask(Protocol):
@@ -116,6 +116,6 @@ def lifts(target: Target, state: VehicleState) -> bool:
     """Whether a standing vehicle must take off."""
     end = target.motion[-1, :, 2]
     kind = target.kinds[2]
-    if kind is Kind.POSITION:
+    if kind is BindingDerivative.POSITION:
         return bool(end[0] > state.position_enu_m[2] + _LIFT_M)
-    return bool(end[1 if kind is Kind.VELOCITY else 2] > _LIFT_M_S)
+    return bool(end[1 if kind is BindingDerivative.VELOCITY else 2] > _LIFT_M_S)

@@ -65,7 +65,7 @@ class Demand:
         return f"{self.name} of {value:.3g} {self.unit}, where {self.limit:.3g} is the {most}"
 
 
-class Motion(NamedTuple):
+class Derivatives(NamedTuple):
     """Derivatives of position, ENU, (n, 3) each."""
 
     velocity: Array
@@ -105,16 +105,16 @@ class Reach:
         hovering = np.full(len(rotors.position_m), self._vehicle.hover_speed / rotors.max_speed)
         return self._battery.charge_after(0.0, hovering, duration_s)
 
-    def charge_of(self, motion: Motion) -> float:
+    def charge_of(self, motion: Derivatives) -> float:
         rotors, interval_s, charge_ah = self._vehicle.rotors, _CHARGE_SAMPLES * INTERVAL_S, 0.0
-        some = Motion(*(column[::_CHARGE_SAMPLES] for column in motion))
+        some = Derivatives(*(column[::_CHARGE_SAMPLES] for column in motion))
         thrust = np.maximum(self._pulled(some).thrust_n[:, 0], 0.0)
         speeds = np.sqrt(thrust / (len(rotors.position_m) * rotors.thrust_coefficient)) / rotors.max_speed
         for speed in speeds:
             charge_ah = self._battery.charge_after(charge_ah, np.full(len(rotors.position_m), speed), interval_s)
         return charge_ah
 
-    def demands(self, motion: Motion, charge_ah: float) -> list[Demand]:
+    def demands(self, motion: Derivatives, charge_ah: float) -> list[Demand]:
         """Return the demands of a motion; limits are after `charge_ah` was taken from the battery."""
         _, a, j, s = motion
         mass = self._airframe.mass_kg
@@ -133,7 +133,7 @@ class Reach:
             demands.append(Demand("body rate", "rad/s", _length(up_rate), self._max_rate, self._max_rate))
         return demands
 
-    def _pulled(self, motion: Motion) -> "_Pulled":
+    def _pulled(self, motion: Derivatives) -> "_Pulled":
         """Split the force into thrust and drag, c (v - (v·z) z) across the rotor axis and c_z (v·z) z along it.
 
         With c = c_xy + c_r √T, T z = m (a + g) + c v + (c_z - c) (v·z) z: thrust points along m (a + g) + c v.
@@ -149,7 +149,7 @@ class Reach:
             thrust = length + (airframe.drag_z - drag) * _dot(force, v)[:, None] / np.maximum(length, _SMALL_N)
         return _Pulled(force, drag, thrust)
 
-    def _force(self, motion: Motion, drag: Array) -> Array:
+    def _force(self, motion: Derivatives, drag: Array) -> Array:
         """Return m (a + g) + c v, N, ENU, (n, 3)."""
         force = self._airframe.mass_kg * motion.acceleration + drag * motion.velocity
         force[:, 2] += self._airframe.mass_kg * self._airframe.gravity_m_s2
@@ -178,19 +178,19 @@ def times(track: Track) -> Array:
     return np.arange(0.0, DURATION_S if track.duration_s == inf else track.duration_s, INTERVAL_S)
 
 
-def exact_motion(track: Track) -> Motion:
+def exact_motion(track: Track) -> Derivatives:
     axes = track.position(track.clock(times(track), _SNAP))
-    return Motion(*(np.stack([axis.derivative(order) for axis in axes], axis=1) for order in range(1, _SNAP + 1)))
+    return Derivatives(*(np.stack([axis.derivative(order) for axis in axes], axis=1) for order in range(1, _SNAP + 1)))
 
 
-def mean_motion(track: Track) -> Motion:
+def mean_motion(track: Track) -> Derivatives:
     """Return the motion by differences over the response time of a control law, which rounds steps off."""
     t, apart = times(track), _RESPONSE_SAMPLES
     around = INTERVAL_S * np.arange(-2 * apart, len(t) + 2 * apart)
     p = position(track, np.clip(around, 0.0, track.duration_s))
     far_back, back, here, ahead, far_ahead = (p[k * apart : k * apart + len(t)] for k in range(5))
     h = INTERVAL_S * apart
-    return Motion(
+    return Derivatives(
         (ahead - back) / (2.0 * h),
         (ahead - 2.0 * here + back) / (h * h),
         (far_ahead - 2.0 * ahead + 2.0 * back - far_back) / (2.0 * h * h * h),

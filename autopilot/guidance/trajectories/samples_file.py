@@ -18,7 +18,7 @@ _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class SampledTrack:
     """Times from 0, s, (n,), position to acceleration, ENU, (n, 3, 3), and yaw, unwrapped, or along the path."""
 
     times_s: Array
@@ -26,13 +26,13 @@ class Samples:
     yaw_rad: Array | None
 
 
-def read_samples(path: Path, text: str | None = None) -> Samples:
+def read_samples(path: Path, text: str | None = None) -> SampledTrack:
     """Read columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and yaw (degrees), or raise TrackFileError."""
     table = read_table(path, _REQUIRED, _OPTIONAL, text)
     times_s = table.times(_MIN_STEP_S)
     motion = np.stack([table.matrix(columns) for columns in (_PLACE, _VELOCITY, _ACCELERATION)], axis=1)
     _check(table, np.diff(times_s)[:, None], motion)
-    return Samples(times_s, motion, table.yaw_rad)
+    return SampledTrack(times_s, motion, table.yaw_rad)
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.guidance.trajectories.samples_file import Samples, read_samples
+from colibri.autopilot.guidance.trajectories.samples_file import SampledTrack, read_samples
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
@@ -238,7 +238,7 @@ def through(waypoints: Waypoints, heights: Array | None = None, between: Array |
     return _looking(position, times_s, waypoints.yaw_rad, waypoints)
 
 
-def sampled(samples: Samples) -> Track:
+def sampled(samples: SampledTrack) -> Track:
     """Return the track by quintic interpolation, with continuous acceleration."""
     from colibri.autopilot.guidance.trajectories.minimum_snap import interpolate
 

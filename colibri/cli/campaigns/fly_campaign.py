@@ -7,7 +7,7 @@ from typing import Any
 
 from colibri.analysis.tables import print_table
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.campaigns.values import CampaignError, first_twice
@@ -132,7 +132,7 @@ class _Bar:
         self._bar.start_task(self._task)
         self._bar.update(self._task, completed=kept)
 
-    def ended(self, flown: Flown) -> None:
+    def ended(self, flown: FlightResult) -> None:
         self._flown += 1
         self._lost += flown.verdict.is_lost
         elapsed_s = self._bar.tasks[self._task].elapsed or 0.0

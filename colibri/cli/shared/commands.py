@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Command(NamedTuple):
+class CommandEntry(NamedTuple):
     """A subcommand.
 
     Attributes:
@@ -16,9 +16,9 @@ class Command(NamedTuple):
     examples: str
 
 
-GROUPS: dict[str, dict[str, Command]] = {
+GROUPS: dict[str, dict[str, CommandEntry]] = {
     "fly": {
-        "fly": Command(
+        "fly": CommandEntry(
             "fly a track and report how well it went",
             "",
             """
@@ -27,7 +27,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri fly circle --feedback sensors --seed 3    # by estimates
             """,
         ),
-        "sitl": Command(
+        "sitl": CommandEntry(
             "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy",
             "",
             """
@@ -36,7 +36,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri sitl --feedback sensors --turbulence light --speed 1
             """,
         ),
-        "view": Command(
+        "view": CommandEntry(
             "see flights, or a MAVLink vehicle, fly in a browser",
             "viewer",
             """
@@ -45,12 +45,12 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri view udpin:127.0.0.1:14550
             """,
         ),
-        "plot": Command(
+        "plot": CommandEntry(
             "draw the figures of a flight, however it ended",
             "",
             "colibri plot out/spiral",
         ),
-        "export": Command(
+        "export": CommandEntry(
             "write the topics of a flight's ULog as MCAP, CSV or Parquet",
             "",
             """
@@ -58,12 +58,12 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri export out/spiral --csv            # a table of each topic
             """,
         ),
-        "replay": Command(
+        "replay": CommandEntry(
             "feed a recorded flight to the autopilot: are its answers the same?", "", "colibri replay out/spiral"
         ),
     },
     "many flights": {
-        "campaign": Command(
+        "campaign": CommandEntry(
             "fly every combination of factors, by many seeds, into one table",
             "campaigns",
             """
@@ -72,7 +72,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri campaign --track spiral --set feedback=state,sensors --seeds 1-10
             """,
         ),
-        "tune": Command(
+        "tune": CommandEntry(
             "find better numbers of a profile, and what they are worth on seeds never seen",
             "",
             """
@@ -80,7 +80,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri tune weights.toml --out out/tune --resume     # go on, or join
             """,
         ),
-        "compare": Command(
+        "compare": CommandEntry(
             "fly several controllers on several tracks, side by side",
             "campaigns",
             """
@@ -88,17 +88,17 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri compare --track circle --seeds 1-20 --turbulence light
             """,
         ),
-        "study": Command(
+        "study": CommandEntry(
             "fly what shows how far profile flight reaches, and draw it",
             "campaigns",
             "colibri study speed robustness    # two of the studies; without a name all",
         ),
-        "figures": Command(
+        "figures": CommandEntry(
             "fly all that the thesis shows and draw its figures", "campaigns", "colibri figures --only 4.9"
         ),
     },
     "vehicles of others": {
-        "companion": Command(
+        "companion": CommandEntry(
             "fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion",
             "vehicles",
             """
@@ -106,14 +106,14 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri companion circle --vehicle udpin:127.0.0.1:14540 --arm
             """,
         ),
-        "vehicle": Command(
+        "vehicle": CommandEntry(
             "write a vehicle as parameters of PX4 or ArduPilot",
             "descriptions",
             "colibri vehicle hummingbird --for px4 --out hummingbird.params",
         ),
     },
     "control laws": {
-        "check-controller": Command(
+        "check-controller": CommandEntry(
             "try on a control law of your own what every one must satisfy",
             "laws",
             """
@@ -121,14 +121,14 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri check-controller lpv-mpc --only memory --only limits
             """,
         ),
-        "certify": Command(
+        "certify": CommandEntry(
             "prove what can be proven of a profile's attitude law",
             "laws",
             "colibri certify flight --controller lpv-mpc",
         ),
     },
     "profiles and vehicles": {
-        "show": Command(
+        "show": CommandEntry(
             "print the file of a profile or vehicle, to copy and change",
             "descriptions",
             """
@@ -138,7 +138,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         ),
     },
     "this computer": {
-        "doctor": Command(
+        "doctor": CommandEntry(
             "look whether everything is there that flights need",
             "computer",
             """
@@ -146,7 +146,7 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri doctor --gcs    # wait for a ground station, too
             """,
         ),
-        "bench": Command(
+        "bench": CommandEntry(
             "measure how fast it flies",
             "computer",
             """
@@ -154,12 +154,12 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri bench --only stages --runs 1
             """,
         ),
-        "verify": Command(
+        "verify": CommandEntry(
             "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
             "computer",
             "colibri verify --link memory",
         ),
-        "completion": Command(
+        "completion": CommandEntry(
             "print what makes a shell complete these commands",
             "computer",
             """

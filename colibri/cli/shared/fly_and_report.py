@@ -13,7 +13,7 @@ from colibri.common.spec import from_namespace
 from colibri.flights.effects import in_words
 from colibri.flights.fly import fly_plan
 from colibri.flights.folder import occupied, prepare
-from colibri.flights.plan import FlightPlan, Summary, unseen
+from colibri.flights.plan import FlightPlan, FrameCount, unseen
 from colibri.flights.processes import FlightError
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.links.startup import COMPILING
@@ -69,7 +69,7 @@ def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
     keep_what_there_is(plan, why)
 
 
-def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -> "Report":
+def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool) -> "Report":
     """Write and print the results. Modules are loaded only now, after the flight."""
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report

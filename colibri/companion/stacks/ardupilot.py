@@ -4,7 +4,7 @@ Sources: ArduPilot, Copter Commands in Guided Mode (SET_ATTITUDE_TARGET, GUID_OP
 AP_Motors_Thrust_Linearization.cpp.
 """
 
-from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOff
+from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOffOrder
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.mavlink.client.modes import COPTER_MODES
 from colibri.mavlink.wire.dialect import mav
@@ -71,6 +71,6 @@ ARDUPILOT = Stack(
     fence=("FENCE_RADIUS", "FENCE_ALT_MAX"),
     thrust=_thrust,
     response=Response((0.03, 0.03, 0.2), 0.026, 0.03, (3.8, 3.8, 1.5), (18.0, 18.0, 4.0)),
-    take_off=TakeOff.ARM_THEN_COMMAND,
+    take_off=TakeOffOrder.ARM_THEN_COMMAND,
     integers_by_bits=False,
 )

@@ -3,7 +3,7 @@
 Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference (Multicopter Position Control, Motor Control, Geofence).
 """
 
-from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOff
+from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOffOrder
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.mavlink.client.modes import PX4_MODES
 from colibri.mavlink.wire.dialect import mav
@@ -56,6 +56,6 @@ PX4 = Stack(
     fence=("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
     thrust=_thrust,
     response=Response((0.055, 0.055, 0.3), 0.04, 0.04, (3.8, 3.8, 2.0), (12.0, 12.0, 6.0)),
-    take_off=TakeOff.COMMAND_THEN_ARM,
+    take_off=TakeOffOrder.COMMAND_THEN_ARM,
     integers_by_bits=True,
 )

@@ -14,7 +14,7 @@ Parameters: TypeAlias = Mapping[str, float]
 """Parameters of the vehicle, by name."""
 
 
-class TakeOff(Enum):
+class TakeOffOrder(Enum):
     """Order of the take-off commands."""
 
     COMMAND_THEN_ARM = "take-off, then arm: the height is above the sea"
@@ -73,5 +73,5 @@ class Stack:
     fence: tuple[str, str]
     thrust: Callable[[Parameters, Vehicle], Thrust]
     response: Response
-    take_off: TakeOff
+    take_off: TakeOffOrder
     integers_by_bits: bool

@@ -22,7 +22,7 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.tasks.orders import GoTo
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, TrackTask
-from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMotion, TaskContext
+from colibri.autopilot.guidance.tasks.task import FlightTask, PlannedMotion, PositionMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.jit import packed
@@ -55,7 +55,7 @@ class ApproachTask(GoToTask):
         return there and super().arrived(context)
 
 
-class Asked(NamedTuple):
+class LawDemand(NamedTuple):
     """Demand of a law; fields of a decision are `None` between two of them, `track_s` is negative before the track."""
 
     rate_flu_rad_s: Vector
@@ -142,7 +142,7 @@ class LawPilot:
     def _time_us(self) -> int:
         return self._tick * self.interval_us
 
-    def step(self, y: Array) -> Asked:
+    def step(self, y: Array) -> LawDemand:
         """Return the demand for a vehicle in state `y` at the time of effect; call it once an interval."""
         decision, horizon, place = None, None, None
         time_us = self._time_us
@@ -166,7 +166,7 @@ class LawPilot:
         now, then = y[model.RATE].tolist(), reached[motion.RATE].tolist()
         p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
-        return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
+        return LawDemand((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
 
     def _carried(self, x: Array, speeds: Array) -> Array:
         interval_s, battery = np.array([self.interval_us * 1e-6]), self._vehicle.battery
@@ -209,7 +209,7 @@ class LawPilot:
             generator.samples,
         )
         wanted = self._task.update(context)
-        assert isinstance(wanted, Motion | PlannedMotion), "no task of these asks for attitudes"
+        assert isinstance(wanted, PositionMotion | PlannedMotion), "no task of these asks for attitudes"
         horizon = generator.lead(context, wanted)
         return horizon, first(wanted.horizon.position_enu_m) if isinstance(wanted, PlannedMotion) else None
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from colibri.companion.stacks.stack import Stack
 from colibri.companion.stacks.thrust_curve import Thrust
-from colibri.companion.supervision.limits import Box, FlightLimits
+from colibri.companion.supervision.limits import FlightLimits, FlightRegion
 from colibri.mavlink.client.report import VehicleReport
 
 MIN_STATE_RATE_HZ = 40.0
@@ -30,7 +30,7 @@ class CheckFacts(NamedTuple):
     mode_rate_hz: float
     report: VehicleReport
     may_arm: bool
-    box: Box
+    box: FlightRegion
     limits: FlightLimits
 
 

@@ -22,7 +22,7 @@ _CRITICAL = frozenset({5, 6, 7, 8})
 """MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
 
 
-class Box(NamedTuple):
+class FlightRegion(NamedTuple):
     """Region of a flight, ENU, m."""
 
     lower: Vector
@@ -31,18 +31,18 @@ class Box(NamedTuple):
     def has(self, place: Vector) -> bool:
         return all(low <= x <= high for low, x, high in zip(self.lower, place, self.upper, strict=True))
 
-    def around(self, place: Vector, margin_m: float) -> "Box":
+    def around(self, place: Vector, margin_m: float) -> "FlightRegion":
         """Extend the box to a place and its margin."""
         lower = tuple(min(low, x - margin_m) for low, x in zip(self.lower, place, strict=True))
         upper = tuple(max(high, x + margin_m) for high, x in zip(self.upper, place, strict=True))
-        return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+        return FlightRegion((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
 
 
-def box_of(track: Track, duration_s: float, margin_m: float) -> Box:
+def box_of(track: Track, duration_s: float, margin_m: float) -> FlightRegion:
     """Return the box around the flown part of a track."""
     points = position(track, np.linspace(0.0, min(track.duration_s, duration_s, _ENDLESS_S), _TRACK_POINTS))
     lower, upper = (points.min(axis=0) - margin_m).tolist(), (points.max(axis=0) + margin_m).tolist()
-    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+    return FlightRegion((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +81,7 @@ class Limit(NamedTuple):
     """A row of the table; after a `blind` one only the mode may be commanded."""
 
     name: str
-    exceeded: Callable[[FlightFacts, FlightLimits, Box], bool]
+    exceeded: Callable[[FlightFacts, FlightLimits, FlightRegion], bool]
     words: Callable[[FlightFacts, FlightLimits], str]
     blind: bool = False
 
@@ -168,5 +168,5 @@ LIMITS: tuple[Limit, ...] = (
 )
 
 
-def exceeded(now: FlightFacts, limits: FlightLimits, box: Box) -> Limit | None:
+def exceeded(now: FlightFacts, limits: FlightLimits, box: FlightRegion) -> Limit | None:
     return next((limit for limit in LIMITS if limit.exceeded(now, limits, box)), None)

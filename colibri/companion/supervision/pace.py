@@ -5,7 +5,7 @@ from collections import deque
 _WINDOW_US = 1_000_000
 
 
-class Pace:
+class SetpointRate:
     """Counts setpoints against those due over the last second."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 
-class Phase(StrEnum):
+class CompanionPhase(StrEnum):
     """Activity of a companion."""
 
     CONNECTING = "connecting"
@@ -17,7 +17,7 @@ class Phase(StrEnum):
     ENDED = "ended"
 
 
-class Condition(StrEnum):
+class PhaseCondition(StrEnum):
     """Condition of a transition; its value is the message to the user."""
 
     CONNECTED = "the vehicle is known"
@@ -35,39 +35,43 @@ class Condition(StrEnum):
     TOO_LATE = "nothing came of it in time"
 
 
-class Row(NamedTuple):
+class PhaseTransition(NamedTuple):
     """A transition."""
 
-    sources: tuple[Phase, ...]
-    condition: Condition
-    target: Phase
+    sources: tuple[CompanionPhase, ...]
+    condition: PhaseCondition
+    target: CompanionPhase
 
 
-_GROUND = (Phase.CONNECTING, Phase.CHECKING)
-_CLIMBS = (Phase.ARMING, Phase.TAKING_OFF)
-_FLIES = (Phase.TAKING_OVER, Phase.FLYING)
+_GROUND = (CompanionPhase.CONNECTING, CompanionPhase.CHECKING)
+_CLIMBS = (CompanionPhase.ARMING, CompanionPhase.TAKING_OFF)
+_FLIES = (CompanionPhase.TAKING_OVER, CompanionPhase.FLYING)
 
-TABLE: tuple[Row, ...] = (
-    Row(_GROUND, Condition.STOPPED, Phase.ENDED),
-    Row((*_CLIMBS, *_FLIES, Phase.HANDING_OVER), Condition.PILOT, Phase.ENDED),
-    Row((Phase.TAKING_OFF, *_FLIES, Phase.HANDING_OVER), Condition.DISARMED, Phase.ENDED),
-    Row((*_CLIMBS, *_FLIES), Condition.STOPPED, Phase.HANDING_OVER),
-    Row((Phase.TAKING_OFF, *_FLIES), Condition.MUST_END, Phase.HANDING_OVER),
-    Row((Phase.CONNECTING,), Condition.CONNECTED, Phase.CHECKING),
-    Row((Phase.CHECKING,), Condition.FINISHED, Phase.ENDED),
-    Row((Phase.CHECKING,), Condition.CHECKED_IN_AIR, Phase.TAKING_OVER),
-    Row((Phase.CHECKING,), Condition.CHECKED_TO_ARM, Phase.ARMING),
-    Row((Phase.ARMING,), Condition.ARMED, Phase.TAKING_OFF),
-    Row((Phase.TAKING_OFF,), Condition.UP, Phase.TAKING_OVER),
-    Row((Phase.TAKING_OVER,), Condition.OFFBOARD, Phase.FLYING),
-    Row((Phase.FLYING,), Condition.FINISHED, Phase.HANDING_OVER),
-    Row((Phase.HANDING_OVER,), Condition.HELD, Phase.ENDED),
-    Row((*_GROUND, Phase.HANDING_OVER), Condition.TOO_LATE, Phase.ENDED),
-    Row((*_CLIMBS, Phase.TAKING_OVER), Condition.TOO_LATE, Phase.HANDING_OVER),
+TABLE: tuple[PhaseTransition, ...] = (
+    PhaseTransition(_GROUND, PhaseCondition.STOPPED, CompanionPhase.ENDED),
+    PhaseTransition((*_CLIMBS, *_FLIES, CompanionPhase.HANDING_OVER), PhaseCondition.PILOT, CompanionPhase.ENDED),
+    PhaseTransition(
+        (CompanionPhase.TAKING_OFF, *_FLIES, CompanionPhase.HANDING_OVER), PhaseCondition.DISARMED, CompanionPhase.ENDED
+    ),
+    PhaseTransition((*_CLIMBS, *_FLIES), PhaseCondition.STOPPED, CompanionPhase.HANDING_OVER),
+    PhaseTransition((CompanionPhase.TAKING_OFF, *_FLIES), PhaseCondition.MUST_END, CompanionPhase.HANDING_OVER),
+    PhaseTransition((CompanionPhase.CONNECTING,), PhaseCondition.CONNECTED, CompanionPhase.CHECKING),
+    PhaseTransition((CompanionPhase.CHECKING,), PhaseCondition.FINISHED, CompanionPhase.ENDED),
+    PhaseTransition((CompanionPhase.CHECKING,), PhaseCondition.CHECKED_IN_AIR, CompanionPhase.TAKING_OVER),
+    PhaseTransition((CompanionPhase.CHECKING,), PhaseCondition.CHECKED_TO_ARM, CompanionPhase.ARMING),
+    PhaseTransition((CompanionPhase.ARMING,), PhaseCondition.ARMED, CompanionPhase.TAKING_OFF),
+    PhaseTransition((CompanionPhase.TAKING_OFF,), PhaseCondition.UP, CompanionPhase.TAKING_OVER),
+    PhaseTransition((CompanionPhase.TAKING_OVER,), PhaseCondition.OFFBOARD, CompanionPhase.FLYING),
+    PhaseTransition((CompanionPhase.FLYING,), PhaseCondition.FINISHED, CompanionPhase.HANDING_OVER),
+    PhaseTransition((CompanionPhase.HANDING_OVER,), PhaseCondition.HELD, CompanionPhase.ENDED),
+    PhaseTransition((*_GROUND, CompanionPhase.HANDING_OVER), PhaseCondition.TOO_LATE, CompanionPhase.ENDED),
+    PhaseTransition((*_CLIMBS, CompanionPhase.TAKING_OVER), PhaseCondition.TOO_LATE, CompanionPhase.HANDING_OVER),
 )
 
 
-def next_phase(phase: Phase, conditions: frozenset[Condition]) -> tuple[Phase, Condition | None]:
+def next_phase(
+    phase: CompanionPhase, conditions: frozenset[PhaseCondition]
+) -> tuple[CompanionPhase, PhaseCondition | None]:
     for row in TABLE:
         if phase in row.sources and row.condition in conditions:
             return row.target, row.condition

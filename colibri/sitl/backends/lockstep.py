@@ -40,7 +40,7 @@ class SessionError(SitlError):
     """A flight cannot go on: a process has died or is silent."""
 
 
-class Plant(Protocol):
+class PlantSide(Protocol):
     """The plant's side; `process` is its id if it has its own."""
 
     @property
@@ -60,7 +60,7 @@ class Plant(Protocol):
     def close(self) -> None: ...
 
 
-class Autopilot(Protocol):
+class AutopilotSide(Protocol):
     """The autopilot's side; `process` is its id if it has its own."""
 
     @property
@@ -106,7 +106,7 @@ class LockstepSession:
         trouble: Faults of the link between plant and autopilot.
     """
 
-    def __init__(self, plant: Plant, autopilot: Autopilot, system: int, seed: int = 0) -> None:
+    def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, seed: int = 0) -> None:
         self.plant = plant
         self.autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)

@@ -4,7 +4,7 @@ from time import perf_counter
 
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.step import answer
-from colibri.autopilot.process.ground import Ground
+from colibri.autopilot.process.ground import GroundService
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.errors import Error
 from colibri.common.process.status import Silent
@@ -90,7 +90,7 @@ class MemoryAutopilot:
         spec = self._spec
         try:
             self._conductor = _MemoryConductor()
-            self._ground = Ground(spec, *spec.load(), Silent(), self._conductor)
+            self._ground = GroundService(spec, *spec.load(), Silent(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
         self.autopilot = self._ground.autopilot

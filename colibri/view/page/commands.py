@@ -15,7 +15,7 @@ ORDERS = {"Arm": "arm", "Disarm": "disarm", "Take off": "take off", "Land": "lan
 _HEIGHT_M = 3.0
 
 
-class Commands:
+class CommandPanels:
     """The command panels of all browsers; commands go into the queue `done`."""
 
     def __init__(

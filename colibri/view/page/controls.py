@@ -22,7 +22,7 @@ class Done(NamedTuple):
     value: Any = None
 
 
-class Controls:
+class ControlPanel:
     """The left panel; a live vehicle has no `span_s` and no time line."""
 
     def __init__(self, gui: viser.GuiApi, span_s: tuple[float, float] | None, scale: float) -> None:

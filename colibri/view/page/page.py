@@ -9,8 +9,8 @@ import viser
 from colibri.common.types import Vector
 from colibri.view.access import Token
 from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
-from colibri.view.page.commands import Commands
-from colibri.view.page.controls import Controls, Done, words
+from colibri.view.page.commands import CommandPanels
+from colibri.view.page.controls import ControlPanel, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
 from colibri.view.page.server import PageServer, address, stop
@@ -47,7 +47,7 @@ class Page:
         self._follows = False
         self._look(middle, self._extent_m)
         begin_s, end_s = zip(*(source.span_s for source in self._sources), strict=True)
-        self.controls = Controls(gui, None if live else (min(begin_s), max(end_s)), self._scale)
+        self.controls = ControlPanel(gui, None if live else (min(begin_s), max(end_s)), self._scale)
         gui.main_panel.dock_left()
         gui.main_panel.set_width(_LEFT_PX)
         panel = gui.add_panel()
@@ -124,7 +124,7 @@ class Page:
         self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
-        Commands(self.server, token, modes, self.controls.done, self._ground_point)
+        CommandPanels(self.server, token, modes, self.controls.done, self._ground_point)
 
     def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
         x, y, z = np.subtract(origin, self._world.position).tolist()

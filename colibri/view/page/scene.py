@@ -16,7 +16,7 @@ from colibri.view.geometry import (
     thrust_arrows,
     zone_segments,
 )
-from colibri.view.snapshot import NO_POINTS, Airframe, Mark, Snapshot, Surroundings
+from colibri.view.snapshot import NO_POINTS, Mark, Snapshot, Surroundings, VehicleShape
 
 COLOURS: tuple[Colour, ...] = ((30, 110, 210), (230, 120, 20), (40, 150, 70), (150, 60, 170))
 """By vehicle."""
@@ -40,7 +40,7 @@ _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 class VehicleScene:
     """One vehicle with trail, reference and horizon, at `scale` times its size."""
 
-    def __init__(self, scene: viser.SceneApi, number: int, airframe: Airframe, scale: float) -> None:
+    def __init__(self, scene: viser.SceneApi, number: int, airframe: VehicleShape, scale: float) -> None:
         self._scene = scene
         self._root = f"/world/{number}"
         self._airframe = airframe

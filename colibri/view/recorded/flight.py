@@ -21,7 +21,7 @@ from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import Vehicle
 from colibri.view.geometry import thinned
 from colibri.view.recorded.horizons import Horizons
-from colibri.view.snapshot import NO_POINTS, NOWHERE, Airframe, Chart, Snapshot, Surroundings, ViewError
+from colibri.view.snapshot import NO_POINTS, NOWHERE, Chart, Snapshot, Surroundings, VehicleShape, ViewError
 
 MAX_ROWS = 30_000
 """Rows in memory: ten minutes at 50 Hz; longer flights have a lower rate."""
@@ -34,7 +34,7 @@ _EVENTS = 3
 """Number of latest controller events shown."""
 
 
-class Columns(NamedTuple):
+class LogColumns(NamedTuple):
     """Columns of a log by name, at its times."""
 
     times_s: Array
@@ -147,7 +147,7 @@ class RecordedFlight:
             charts.append(_chart("battery, V", ("voltage",), times_s[known], self._truth.columns("voltage_v")[known]))
         return tuple(charts)
 
-    def _estimation_chart(self, estimate: Columns) -> Chart:
+    def _estimation_chart(self, estimate: LogColumns) -> Chart:
         truth = np.stack([np.interp(estimate.times_s, self._truth.times_s, axis) for axis in self._place.T], axis=1)
         wrong = estimate.columns("x", "y", "z") - truth
         bound = 3.0 * estimate.columns("sd_x", "sd_y", "sd_z").max(axis=1)[:, None]
@@ -166,13 +166,13 @@ class RecordedFlight:
         return tuple(until[-_EVENTS:][::-1])
 
 
-def airframe_of(vehicle: Vehicle) -> Airframe:
+def airframe_of(vehicle: Vehicle) -> VehicleShape:
     a, b, c, d = (1.0 if direction == "ccw" else -1.0 for direction in vehicle.rotors.direction)
     foot_m = vehicle.ground.foot_depth_m if vehicle.ground else 0.0
-    return Airframe(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
+    return VehicleShape(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
 
 
-def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
+def _read(log: FlightFile, topic: Topic, apart_s: float) -> LogColumns:
     """Read a topic with samples at least `apart_s` apart, at most `MAX_ROWS`."""
     (times_s,) = read_series(log, topic, "t")
     if not len(times_s):
@@ -182,10 +182,10 @@ def _read(log: FlightFile, topic: Topic, apart_s: float) -> Columns:
     wanted = np.zeros(len(times_s), dtype=np.bool_)
     wanted[::step] = wanted[-1] = True
     rows = np.vstack(list(read_blocks(log, topic, wanted)))
-    return Columns(rows[:, 0], dict(zip(topic.names, rows.T, strict=True)))
+    return LogColumns(rows[:, 0], dict(zip(topic.names, rows.T, strict=True)))
 
 
-def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:
+def _reference(plan: FlightPlan, times_s: Array, decisions: LogColumns) -> Array:
     lags = Lags(decisions.times_s, decisions.named["path_lag_s"])
     return position(plan.track, path_times(times_s, lags))
 
@@ -204,7 +204,7 @@ def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, he
     return Chart(title, names, rows[:, 0], rows[:, 2:].T, rows[:, 1])
 
 
-def _events(decisions: Columns) -> list[tuple[float, str]]:
+def _events(decisions: LogColumns) -> list[tuple[float, str]]:
     """Return times and texts of QP failures and fallbacks."""
     statuses = {code: status for status, code in STATUS_CODES.items()}
     fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}

@@ -11,7 +11,14 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.mission.items import FENCE, MISSION
-from colibri.mavlink.services.command import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED, Command
+from colibri.mavlink.services.command import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    ReceivedCommand,
+)
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.cockpit import FLYING, GROUND, Cockpit, item
@@ -246,7 +253,7 @@ def test_any_command_is_answered_and_the_flight_goes_on(
     handlers = list(cockpit.commands.handlers().items())
     number, handler = handlers[index % len(handlers)]
     p1, p2, p3, p4, x, y, z = numbers
-    refusal = handler(Command(number, p1, p2, p3, p4, x, y, z, frame, GROUND, cockpit.now_us))
+    refusal = handler(ReceivedCommand(number, p1, p2, p3, p4, x, y, z, frame, GROUND, cockpit.now_us))
     if refusal is not None:
         assert refusal.reason
         assert refusal.result in (DENIED, FAILED, UNSUPPORTED, TEMPORARILY_REJECTED)

@@ -11,12 +11,12 @@ from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, Sta
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.guidance import RESTS
 from colibri.autopilot.guidance.tasks.position import HoldTask
-from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.autopilot.guidance.tasks.task import ClientInputs
 from colibri.mavlink.mission.items import MISSION
 from colibri.mavlink.setpoints.setpoints import Sticks
 from tests.support.cockpit import FLYING, Cockpit, at, item
 
-STICKS = Steered(sticks=Sticks(0.0, 0.0, 0.5, 0.0))
+STICKS = ClientInputs(sticks=Sticks(0.0, 0.0, 0.5, 0.0))
 LEADS = {
     Action.HOLD: Mode.HOLD,
     Action.RETURN: Mode.RETURN,

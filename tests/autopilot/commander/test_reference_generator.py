@@ -11,12 +11,12 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Reference, at_rest, lead, still_target
 from colibri.autopilot.guidance.sample_grid import instants
-from colibri.autopilot.guidance.tasks.task import Motion, TaskContext
+from colibri.autopilot.guidance.tasks.task import PositionMotion, TaskContext
 
 SAMPLES, INTERVAL_US = 30, 8_000
 STATE = VehicleState((1.0, -2.0, 3.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 7.0), (0.0, 0.0, 0.0))
-HERE = Motion(still_target(STATE.position_enu_m, 0.7, SAMPLES), Limits())
-THERE = Motion(still_target((1.0, -2.0, 3.5), 0.7, SAMPLES), Limits())
+HERE = PositionMotion(still_target(STATE.position_enu_m, 0.7, SAMPLES), Limits())
+THERE = PositionMotion(still_target((1.0, -2.0, 3.5), 0.7, SAMPLES), Limits())
 
 
 class Lead:
@@ -26,7 +26,7 @@ class Lead:
         self.generator = ReferenceGenerator(instants(Preview(INTERVAL_US, SAMPLES), INTERVAL_US), Limits())
         self.generator.set(at_rest(STATE))
 
-    def sample(self, wanted: Motion, *, waited: bool = False) -> Horizon:
+    def sample(self, wanted: PositionMotion, *, waited: bool = False) -> Horizon:
         before = self.generator.reference
         assert before is not None
         context = TaskContext(0, STATE, before, (0.0, 0.0, 0.0), Behaviour(), INTERVAL_US * 1e-6, SAMPLES)

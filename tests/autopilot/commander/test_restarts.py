@@ -20,10 +20,10 @@ from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask,
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
+from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, LandTask, TakeoffTask, TaskSequence, TrackTask
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
-from colibri.autopilot.guidance.tasks.task import FlightTask, Steered
+from colibri.autopilot.guidance.tasks.task import ClientInputs, FlightTask
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import FENCE, MISSION, plan_of
@@ -37,7 +37,7 @@ MISSION_ITEMS = (
     item("NAV_LAND", place=(8.0, 0.0, 0.0)),
 )
 PLANS = {MISSION: plan_of(MISSION_ITEMS), FENCE: plan_of(())}
-STEERED = Steered(
+STEERED = ClientInputs(
     Sticks(pitch=0.5, roll=-0.3, thrust=0.7, yaw=0.2),
     PositionSetpoint((20.0, 5.0, 8.0)),
     TargetState((15.0, 0.0, 0.0), (1.0, 0.5, 0.0), (0.0, 0.0, 0.0)),
@@ -70,7 +70,7 @@ def come_home(cockpit: Cockpit) -> None:
 
 
 def circle(cockpit: Cockpit) -> None:
-    cockpit.pilot.fly(Mode.ORBIT, OrbitTask(Circle((0.0, 0.0, 2.0), 2.0), cockpit.pilot.context()), ())
+    cockpit.pilot.fly(Mode.ORBIT, OrbitTask(Orbit((0.0, 0.0, 2.0), 2.0), cockpit.pilot.context()), ())
 
 
 def begins(mode: Mode) -> Callable[[Cockpit], object]:

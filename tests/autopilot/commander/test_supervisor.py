@@ -4,8 +4,8 @@ import pytest
 
 from colibri.autopilot.commander.rules.failsafe_conditions import FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_parameters import settings
-from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory
-from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition, Row
+from colibri.autopilot.commander.rules.failsafe_rule import FailsafeMemory, FlightState
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition, FailsafeRow
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
@@ -16,7 +16,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.failsafe_inputs import FULL, LOST, WELL
 
-HOLDING = Flight(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
+HOLDING = FlightState(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
 DEFINITIONS = definitions(load_profile("flight"), load_vehicle("hummingbird"))
 CHOICES = [
     (row, value, action) for row in TABLE if row.condition in LOST and row.parameter for value, action in row.choices
@@ -30,7 +30,7 @@ def supervisor(**values: int) -> tuple[Supervisor, StatusQueue]:
     return Supervisor(parameters, lines), lines
 
 
-def look(of: Supervisor, inputs: FailsafeInputs, flight: Flight = HOLDING, for_s: float = 100.0) -> list[Action]:
+def look(of: Supervisor, inputs: FailsafeInputs, flight: FlightState = HOLDING, for_s: float = 100.0) -> list[Action]:
     """Show it the same for a while; return what begins."""
     times = range(inputs.now_us, inputs.now_us + round(for_s * 1e6), 500_000)
     begun = [of.step(inputs._replace(now_us=now_us), flight) for now_us in times]
@@ -40,7 +40,7 @@ def look(of: Supervisor, inputs: FailsafeInputs, flight: Flight = HOLDING, for_s
 @pytest.mark.parametrize(
     ("row", "value", "action"), CHOICES, ids=[f"{row.condition}: {NAMES[action]}" for row, _, action in CHOICES]
 )
-def test_what_is_lost_begins_what_its_parameter_says(row: Row, value: int, action: Action) -> None:
+def test_what_is_lost_begins_what_its_parameter_says(row: FailsafeRow, value: int, action: Action) -> None:
     saves, lines = supervisor(**{row.parameter: value})
     begun = look(saves, LOST[row.condition])
     texts = [text for _, text in lines.take()]
@@ -81,7 +81,7 @@ def test_the_charge_state_is_that_of_the_failsafes(remaining: float, state: int)
 def test_parameters_are_gone_by_once_they_are_adopted() -> None:
     parameters, lines = Parameters(DEFINITIONS), StatusQueue()
     watches = Supervisor(parameters, lines)
-    assert watches.memory == Memory()
+    assert watches.memory == FailsafeMemory()
     parameters.set("BAT_LOW_THR", 0.2)
     inputs = WELL._replace(battery=FULL._replace(remaining=0.19))
     look(watches, inputs)

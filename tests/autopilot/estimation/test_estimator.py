@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.estimation.estimate import Estimate
-from colibri.autopilot.estimation.sensing.rejection import Reason, Source
+from colibri.autopilot.estimation.sensing.rejection import Reason, RejectedSource
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
@@ -139,7 +139,7 @@ def test_a_glitch_is_not_followed() -> None:
     assert during.health.gps_glitch
     assert not during.health.dead_reckoning
     assert max(error_m(flight, of, t) for t in np.arange(9.0, 20.0, 0.5)) < 1.5
-    assert after.rejected == {(Source.GPS, Reason.INNOVATION): 50}
+    assert after.rejected == {(RejectedSource.GPS, Reason.INNOVATION): 50}
     assert after.resets == 0
 
 
@@ -178,7 +178,7 @@ def test_an_impossible_fix_is_counted(change: dict[str, object], reason: Reason)
         return frame._replace(gps=replace(frame.gps, **change))  # type: ignore[arg-type]
 
     after = last(estimates(recorded(source.hover, 4, 5.0).frames, spoilt))
-    assert set(after.rejected) == {(Source.GPS, reason)}
+    assert set(after.rejected) == {(RejectedSource.GPS, reason)}
     assert after.health.gps_lost_since_us is not None
 
 
@@ -190,10 +190,10 @@ def test_a_magnet_nearby_does_not_turn_it() -> None:
     flight = recorded(source.hover, 2, 30.0)
     of = estimates(flight.frames, magnet)
     during, after = at(of, 12.0), last(of)
-    assert Source.MAGNETOMETER in during.health.not_accepted
+    assert RejectedSource.MAGNETOMETER in during.health.not_accepted
     assert during.health.heading
-    assert set(during.rejected) == {(Source.MAGNETOMETER, Reason.FIELD)}
-    assert Source.MAGNETOMETER not in after.health.not_accepted
+    assert set(during.rejected) == {(RejectedSource.MAGNETOMETER, Reason.FIELD)}
+    assert RejectedSource.MAGNETOMETER not in after.health.not_accepted
     assert after.resets == 1
     ahead = earth_from_body(after.frame.attitude, (1.0, 0.0, 0.0))
     assert np.dot(ahead, flight.motion.attitude[-1][:, 0]) > np.cos(np.radians(1.0))
@@ -206,9 +206,9 @@ def test_a_barometer_that_jumps_does_not_lift_it() -> None:
     flight = recorded(source.hover, 2, 25.0)
     of = estimates(flight.frames, jump)
     during, after = at(of, 14.0), last(of)
-    assert Source.BAROMETER in during.health.not_accepted
+    assert RejectedSource.BAROMETER in during.health.not_accepted
     assert during.health.height
-    assert Source.BAROMETER not in after.health.not_accepted
+    assert RejectedSource.BAROMETER not in after.health.not_accepted
     assert after.resets == 1
     assert max(error_m(flight, of, t) for t in np.arange(9.0, 25.0, 0.5)) < 1.0
 
@@ -219,8 +219,8 @@ def test_a_stuck_barometer_is_seen() -> None:
 
     flight = recorded(source.climb, 2, 14.0)
     of = estimates(flight.frames, stuck)
-    assert last(of).rejected[Source.BAROMETER, Reason.FROZEN] > 300
-    assert Source.BAROMETER in last(of).health.not_accepted
+    assert last(of).rejected[RejectedSource.BAROMETER, Reason.FROZEN] > 300
+    assert RejectedSource.BAROMETER in last(of).health.not_accepted
     assert error_m(flight, of, 13.9) < 1.0
 
 
@@ -254,7 +254,7 @@ def test_repeated_and_backward_frames_change_nothing() -> None:
         disturbed += [frame, frame, frames[k // 2]] if k % 7 == 0 else [frame]
     other = last(estimates(disturbed))
     assert other.frame == last(estimates(frames)).frame
-    assert set(other.rejected) == {(Source.CLOCK, Reason.TIME)}
+    assert set(other.rejected) == {(RejectedSource.CLOCK, Reason.TIME)}
 
 
 def test_one_frame_from_far_ahead_is_a_stray() -> None:

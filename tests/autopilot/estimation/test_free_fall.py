@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
-from colibri.autopilot.estimation.sensing.inertial import Reading
+from colibri.autopilot.estimation.sensing.inertial import InertialReading
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Vector
@@ -25,7 +25,7 @@ def watched(first_us: int, force: Vector, sink_m_s: float = 0.0, fixes: bool = T
         fell_s = max(0, time_us - DELAY_US - first_us) * 1e-6
         down = sink_m_s + (G * fell_s if force is NOTHING_FELT else 0.0)
         fix = GpsFix(time_us, 3, DEFAULT_ORIGIN, (2.0, 0.0, -down), 1.0, 1.0, 10)
-        reading = Reading(force, (0.0, 0.0, 0.0), True, True)
+        reading = InertialReading(force, (0.0, 0.0, 0.0), True, True)
         is_due = fixes and time_us % FIX_US == 0
         caught = falling.feed(time_us, reading, (0.22, 0.0, -0.42), 100.0, fix if is_due else None)
         if caught is not None:

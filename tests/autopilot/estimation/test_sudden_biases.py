@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colibri.autopilot.estimation.sensing.rejection import Source
+from colibri.autopilot.estimation.sensing.rejection import RejectedSource
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
@@ -177,5 +177,5 @@ def test_a_gyroscope_drift_is_followed() -> None:
 )
 def test_a_field_beside_the_magnetometer_is_no_gyroscope_bias(path: source.Path, change: Change) -> None:
     of = known(estimates(recorded(path, 5, 25.0).frames, change))
-    assert any(Source.MAGNETOMETER in one.health.not_accepted for one in of)
+    assert any(RejectedSource.MAGNETOMETER in one.health.not_accepted for one in of)
     assert all(one.health.gyro_bias for one in of)

@@ -9,16 +9,16 @@ from colibri.mavlink.hil.faults import COMMAND, GPS, MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.services.command import DENIED, FAILED, PENDING, UNSUPPORTED, Command
+from colibri.mavlink.services.command import DENIED, FAILED, PENDING, UNSUPPORTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED
 from colibri.mavlink.wire.refusal import Refusal
 
 PEER = Peer(0, 255, 190)
 
 
-def asked(*params: float, now_us: int = 0) -> Command:
+def asked(*params: float, now_us: int = 0) -> ReceivedCommand:
     p = (*params, *(0.0,) * (7 - len(params)))
-    return Command(COMMAND, p[0], p[1], p[2], p[3], p[4], p[5], p[6], None, PEER, now_us)
+    return ReceivedCommand(COMMAND, p[0], p[1], p[2], p[3], p[4], p[5], p[6], None, PEER, now_us)
 
 
 @pytest.fixture

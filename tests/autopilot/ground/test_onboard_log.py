@@ -6,21 +6,21 @@ import pytest
 from pyulog import ULog
 
 from colibri.autopilot.ground.onboard_log import OnboardLog
-from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import Reading
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.files.memory import MemoryFiles
+from colibri.mavlink.files.tree import OpenFile
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 from colibri.mavlink.services.statustext import INFO, Line
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog.blocks import EVERY_US
 
 SAMPLE_US = 8_000
 
 
 class Flight:
-    def __init__(self, memory: Memory | None = None) -> None:
-        self.memory = memory or Memory()
+    def __init__(self, memory: MemoryFiles | None = None) -> None:
+        self.memory = memory or MemoryFiles()
         self.memory.make_folder(("logs",))
-        self.parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
+        self.parameters = Parameters([Parameter(name="A", kind=ParamType.REAL, default=1.0, description="")])
         self.log = self.begun()
         self.now_us = 0
 
@@ -30,14 +30,14 @@ class Flight:
     def run(self, samples: int, *said: str, armed: bool = True) -> None:
         for number in range(samples):
             self.now_us += SAMPLE_US
-            snapshot = Snapshot(time_us=self.now_us, armed=armed)
+            snapshot = TelemetrySnapshot(time_us=self.now_us, armed=armed)
             lines = [Line(INFO, text) for text in said] if number == 0 else []
             self.log.update(snapshot, lines, self.now_us, armed=armed)
             self.log.update(snapshot, [], self.now_us + SAMPLE_US // 2, armed=armed)  # a frame between two samples
 
     def content(self, name: str) -> bytes:
         reading = self.memory.open(("logs", name))
-        assert isinstance(reading, Reading)
+        assert isinstance(reading, OpenFile)
         return bytes(reading.read(0, reading.size))  # type: ignore[arg-type]
 
     def read(self, name: str = "00001.ulg") -> ULog:

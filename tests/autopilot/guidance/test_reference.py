@@ -11,7 +11,7 @@ from colibri.autopilot.control.interface import Horizon
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import (
     ALL_BOUND,
-    Kind,
+    BindingDerivative,
     Reference,
     Target,
     lead,
@@ -101,7 +101,7 @@ def test_rest_to_rest_keeps_limits_and_does_not_overshoot(limits: Limits, place:
 @settings(max_examples=8, deadline=None)
 @given(LIMITS, st.tuples(reals(12.0), reals(12.0), reals(3.0)), reals(3.0))
 def test_a_velocity_is_reached_and_a_vehicle_stops_from_any(limits: Limits, velocity: Vector, rate: float) -> None:
-    target = still_target(ORIGIN, 0.0, SAMPLES, (Kind.VELOCITY,) * 3)._replace(turns=False)
+    target = still_target(ORIGIN, 0.0, SAMPLES, (BindingDerivative.VELOCITY,) * 3)._replace(turns=False)
     moving = at(ORIGIN, velocity=velocity)._replace(heading=np.array([0.0, rate]))
     motions, _, end = led(moving, target, limits, 25.0)
     assert np.abs(end.motion[1:]).max() < 1e-6

@@ -18,7 +18,7 @@ from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_n
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
-from colibri.mavlink.parameters.store import Kind, ParamError, Parameters
+from colibri.mavlink.parameters.store import ParamError, Parameters, ParamType
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
@@ -47,7 +47,7 @@ def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle
     parameters = parameters_of(profile, load_vehicle(vehicle))
     assert all(parameter.description and parameter.group for parameter in parameters)
     for name in ("MIS_TAKEOFF_ALT", "RTL_RETURN_ALT", "FLW_TGT_HT", "FLW_TGT_DST", "FLW_TGT_FA", "FLW_TGT_RS"):
-        assert parameters.at(parameters.index(name) or 0).kind == Kind.REAL  # type: ignore[union-attr]
+        assert parameters.at(parameters.index(name) or 0).kind == ParamType.REAL  # type: ignore[union-attr]
     for name in ("FLW_TGT_ALT_M", "SYS_FAILURE_EN", "MAV_SYS_ID", "TRACK"):
         assert isinstance(parameters[name], int)
 

@@ -8,10 +8,10 @@ import pytest
 
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.core.subscription import Flown, Subscribers
+from colibri.autopilot.core.subscription import FlownSettings, Subscribers
 from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, definitions
-from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
+from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.common.config import SettingsError
 from colibri.mavlink.parameters.store import ParamError, Parameters, Value
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -29,7 +29,7 @@ class Flight:
         self.build = builder(profile.controller, clock)
         self.law = self.build(profile, vehicle)
         self.said: list[str] = []
-        self.tuning = Tuning(Numbers(profile, vehicle), self.build, self.law, self.said.append)
+        self.tuning = Retuning(Numbers(profile, vehicle), self.build, self.law, self.said.append)
         self.parameters = Parameters(definitions(profile, vehicle), self.tuning.prepare)
         self.memory = self.law.initial(vehicle.hover_speed)
         self.samples = 0
@@ -191,7 +191,7 @@ def faulty() -> tuple[Parameters, list[str]]:
     )
     words: list[str] = []
     numbers = Numbers(profile, vehicle)
-    tuning = Tuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
+    tuning = Retuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
     return Parameters(definitions(profile, vehicle), tuning.prepare), words
 
 
@@ -218,7 +218,7 @@ def test_what_a_part_cannot_be_built_by_is_refused_in_words(name: str, value: fl
     profile, vehicle = load_profile("flight"), load_vehicle("hummingbird")
     build, words = builder(profile.controller, clock), list[str]()
     parameters = Parameters(definitions(profile, vehicle))
-    tuning = Tuning(Numbers(profile, vehicle), build, build(profile, vehicle), words.append, parameters, Rigid())
+    tuning = Retuning(Numbers(profile, vehicle), build, build(profile, vehicle), words.append, parameters, Rigid())
     parameters.ask(tuning.prepare)
     assert parameters.set(name, value) == ParamError.VALUE_OUT_OF_RANGE
     assert parameters[name] == parameters.default(name)
@@ -236,7 +236,7 @@ def test_a_change_that_a_subscriber_cannot_adopt_is_taken_back(flight: Flight) -
         adopted.append(vehicle.body.mass_kg)
 
     tuned = Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law)
-    flown = Flown(flight.parameters.values, tuned)
+    flown = FlownSettings(flight.parameters.values, tuned)
     subscribers = Subscribers(parameters=(), behaviour=(), law=(), vehicle=(adopt,), flown=flown)
     assert flight.parameters.set("VEH_MASS", 0.75) is None
     with pytest.raises(ValueError, match="no"):

@@ -8,9 +8,9 @@ import pytest
 from colibri.autopilot.__main__ import command_line
 from colibri.autopilot.core.defence.errors import ErrorRecord
 from colibri.autopilot.core.defence.table import LAW
-from colibri.autopilot.process.client import Client
+from colibri.autopilot.process.client import PlantClient
 from colibri.autopilot.process.error_log import FILE, ErrorLog
-from colibri.autopilot.process.ground import Ground
+from colibri.autopilot.process.ground import GroundService
 from colibri.autopilot.process.run import run
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop
@@ -55,14 +55,14 @@ def test_what_cannot_be_kept_is_on_standard_error(folder: Path | None, capsys: p
 
 
 def test_the_process_ends_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fly(client: Client, autopilot: object) -> None:
+    def fly(client: PlantClient, autopilot: object) -> None:
         del autopilot
         ground = client._ground  # noqa: SLF001
-        assert isinstance(ground, Ground)
+        assert isinstance(ground, GroundService)
         ground.copter.defence.caught(LAW, ValueError("no"))
         ground.serve(0.0)
 
-    monkeypatch.setattr(Client, "fly", fly)
+    monkeypatch.setattr(PlantClient, "fly", fly)
     spec = from_namespace(
         AutopilotSpec, command_line().parse_args(["--gcs", "udpin:127.0.0.1:0", "--state", str(tmp_path)])
     )

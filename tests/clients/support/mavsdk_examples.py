@@ -21,7 +21,7 @@ from colibri.common.process.lifecycle import fail
 from tests.clients.support.client import Client
 from tests.clients.support.example_flights import Evidence
 from tests.clients.support.example_table import EXAMPLES, Example
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import SitlProcess, vehicle
 
 SDK_LINK = "udpout:127.0.0.1:14540"
 
@@ -101,7 +101,7 @@ def _run(example: Example, folder: Path, python: Path) -> Result:
     return Result(example, "", monotonic() - began_s)
 
 
-def _judge(example: Example, folder: Path, python: Path, room: Path, flown: Vehicle) -> None:
+def _judge(example: Example, folder: Path, python: Path, room: Path, flown: SitlProcess) -> None:
     """Run an example in `room`, and demand that it and the vehicle do what they should.
 
     Raises:

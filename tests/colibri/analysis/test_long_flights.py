@@ -19,7 +19,7 @@ from colibri.analysis.series import figure_series
 from colibri.analysis.series.figure_series import FigureSeries
 from colibri.analysis.series.flight_series import read_flight
 from colibri.flights.in_process import fly_locally
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, FrameCount
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.ulog import reader
 from colibri.mavlink.ulog.beginning import beginning
@@ -27,7 +27,7 @@ from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, TRUTH
 from colibri.mavlink.ulog.log import MemoryLog
 
 A_BLOCK, SOME_ROWS, ALL_ROWS = 1, 200, 1 << 30
-SUMMARY = Summary(1.0, 1, 0)
+SUMMARY = FrameCount(1.0, 1, 0)
 MAX_BYTES_A_SAMPLE = 100
 """A row of the table alone has 216, and its text 500."""
 

@@ -113,7 +113,7 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
     told: list[str] = []
     monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
     profile = load_profile(run.PROFILE)
-    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, speed.Peer("rotorpy", lambda *_: 1.0))
+    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, speed.PeerSimulator("rotorpy", lambda *_: 1.0))
     assert len(told) == run.parts(["flights"], 2, beside=True)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import colibri
 from colibri.campaigns.engines.engine import Killed
-from colibri.campaigns.flights import Flown
+from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.run import fly_campaign
 from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, SHORT, Here, Hovers, begin, planned, rows, tables_in
 
@@ -56,7 +56,7 @@ def test_it_is_killed_at_any_instant_and_goes_on(tmp_path: Path, expected: tuple
 def test_from_python_with_a_law_and_a_metric_of_one_s_own(tmp_path: Path) -> None:
     part = "profile.controllers.Hovers.part"
     profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 1.0})
-    flown: list[Flown] = []
+    flown: list[FlightResult] = []
     results = colibri.campaign(
         fly=SHORT | {"track": "hover", "profile": profile, "controller": Hovers},
         grid={part: [0.9, 1.0]},

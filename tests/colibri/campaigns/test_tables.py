@@ -12,7 +12,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from colibri.campaigns.flight_table import wilson
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import fly_campaign
 from colibri.campaigns.values import CampaignError
@@ -28,7 +28,7 @@ def made(verdicts: dict[int, Verdict] | None = None, **tables: Any) -> CampaignR
     for point in campaign.points():
         verdict = (verdicts or {}).get(point.flight, Verdict.FLOWN)
         error = 10.0 * float(point.factors.get(LATENCY, 1.0)) + 1e-3 * point.seed
-        rows[point.flight] = Flown(point.flight, verdict, "", (error, None), f"hash{point.flight}")
+        rows[point.flight] = FlightResult(point.flight, verdict, "", (error, None), f"hash{point.flight}")
     return CampaignResults(campaign, rows)
 
 

@@ -8,16 +8,16 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification.attitude import AttitudeNumbers, Kinematics, box_of
-from colibri.certification.certificate import Entry
+from colibri.certification.certificate import ProofEntry
 from colibri.certification.exact import exactly
-from colibri.certification.flights import Conditions, Interval, integrate
+from colibri.certification.flights import CertifiedConditions, Interval, integrate
 from colibri.certification.loop import RangeError, UncertainLoop
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import PlannedAttitude, of_error
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 
-PROFILE, VEHICLE, CONDITIONS = load_profile("flight"), load_vehicle("hummingbird"), Conditions(0.01, 0.5)
+PROFILE, VEHICLE, CONDITIONS = load_profile("flight"), load_vehicle("hummingbird"), CertifiedConditions(0.01, 0.5)
 LAW = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
 INERTIA = [0.003, 0.004, 0.006]
 UNEQUAL = LAW.numbers_at(0.5)._replace(inertia_kg_m2=INERTIA)
@@ -65,7 +65,7 @@ def somewhere(numbers: AttitudeNumbers, rng: np.random.Generator, flights: int) 
     disturbance = rng.normal(size=(flights, 3))
     disturbance *= numbers.disturbance_n_m / np.linalg.norm(disturbance, axis=1)[:, None]
     commands = z @ np.array(numbers.commanded[0]).T
-    flyer = LAW.flyer(Entry(0.5, numbers, NOTHING, {}), held, rng)
+    flyer = LAW.flyer(ProofEntry(0.5, numbers, NOTHING, {}), held, rng)
     inertia = np.array(numbers.inertia_kg_m2)
     return z, Interval(commands, disturbance, inertia, numbers.lag_s, flyer.turn, flyer.momentum())
 

@@ -10,8 +10,8 @@ import pytest
 from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.certificate import Certificate, Entry
-from colibri.certification.flights import AttitudeLaw, Conditions, Interval, Plan, fly, integrate
+from colibri.certification.certificate import Certificate, ProofEntry
+from colibri.certification.flights import AttitudeLaw, BorderFlights, CertifiedConditions, Interval, fly, integrate
 from colibri.certification.lyapunov import Proof
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.certification.report import CERTIFICATE, FIGURE
@@ -21,7 +21,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from tests.support.commands import Refused
 
 HERE = Path(__file__).parent
-CONDITIONS, VEHICLE = Conditions(0.01, 0.5), load_vehicle("hummingbird")
+CONDITIONS, VEHICLE = CertifiedConditions(0.01, 0.5), load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
 FLIGHT = PlannedAttitude(PROFILE.table("lpv-mpc"), VEHICLE, CONDITIONS)
 CERTIFIED = certificates.read(HERE / "lpv-mpc.json", AttitudeNumbers)
@@ -77,7 +77,7 @@ def test_every_part_of_it_is_confirmed(part: str) -> None:
 
 @pytest.mark.parametrize("flights", [100, pytest.param(1000, marks=pytest.mark.long)])
 def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
-    flown = fly(FLIGHT, CERTIFIED.invariant, Plan(flights, 1.0, seed=1))
+    flown = fly(FLIGHT, CERTIFIED.invariant, BorderFlights(flights, 1.0, seed=1))
     assert flown.values.shape[1] == flights
     assert flown.values[0] == pytest.approx(np.ones(flights))
     assert flown.values.max() <= 1.0
@@ -85,7 +85,7 @@ def test_of_flights_from_its_border_none_leaves_it(flights: int) -> None:
 
 def test_flights_tend_to_what_is_certified_at_least_as_fast() -> None:
     states, proof = (
-        fly(FLIGHT, CERTIFIED.invariant, Plan(50, 0.5, seed=2)).states,
+        fly(FLIGHT, CERTIFIED.invariant, BorderFlights(50, 0.5, seed=2)).states,
         CERTIFIED.attractor.proof,
     )
     values = np.einsum("tfi,ij,tfj->tf", states, proof.P, states)
@@ -107,7 +107,7 @@ def directions(rng: np.random.Generator, count: int) -> Array:
     return units
 
 
-def beyond(z: Array, rng: np.random.Generator, entry: Entry) -> Array:
+def beyond(z: Array, rng: np.random.Generator, entry: ProofEntry) -> Array:
     phi, theta = rng.uniform(-1.0, 1.0, 2) * FLIGHT.held(entry)
     (commanded, _), _ = FLIGHT.decide(z, (phi, theta, 0.0), rng.uniform(*FLIGHT.thrusts_n(entry.scale)), None)
     more: Array = commanded - FLIGHT.commanded[0] @ z
@@ -155,7 +155,7 @@ def test_what_is_refused_is_unstable_indeed(sluggish: str) -> None:
 def left_after(law: AttitudeLaw, error: float) -> float:
     """Return the largest error of the attitude after 6 s that began so large about all axes."""
     numbers = law.numbers_at(0.1)
-    entry = Entry(0.1, numbers, CERTIFIED.invariant.proof, {})
+    entry = ProofEntry(0.1, numbers, CERTIFIED.invariant.proof, {})
     flyer = law.flyer(entry, np.zeros((1, 2)), np.random.default_rng(0))
     z, nothing, inertia = np.zeros((1, 12)), np.zeros((1, 3)), np.array(numbers.inertia_kg_m2)
     z[0, [0, 2, 4]] = error

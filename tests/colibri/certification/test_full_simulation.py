@@ -17,7 +17,7 @@ from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.flights import Conditions, Plan, fly
+from colibri.certification.flights import BorderFlights, CertifiedConditions, fly
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion
@@ -27,7 +27,7 @@ from colibri.plant.physics.integrators import fixed_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 
-VEHICLE, CONDITIONS = load_vehicle("hummingbird"), Conditions(0.01, 0.5)
+VEHICLE, CONDITIONS = load_vehicle("hummingbird"), CertifiedConditions(0.01, 0.5)
 HOVER_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
 ALLOCATION = VEHICLE.allocation() * VEHICLE.rotors.max_speed**2
 RESONANCE_RAD_S = 28.0
@@ -53,23 +53,23 @@ def errors_of(attitude: Quaternion) -> Array:
     return errors
 
 
-def memory_of(tracked: Tracked, remembered: Array) -> lpv_mpc.Memory:
+def memory_of(tracked: Tracked, remembered: Array) -> lpv_mpc.LawMemory:
     commands, level = (np.linalg.solve(ALLOCATION, [HOVER_N, *moments]) for moments in (remembered, np.zeros(3)))
     states = np.tile(np.concatenate([np.zeros(12), level]), (29, 1))
-    return lpv_mpc.Memory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
+    return lpv_mpc.LawMemory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
 
 
-def remembered(memory: lpv_mpc.Memory) -> Array:
+def remembered(memory: lpv_mpc.LawMemory) -> Array:
     assert memory.plan
     moments: Array = ALLOCATION[1:] @ memory.plan.commands[memory.age]
     return moments
 
 
-def invariant() -> certificates.Entry:
+def invariant() -> certificates.ProofEntry:
     return certificates.read(Path(__file__).parent / f"{NAME}.json", AttitudeNumbers).invariant
 
 
-def disturbances(entry: certificates.Entry, kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
+def disturbances(entry: certificates.ProofEntry, kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
     """Return the moment, N m, of a sample and its errors: constant, random, at the loop's resonance, or raising V most.
 
     All but the swinging one are as long as is allowed.
@@ -90,7 +90,7 @@ def disturbances(entry: certificates.Entry, kind: int, rng: np.random.Generator)
 
 
 def values(
-    entry: certificates.Entry,
+    entry: certificates.ProofEntry,
     controller: AttitudeController[Any],
     start: Array,
     disturbance: Callable[[int, Array], Array],
@@ -128,7 +128,7 @@ def values(
 def test_flights_of_the_law_as_it_flies_stay_in_the_set(flights: int) -> None:
     rng, entry = np.random.default_rng(4), invariant()
     law = lpv_mpc.LpvMpc(table(NAME), VEHICLE, lambda: 0.0)
-    for i, start in enumerate(fly(CERTIFIED, entry, Plan(flights, 0.0, seed=4)).states[0]):
+    for i, start in enumerate(fly(CERTIFIED, entry, BorderFlights(flights, 0.0, seed=4)).states[0]):
         began, *later = values(entry, law, start, disturbances(entry, i % 4, rng))
         assert began == pytest.approx(1.0)
         assert max(later) <= 1.0

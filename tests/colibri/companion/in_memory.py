@@ -10,8 +10,8 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.supervision.ending import Ended
-from colibri.companion.supervision.phases import Phase
+from colibri.companion.supervision.ending import CompanionEnd
+from colibri.companion.supervision.phases import CompanionPhase
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.vehicle import Sitl
@@ -72,7 +72,7 @@ class Ride(Generic[Flown]):
         self._up, self._down = Pipe(self.trouble, f"{seed} up"), Pipe(self.trouble, f"{seed} down")
         self._port: StandIn | Port = sitl if isinstance(sitl, StandIn) else Port(sitl)
         self.sent: list[tuple[int, bytes]] = []
-        self.history: list[tuple[float, Phase]] = []
+        self.history: list[tuple[float, CompanionPhase]] = []
         self.polls_every_us = 0
         self._polled_us = -1
 
@@ -102,7 +102,7 @@ class Ride(Generic[Flown]):
             assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
             self.step()
 
-    def to_the_end(self, within_s: float) -> Ended:
+    def to_the_end(self, within_s: float) -> CompanionEnd:
         self.until(lambda: self.companion.ended is not None, within_s)
         assert self.companion.ended
         return self.companion.ended

@@ -13,7 +13,7 @@ import numpy as np
 
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Array
-from colibri.mavlink.parameters.store import Kind
+from colibri.mavlink.parameters.store import ParamType
 from colibri.mavlink.wire.dialect import Bits, Codec, Message, definition_of, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
@@ -297,7 +297,7 @@ class Px4(StandIn):
         value = self.params.get(name)
         if value is None:
             return
-        wire, kind = (Bits(value), Kind.INT) if isinstance(value, int) else (value, Kind.REAL)
+        wire, kind = (Bits(value), ParamType.INT) if isinstance(value, int) else (value, ParamType.REAL)
         self._outbox.append(self._codec.encode("PARAM_VALUE", name, wire, kind, 1, 0))
 
     def _signal(self, thrust: float) -> float:

@@ -12,7 +12,7 @@ from colibri.companion.identified import identified
 from colibri.companion.settings import CompanionSettings, SetpointKind
 from colibri.companion.stacks.colibri import COLIBRI
 from colibri.companion.supervision.limits import FlightLimits
-from colibri.companion.supervision.phases import Phase
+from colibri.companion.supervision.phases import CompanionPhase
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
@@ -50,7 +50,7 @@ def in_air(flights: Flights, settings: CompanionSettings | None = None, **more: 
 
 def flying(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
     ride = in_air(flights, settings, **more)
-    ride.until(lambda: ride.companion.phase is Phase.FLYING, 10.0)
+    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 10.0)
     return ride
 
 
@@ -58,7 +58,7 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
     sitl = flights.begin(feedback="sensors", turbulence="light", seed=1)
     ride = Ride(sitl, "spiral", CompanionSettings(may_arm=True, duration_s=5.0))
     assert ride.to_the_end(60.0).in_order
-    assert [phase for _, phase in ride.history] == list(Phase)
+    assert [phase for _, phase in ride.history] == list(CompanionPhase)
     assert ride.companion.errors.rmse_m() < 0.05
     assert ride.companion.errors.flown_s == pytest.approx(5.0, abs=0.1)
     assert sitl.mode is Mode.HOLD
@@ -117,14 +117,14 @@ def test_it_waits_for_a_mode_that_stays_by_itself(flights: Flights) -> None:
         ride.sitl.select(Mode.POSITION)
         for _ in range(1000):
             ride.step()
-        assert ride.companion.phase is Phase.CHECKING
+        assert ride.companion.phase is CompanionPhase.CHECKING
         assert not names_of(ride) & set(SETPOINTS)
 
 
 def test_a_vehicle_that_refuses_to_arm_ends_it(flights: Flights) -> None:
     ride = Ride(flights.begin(), HOVER)
     codec = Codec(1, 1)
-    ride.until(lambda: ride.companion.phase is Phase.ARMING, 10.0)
+    ride.until(lambda: ride.companion.phase is CompanionPhase.ARMING, 10.0)
     take_off = mav.MAV_CMD_NAV_TAKEOFF
     ride.companion.receive(codec.encode("COMMAND_ACK", take_off, mav.MAV_RESULT_DENIED), ride.now_us)
     ended = ride.to_the_end(5.0)
@@ -210,7 +210,7 @@ def test_each_limit_ends_it_and_leaves_the_vehicle_in_hold(
         ride.step()
     goes_on = provoke(ride)
     provoked_us = ride.now_us
-    while ride.companion.phase is Phase.FLYING:
+    while ride.companion.phase is CompanionPhase.FLYING:
         assert ride.now_us - provoked_us < 3_000_000, name
         if goes_on is not None:
             goes_on()

@@ -13,7 +13,7 @@ from colibri.autopilot.guidance.trajectories.loading import track_through
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.companion.errors import CompanionError
-from colibri.companion.home import Home, HomeSeeker
+from colibri.companion.home import HomeSeeker, LocalOrigin
 from colibri.companion.plan_file import read_plan
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.vehicle_peer import VehiclePeer
@@ -25,7 +25,7 @@ from tests.colibri.companion.in_memory import AHEAD_US, Port, Ride
 TAKE_OFF, LAND, RETURN, WAYPOINT, CHANGE_SPEED = 22, 21, 20, 16, 178
 PLACES = ((0.0, 2.0, 3.0), (4.0, 2.0, 4.0), (4.0, -2.0, 3.0))
 ORIGIN = DEFAULT_ORIGIN
-HERE = Home(ORIGIN, 0.0)
+HERE = LocalOrigin(ORIGIN, 0.0)
 
 
 def item(command: int, enu_m: tuple[float, float, float] = (0.0, 0.0, 2.5), **more: Any) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def test_waypoints_are_placed_by_the_home_that_the_vehicle_has(tmp_path: Path) -
     assert "item 5 (return) is left to the pilot" in mission.note
     assert mission.waypoints(HERE).points_enu_m == pytest.approx(np.array(PLACES), abs=1e-3)
     south = Geodetic(*geodetic_of((0.0, -10.0, 0.0), ORIGIN))
-    moved = mission.waypoints(Home(south, -1.5)).points_enu_m
+    moved = mission.waypoints(LocalOrigin(south, -1.5)).points_enu_m
     assert moved == pytest.approx(np.array(PLACES) + np.array([0.0, 10.0, -1.5]), abs=1e-3)
 
 

@@ -10,12 +10,12 @@ from colibri.companion.stacks.ardupilot import ARDUPILOT
 from colibri.companion.stacks.px4 import PX4
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
-from colibri.companion.supervision.limits import LIMITS, Box, FlightFacts, FlightLimits, exceeded
-from colibri.companion.supervision.pace import Pace
-from colibri.companion.supervision.phases import TABLE, Condition, Phase, next_phase
+from colibri.companion.supervision.limits import LIMITS, FlightFacts, FlightLimits, FlightRegion, exceeded
+from colibri.companion.supervision.pace import SetpointRate
+from colibri.companion.supervision.phases import TABLE, CompanionPhase, PhaseCondition, next_phase
 from colibri.mavlink.client.report import VehicleReport
 
-BOX = Box((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
+BOX = FlightRegion((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
 QUIET = VehicleReport()
 GOOD = CheckFacts(
     stack=PX4,
@@ -107,7 +107,7 @@ def test_each_limit_is_exceeded_alone_and_says_by_how_much() -> None:
 
 
 def test_the_pace_counts_setpoints_of_the_last_second() -> None:
-    pace = Pace()
+    pace = SetpointRate()
     pace.begin(5_000_000)
     assert pace.kept(5_900_000, 8_000) == 1.0
     for n in range(1, 126):
@@ -121,17 +121,27 @@ def test_the_pace_counts_setpoints_of_the_last_second() -> None:
 
 
 def test_from_every_phase_in_the_air_a_pilot_and_a_stop_lead_out() -> None:
-    for phase in (Phase.ARMING, Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING, Phase.HANDING_OVER):
-        everything = frozenset(Condition)
-        assert next_phase(phase, everything) == (Phase.ENDED, Condition.PILOT)
-        if phase is not Phase.HANDING_OVER:
-            stopped = frozenset({Condition.STOPPED, Condition.ARMED, Condition.OFFBOARD, Condition.UP})
-            assert next_phase(phase, stopped)[0] is Phase.HANDING_OVER
-    for phase in Phase:
+    for phase in (
+        CompanionPhase.ARMING,
+        CompanionPhase.TAKING_OFF,
+        CompanionPhase.TAKING_OVER,
+        CompanionPhase.FLYING,
+        CompanionPhase.HANDING_OVER,
+    ):
+        everything = frozenset(PhaseCondition)
+        assert next_phase(phase, everything) == (CompanionPhase.ENDED, PhaseCondition.PILOT)
+        if phase is not CompanionPhase.HANDING_OVER:
+            stopped = frozenset(
+                {PhaseCondition.STOPPED, PhaseCondition.ARMED, PhaseCondition.OFFBOARD, PhaseCondition.UP}
+            )
+            assert next_phase(phase, stopped)[0] is CompanionPhase.HANDING_OVER
+    for phase in CompanionPhase:
         assert next_phase(phase, frozenset()) == (phase, None)
-    assert not any(Phase.ENDED in row.sources for row in TABLE)
+    assert not any(CompanionPhase.ENDED in row.sources for row in TABLE)
 
 
 def test_nothing_leads_to_arming_but_a_check_that_allows_it() -> None:
-    rows = [row for row in TABLE if row.target is Phase.ARMING]
-    assert [(row.sources, row.condition) for row in rows] == [((Phase.CHECKING,), Condition.CHECKED_TO_ARM)]
+    rows = [row for row in TABLE if row.target is CompanionPhase.ARMING]
+    assert [(row.sources, row.condition) for row in rows] == [
+        ((CompanionPhase.CHECKING,), PhaseCondition.CHECKED_TO_ARM)
+    ]

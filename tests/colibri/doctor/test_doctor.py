@@ -10,13 +10,13 @@ import pytest
 from colibri.cli.main import main
 from colibri.common.machine_code.on_disk import MachineCode
 from colibri.doctor import examine, flying, network, packages
-from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.finding import Finding, Severity
 from colibri.doctor.ground_station import called, ground_station
 from colibri.flights.fleet_spec import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav
 
-FINE, FAILED = Finding("one", Verdict.FINE, "there"), Finding("other", Verdict.FAILED, "not there", "put it there")
+FINE, FAILED = Finding("one", Severity.FINE, "there"), Finding("other", Severity.FAILED, "not there", "put it there")
 ROUTES = (
     "Iface\tDestination\tGateway\tFlags\n"
     "eth0\t000013AC\t00000000\t0001\n"
@@ -34,7 +34,7 @@ def taken() -> Iterator[int]:
 def test_this_computer_flies() -> None:
     """What the tests themselves need is there; whether a port is free depends on who else flies here."""
     found = list(examine.examine([packages.packages, network.loopback, flying.machine_code, flying.flight]))
-    assert [finding.verdict for finding in found] == [Verdict.FINE] * 4
+    assert [finding.verdict for finding in found] == [Severity.FINE] * 4
     assert "times real time" in found[-1].found
 
 
@@ -58,21 +58,21 @@ def test_packages_that_are_missing_too_old_or_others_are_named(monkeypatch: pyte
     has, others = packages.version_of, {"daqp": None, "numpy": "1.20.0", "rich": "0.0.1", "optuna": None}
     monkeypatch.setattr(packages, "version_of", lambda name: others[name] if name in others else has(name))
     needed, locked = packages.packages(), packages.lock()
-    assert (needed.verdict, needed.found[:45]) == (Verdict.FAILED, "daqp is missing, numpy is 1.20.0, not >=2.0, ")
+    assert (needed.verdict, needed.found[:45]) == (Severity.FAILED, "daqp is missing, numpy is 1.20.0, not >=2.0, ")
     assert locked is not None
-    assert locked.verdict is Verdict.NOTE
+    assert locked.verdict is Severity.NOTE
     assert "rich is 0.0.1, not ==" in locked.found
     (tune,) = [finding for finding in packages.extras() if finding.checked == "extra tune"]
-    assert (tune.verdict, tune.advice) == (Verdict.NOTE, "if you need it: pip install 'colibri-sitl[tune]'")
+    assert (tune.verdict, tune.advice) == (Severity.NOTE, "if you need it: pip install 'colibri-sitl[tune]'")
 
 
 def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, taken: int) -> None:
     monkeypatch.setattr(network, "PLANT_PORT", taken)
     monkeypatch.setattr(network, "GROUND_PORT", taken)
     ground, _, plant = network.ports()
-    assert ground.verdict is Verdict.FINE
+    assert ground.verdict is Severity.FINE
     assert f"(process {os.getpid()}) waits there" in ground.found
-    assert plant.verdict is Verdict.FAILED
+    assert plant.verdict is Severity.FAILED
     assert plant.found.startswith("taken by ")
     assert PLANT_PORT == 14560
 
@@ -94,7 +94,7 @@ def test_the_way_out_of_a_container_is_the_default_gateway(tmp_path: Path, monke
 def test_a_folder_for_machine_code_that_is_none_is_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(MachineCode, "cache_path", None, raising=False)
     found = flying.machine_code()
-    assert (found.verdict, found.advice) == (Verdict.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
+    assert (found.verdict, found.advice) == (Severity.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
 
 
 @pytest.mark.parametrize(("kind", "is_one"), [(mav.MAV_TYPE_GCS, True), (mav.MAV_TYPE_QUADROTOR, False)])
@@ -114,5 +114,5 @@ def test_a_ground_station_that_is_not_there_is_said(taken: int) -> None:
     link = open_ground_link(f"udpout:127.0.0.1:{taken}")
     found = ground_station(link, 0.05)
     link.close()
-    assert found.verdict is Verdict.FAILED
+    assert found.verdict is Severity.FAILED
     assert found.found == f"no heartbeat over udpout:127.0.0.1:{taken} within 0.05 s"

@@ -12,7 +12,7 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.flights.flight import Direct, Flight, InMemory, Sample
+from colibri.flights.flight import Direct, FrameSample, InMemory, SteppedFlight
 from colibri.mavlink.hil.faults import GPS, OFF, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.wire.dialect import Codec, mav
@@ -33,21 +33,21 @@ def plant(feedback: Feedback, interval_us: int) -> Plant:
     return PlantBuilder(gusts, VEHICLE, DEFAULT_STARTS).build(feedback, interval_us)
 
 
-def on_track(feedback: Feedback) -> Flight[Any]:
+def on_track(feedback: Feedback) -> SteppedFlight[Any]:
     estimator = estimator_for(feedback, VEHICLE, DEFAULT_ORIGIN)
     autopilot = track_autopilot(PROFILE, VEHICLE, track("spiral"), lambda: 0.0, estimator=estimator)
     wire = InMemory(autopilot.frame_interval_us, feedback)
-    return Flight(plant(feedback, autopilot.frame_interval_us), autopilot, wire)
+    return SteppedFlight(plant(feedback, autopilot.frame_interval_us), autopilot, wire)
 
 
-def with_stations(feedback: Feedback) -> Flight[Copter]:
+def with_stations(feedback: Feedback) -> SteppedFlight[Copter]:
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=feedback)
     autopilot = copter_autopilot(PROFILE, VEHICLE, settings, lambda: 0.0, first=track("spiral"))
     autopilot.stages.stations.hub.open(0, STATION)
-    return Flight(plant(feedback, autopilot.frame_interval_us), autopilot, Direct())
+    return SteppedFlight(plant(feedback, autopilot.frame_interval_us), autopilot, Direct())
 
 
-def flown(flight: Flight[Any]) -> list[Sample]:
+def flown(flight: SteppedFlight[Any]) -> list[FrameSample]:
     """Fly on, with a ground station that asks for a parameter, and later changes one."""
     codec, samples = Codec(255, 190), []
     for frame in range(FRAMES):
@@ -65,7 +65,7 @@ def flown(flight: Flight[Any]) -> list[Sample]:
 @pytest.mark.parametrize("feedback", Feedback)
 @pytest.mark.parametrize("begun", [on_track, with_stations])
 def test_a_restored_flight_goes_on_with_the_same_bits(feedback: Feedback, begun: Any) -> None:
-    flight: Flight[Any] = begun(feedback)
+    flight: SteppedFlight[Any] = begun(feedback)
     for _ in range(FRAMES):
         flight.step()
     snapshot, time_us = flight.snapshot(), flight.time_us

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from colibri.flights.snapshots import Snapshot, SnapshotError
+from colibri.flights.snapshots import ObjectSnapshot, SnapshotError
 
 
 class Slotted:
@@ -72,7 +72,7 @@ class Everything:
 def test_all_that_changes_comes_back_as_often_as_needed() -> None:
     it, fresh = Everything(), Everything()
     expected = fresh.seen()
-    snapshot = Snapshot([it])
+    snapshot = ObjectSnapshot([it])
     for _ in range(3):
         assert it.seen() == expected
         it.change()
@@ -82,7 +82,7 @@ def test_all_that_changes_comes_back_as_often_as_needed() -> None:
 
 def test_an_object_stays_the_same_object() -> None:
     it = Everything()
-    inside, snapshot = it.list, Snapshot([it])
+    inside, snapshot = it.list, ObjectSnapshot([it])
     it.list = []
     snapshot.restore()
     assert it.list is inside
@@ -90,7 +90,7 @@ def test_an_object_stays_the_same_object() -> None:
 
 def test_what_is_shared_is_left_alone() -> None:
     shared = [1]
-    snapshot = Snapshot([[shared]], [shared])
+    snapshot = ObjectSnapshot([[shared]], [shared])
     shared.append(2)
     snapshot.restore()
     assert shared == [1, 2]
@@ -101,4 +101,4 @@ def test_a_running_generator_is_refused() -> None:
         yield 1
 
     with pytest.raises(SnapshotError, match=r"the state of a .*generator cannot be kept"):
-        Snapshot([numbers()])
+        ObjectSnapshot([numbers()])

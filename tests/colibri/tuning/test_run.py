@@ -8,7 +8,7 @@ import pytest
 
 import colibri
 from colibri.campaigns.flights import Verdict
-from colibri.tuning.flying import Flights
+from colibri.tuning.flying import TrialFlights
 from colibri.tuning.results import TuningResults
 from colibri.tuning.run import fly_tuning
 from tests.support.campaigns import Here, tables_in
@@ -108,7 +108,7 @@ def test_a_trial_that_is_clearly_worse_ends_early(tmp_path: Path) -> None:
     assert min(trial.values[0] for trial in pruned) >= results.best.values[0]
     for trial in pruned:  # what was expected of it is what it would have come to
         tuning = planned(seeds="1-8", tune=space)
-        with Flights(Here(), tuning.common) as flights:
+        with TrialFlights(Here(), tuning.common) as flights:
             points = [point._replace(factors=point.factors | trial.params) for point in tuning.campaign.points()]
             values = tuning.objectives[0].of_flights(flights.fly(points), tuning.campaign.metrics, 1e9)
         assert trial.values[0] == pytest.approx(values.mean(), rel=0.05)

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from colibri.tuning.trials import JOURNAL, Begun, Ended, Trials
+from colibri.tuning.trials import JOURNAL, Begun, FinishedTrial, Trials
 from tests.support.tuning import POSITION, RATE, planned
 
 
 def end(trials: Trials, begun: Begun) -> None:
     """End a trial with a value that follows from what it tried."""
     value = abs(begun.params[POSITION] - 300.0) + begun.params[RATE]
-    trials.tell(begun, Ended(begun.number, (value,), begun.params, 4, 0, False, {}))
+    trials.tell(begun, FinishedTrial(begun.number, (value,), begun.params, 4, 0, False, {}))
 
 
-def all_of(folder: Path, trials: int = 14) -> list[Ended]:
+def all_of(folder: Path, trials: int = 14) -> list[FinishedTrial]:
     with Trials(folder, planned(trials=trials)) as shared:
         while (begun := shared.ask()) is not None:
             end(shared, begun)
@@ -22,22 +22,22 @@ def all_of(folder: Path, trials: int = 14) -> list[Ended]:
 
 
 @pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> list[Ended]:
+def expected(tmp_path_factory: pytest.TempPathFactory) -> list[FinishedTrial]:
     return all_of(tmp_path_factory.mktemp("expected"))
 
 
-def plain(trials: list[Ended]) -> list[tuple[object, ...]]:
+def plain(trials: list[FinishedTrial]) -> list[tuple[object, ...]]:
     return [(trial.number, trial.values, trial.params) for trial in trials]
 
 
-def test_the_first_trial_is_the_profile_as_it_is(expected: list[Ended]) -> None:
+def test_the_first_trial_is_the_profile_as_it_is(expected: list[FinishedTrial]) -> None:
     assert expected[0].params == {POSITION: 100.0, RATE: 0.015}
     for trial in expected:
         assert all(value == float(f"{value:.4g}") for value in trial.params.values())
     assert len({trial.params[POSITION] for trial in expected}) == 14
 
 
-def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[Ended]) -> None:
+def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[FinishedTrial]) -> None:
     with Trials(tmp_path, planned(root_seed=1)) as shared:
         for trial in expected[:2]:
             begun = shared.ask()
@@ -48,7 +48,7 @@ def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[Ended]) ->
 
 
 @pytest.mark.parametrize("cut", range(1, 30, 4))
-def test_another_process_continues_the_tuning(cut: int, tmp_path: Path, expected: list[Ended]) -> None:
+def test_another_process_continues_the_tuning(cut: int, tmp_path: Path, expected: list[FinishedTrial]) -> None:
     with Trials(tmp_path, planned(trials=14)) as shared:
         for _ in range(11):
             begun = shared.ask()
@@ -62,7 +62,7 @@ def test_another_process_continues_the_tuning(cut: int, tmp_path: Path, expected
     assert plain(all_of(tmp_path)) == plain(expected)
 
 
-def test_more_trials_go_on_where_it_ended(tmp_path: Path, expected: list[Ended]) -> None:
+def test_more_trials_go_on_where_it_ended(tmp_path: Path, expected: list[FinishedTrial]) -> None:
     assert plain(all_of(tmp_path, 9)) == plain(expected[:9])
     assert plain(all_of(tmp_path)) == plain(expected)
 

@@ -7,7 +7,7 @@ import pytest
 
 import colibri
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.tuning.verdict import Compared, better, check_campaign, compare
 from tests.support.tuning import WEIGHTS, planned
 
@@ -26,7 +26,7 @@ def compared(after: Any, lost_after: int = 0, before: Any = 1.0, **tables: Any) 
     values = np.concatenate([errors.ravel(), (errors * after).ravel()])
     lost = range(2 * SEEDS, 2 * SEEDS + lost_after)
     flown = {
-        flight: Flown(flight, Verdict.LOST if flight in lost else Verdict.FLOWN, "", (float(value),), "")
+        flight: FlightResult(flight, Verdict.LOST if flight in lost else Verdict.FLOWN, "", (float(value),), "")
         for flight, value in enumerate(values)
     }
     return compare(tuning, FlightTable(campaign, flown))

@@ -13,11 +13,11 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.cli.computer.verify import GOLDEN_HASHES
 from colibri.sitl.vehicle import Sitl
 from colibri.verification import golden, golden_flights
-from colibri.verification.cases import Case, SitlCase
+from colibri.verification.cases import SitlCase, TrackCase
 from tests.support.commands import Ran
 
-SHORT = Case("short", {"track": "line", "profile": "se3", "duration": 0.4})
-CORNER = Case("corner", {"track": "waypoints", "profile": "se3", "duration": 0.4}, golden_flights.WAYPOINTS)
+SHORT = TrackCase("short", {"track": "line", "profile": "se3", "duration": 0.4})
+CORNER = TrackCase("corner", {"track": "waypoints", "profile": "se3", "duration": 0.4}, golden_flights.WAYPOINTS)
 
 
 def hop(sitl: Sitl) -> None:
@@ -129,8 +129,8 @@ def test_the_file_of_the_project_names_the_set_in_its_order() -> None:
     assert list(known) == [flight.name for flight in golden_flights.FLIGHTS]
 
 
-def law_of(flight: Case | SitlCase) -> str:
-    options = flight.options if isinstance(flight, Case) else flight.setting
+def law_of(flight: TrackCase | SitlCase) -> str:
+    options = flight.options if isinstance(flight, TrackCase) else flight.setting
     return load_profile(options.get("profile", "flight")).with_choices(options.get("controller"), None).controller
 
 
@@ -149,6 +149,6 @@ def test_every_track_of_the_thesis_has_a_golden_flight(profile: str) -> None:
     tracks = [
         flight.options["track"]
         for flight in golden_flights.FLIGHTS
-        if isinstance(flight, Case) and flight.options["profile"] == profile
+        if isinstance(flight, TrackCase) and flight.options["profile"] == profile
     ]
     assert set(THESIS_TRACKS) <= set(tracks)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from colibri.verification import verify
-from colibri.verification.cases import Case
+from colibri.verification.cases import TrackCase
 from tests.support.commands import Ran
 
 
@@ -19,13 +19,13 @@ def test_every_flight_is_the_same_twice(tmp_path: Path, ran: Ran, monkeypatch: p
 
 def test_what_is_not_the_same_is_named(tmp_path: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verify, "CASES", verify.CASES[1:2])
-    fly = Case.fly
+    fly = TrackCase.fly
     seeds = iter((1, 2, 3))
 
-    def another_each_time(case: Case, out: Path, link: str, **more: Any) -> str:
+    def another_each_time(case: TrackCase, out: Path, link: str, **more: Any) -> str:
         return f"{next(seeds)}{fly(case, out, link, **more)}"
 
-    monkeypatch.setattr(Case, "fly", another_each_time)
+    monkeypatch.setattr(TrackCase, "fly", another_each_time)
     said = ran("verify", "--link", "memory", "--duration", "1", "--out", tmp_path, code=1)
     assert "NO" in said.out
     assert "not the same twice: spiral; the logs are in" in said.err

@@ -19,7 +19,7 @@ from colibri.view.geometry import (
     thrust_arrows,
     zone_segments,
 )
-from colibri.view.snapshot import Airframe, Mark, Surroundings, Zone
+from colibri.view.snapshot import Mark, Surroundings, VehicleShape, Zone
 
 
 def test_a_faster_rotor_is_redder_and_an_unknown_one_is_grey() -> None:
@@ -31,7 +31,7 @@ def test_a_faster_rotor_is_redder_and_an_unknown_one_is_grey() -> None:
 
 
 def test_thrust_goes_with_the_square_of_the_speed() -> None:
-    arrows = thrust_arrows(Airframe(), (0.5, 1.0, 0.0, nan), scale=2.0)
+    arrows = thrust_arrows(VehicleShape(), (0.5, 1.0, 0.0, nan), scale=2.0)
     lengths = np.linalg.norm(arrows[:, 1] - arrows[:, 0], axis=1)
     assert lengths[1] == pytest.approx(4.0 * lengths[0])
     assert lengths[2:] == pytest.approx([0.0, 0.0], abs=1e-5)

@@ -12,7 +12,7 @@ from colibri.mavlink.mission.items import FENCE
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.sitl.mission_items import land, takeoff, waypoint
 from colibri.sitl.vehicle import Sitl
-from colibri.view.observer import CHOICES, COMPONENT, SYSTEM, Observer
+from colibri.view.observer import CHOICES, COMPONENT, SYSTEM, VehicleObserver
 from colibri.view.snapshot import Snapshot
 from tools.pages.pictures.watched import watched
 
@@ -61,8 +61,8 @@ def test_plans_are_drawn_where_they_lie(sitl: Sitl) -> None:
 
 
 @pytest.fixture
-def others() -> tuple[Observer, Any]:
-    observer, codec = Observer(), Codec(1, 1)
+def others() -> tuple[VehicleObserver, Any]:
+    observer, codec = VehicleObserver(), Codec(1, 1)
 
     def send(name: str, *fields: Any) -> None:
         observer.receive(codec.encode(name, *fields), 1.0)
@@ -71,7 +71,7 @@ def others() -> tuple[Observer, Any]:
     return observer, send
 
 
-def test_a_foreign_vehicle_is_seen_by_its_common_messages(others: tuple[Observer, Any]) -> None:
+def test_a_foreign_vehicle_is_seen_by_its_common_messages(others: tuple[VehicleObserver, Any]) -> None:
     observer, send = others
     east_of_home = geodetic_of((10.0, 0.0, 7.0), HOME)
     send("GPS_GLOBAL_ORIGIN", round(HOME[0] * 1e7), round(HOME[1] * 1e7), round(HOME[2] * 1e3))
@@ -91,7 +91,7 @@ def test_a_foreign_vehicle_is_seen_by_its_common_messages(others: tuple[Observer
     assert observer.telemetry.snapshot(60.0).mode == "no heartbeat"
 
 
-def test_a_fence_comes_item_by_item(others: tuple[Observer, Any]) -> None:
+def test_a_fence_comes_item_by_item(others: tuple[VehicleObserver, Any]) -> None:
     observer, send = others
     send("GPS_GLOBAL_ORIGIN", round(HOME[0] * 1e7), round(HOME[1] * 1e7), round(HOME[2] * 1e3))
     corners = [geodetic_of((east, north, 0.0), HOME) for east, north in ((9.0, 9.0), (-9.0, 9.0), (0.0, -9.0))]
@@ -112,7 +112,7 @@ def test_a_fence_comes_item_by_item(others: tuple[Observer, Any]) -> None:
     assert np.linalg.norm(outside.corners_m, axis=1) == pytest.approx(2.5, abs=0.05)
 
 
-def test_an_order_is_said_again_until_it_is_answered(others: tuple[Observer, Any]) -> None:
+def test_an_order_is_said_again_until_it_is_answered(others: tuple[VehicleObserver, Any]) -> None:
     observer, send = others
     observer.land()
     sent = [landings(observer, at_s) for at_s in (10.0, 10.5, 11.1)]
@@ -123,13 +123,13 @@ def test_an_order_is_said_again_until_it_is_answered(others: tuple[Observer, Any
 
 
 def test_nobody_answers() -> None:
-    observer = Observer()
+    observer = VehicleObserver()
     observer.land()
     assert observer.telemetry.snapshot(0.0).texts == ("land: no vehicle is there",)
 
 
 def test_it_does_not_pass_for_a_ground_station() -> None:
-    observer = Observer()
+    observer = VehicleObserver()
     (beat,) = Codec(1, 1).decode(observer.poll(0.0)[0])
     assert beat.fields.type != mav.MAV_TYPE_GCS
 
@@ -139,15 +139,15 @@ def test_offered_modes_exist() -> None:
         assert set(offered) <= MODES[autopilot].keys()
 
 
-def messages(observer: Observer, at_s: float) -> list[Any]:
+def messages(observer: VehicleObserver, at_s: float) -> list[Any]:
     return [message for each in observer.poll(at_s) for message in Codec(1, 1).decode(each)]
 
 
-def names(observer: Observer, at_s: float) -> list[str]:
+def names(observer: VehicleObserver, at_s: float) -> list[str]:
     """Return the names of what is sent at a time, but for streams and commands."""
     return [message.name for message in messages(observer, at_s) if message.name not in ("HEARTBEAT", "COMMAND_LONG")]
 
 
-def landings(observer: Observer, at_s: float) -> int:
+def landings(observer: VehicleObserver, at_s: float) -> int:
     numbers = [each.fields.command for each in messages(observer, at_s) if each.name == "COMMAND_LONG"]
     return numbers.count(mav.MAV_CMD_NAV_LAND)

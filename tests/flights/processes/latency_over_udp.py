@@ -18,7 +18,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from tools.harness.processes import Process, running
 from tools.harness.relay import Relay
-from tools.pages.latency import LEMNISCATE, STEP, Case, Merit, merit
+from tools.pages.latency import LEMNISCATE, STEP, LatencyCase, Merit, merit
 
 _LOOK_EVERY_S = 0.0002
 
@@ -43,7 +43,7 @@ class DelayRelay(Relay):
             sleep(_LOOK_EVERY_S)
 
 
-def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, float]:
+def fly(case: LatencyCase, round_trip_ms: float, speed: float) -> tuple[Merit | None, float]:
     """Fly a case; return how it went, and the mean round trip that the plant has measured, ms."""
     with TemporaryDirectory() as temporary:
         logs, out = Path(temporary) / "logs", Path(temporary) / "flight"

@@ -11,7 +11,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl.vehicle import Sitl
 from tools.harness.ports import OnPort
 from tools.harness.processes import fly, states
-from tools.harness.stations import ACCEPTED, Station
+from tools.harness.stations import ACCEPTED, HarnessStation
 
 DURATION = ("--duration", "6")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
@@ -28,7 +28,7 @@ def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str, pr
     """It begins above its track: one that must sink is watched for the ground, but does not touch it for that."""
     options = ("--profile", profile, *DURATION, "--start", "z=4")
     alone = fly(tmp_path / "alone", track, "--link", "memory", *options)
-    stations = Station(255, every=2), Station(245, every=2)
+    stations = HarnessStation(255, every=2), HarnessStation(245, every=2)
     with OnPort(stations[0]) as one, OnPort(stations[1]) as other:
         links = ("--gcs", one.url, "--gcs", other.url, "--speed", "3")
         watched = fly(tmp_path / "watched", track, *links, *options)
@@ -61,7 +61,7 @@ def test_every_control_law_flies_where_it_is_sent(sitl_fleet: Callable[..., list
 
 
 def test_a_watched_flight_is_paced_to_the_wall_clock(tmp_path: Path) -> None:
-    station = Station(255)
+    station = HarnessStation(255)
     with OnPort(station) as port:
         report = fly(tmp_path, "hover", "--gcs", port.url, "--duration", "1.5")
     assert station.counts["HEARTBEAT"] >= 1

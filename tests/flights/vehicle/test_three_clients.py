@@ -7,7 +7,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import QUICK
-from tools.harness.stations import Station
+from tools.harness.stations import HarnessStation
 from tools.soak.clients import crew, faults
 
 pytestmark = QUICK
@@ -17,7 +17,7 @@ WARM_S = 8.0
 MAX_NEW_OBJECTS = 100
 
 
-def connect(sitl: Sitl, client: Station, monkeypatch: pytest.MonkeyPatch) -> None:
+def connect(sitl: Sitl, client: HarnessStation, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a client answer what comes with the next frame."""
     link = sitl.client(*client.identity)
 

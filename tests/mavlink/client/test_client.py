@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from colibri.mavlink.client.client import LOST_AFTER_US, Client, Ended, Found, Lost
+from colibri.mavlink.client.client import LOST_AFTER_US, Client, ConversationEnded, VehicleFound, VehicleLost
 from colibri.mavlink.client.commands import Command
 from colibri.mavlink.client.conversation import UNANSWERED, Repeat
 from colibri.mavlink.client.parameters import ReadParameter
@@ -43,7 +43,7 @@ def test_a_conversation_as_a_script_of_events() -> None:
     assert (heartbeat.source, heartbeat.fields.type) == ((255, 190), mav.MAV_TYPE_GCS)
     client.receive(beat(), 100_000)
     (found,) = client.take_events()
-    assert isinstance(found, Found)
+    assert isinstance(found, VehicleFound)
     arming = client.begin(Command(found.vehicle.target, ARM, 1.0))
     (message,) = sent(client, 200_000)
     assert (message.fields.command, message.fields.confirmation, message.fields.param1) == (ARM, 0, 1.0)
@@ -51,26 +51,26 @@ def test_a_conversation_as_a_script_of_events() -> None:
     (message,) = sent(client, 700_000)
     assert message.fields.confirmation == 1
     client.receive(ack(ARM, mav.MAV_RESULT_DENIED), 800_000)
-    assert client.take_events() == [Ended(arming)]
+    assert client.take_events() == [ConversationEnded(arming)]
     assert (arming.result, arming.accepted) == (mav.MAV_RESULT_DENIED, False)
     assert not sent(client, 5_000_000)
     (lost,) = client.take_events()
-    assert lost == Lost(client.vehicles[1])
+    assert lost == VehicleLost(client.vehicles[1])
 
 
 def test_vehicles_are_found_lost_and_found_again() -> None:
     client = Client(255, 190)
     for system, autopilot in ((1, PX4), (7, ARDUPILOT)):
         client.receive(beat(system, autopilot), 0)
-    assert [type(event) for event in client.take_events()] == [Found, Found]
+    assert [type(event) for event in client.take_events()] == [VehicleFound, VehicleFound]
     assert client.vehicle == client.vehicles[1]
     assert [vehicle.autopilot for vehicle in client.vehicles.values()] == [PX4, ARDUPILOT]
     client.receive(beat(7, ARDUPILOT), LOST_AFTER_US)
     client.poll(LOST_AFTER_US + 1)
-    assert client.take_events() == [Lost(client.vehicles[1])]
+    assert client.take_events() == [VehicleLost(client.vehicles[1])]
     assert [vehicle.lost for vehicle in client.vehicles.values()] == [True, False]
     client.receive(beat(1), 2 * LOST_AFTER_US)
-    assert client.take_events() == [Found(client.vehicles[1])]
+    assert client.take_events() == [VehicleFound(client.vehicles[1])]
 
 
 def test_a_vehicle_is_known_by_its_version() -> None:
@@ -128,7 +128,7 @@ def test_silence_ends_a_conversation_and_frees_its_lane() -> None:
     first, second = (client.begin(Command(TARGET, ARM, armed, repeat=repeat)) for armed in (1.0, 0.0))
     assert [len(sent(client, 100_000 * n)) for n in range(4)] == [1, 1, 1, 0]
     assert first.result == UNANSWERED
-    assert client.take_events() == [Ended(first)]
+    assert client.take_events() == [ConversationEnded(first)]
     (message,) = sent(client, 300_001)
     assert message.fields.param1 == 0.0
     client.cancel(second)

@@ -13,13 +13,13 @@ from colibri.mavlink.client.conversation import OK, UNANSWERED, Conversation, Re
 from colibri.mavlink.client.parameters import DIFFERS, ListParameters, ReadParameter, SetParameter
 from colibri.mavlink.client.plans import Clear, Download, Upload
 from colibri.mavlink.files.log_download import Logs
-from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.mission.items import ALL, FENCE, MISSION, PLAN_TYPES
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.parameters.service import ParameterService
-from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, ParamError, Parameter, Parameters
-from colibri.mavlink.services.command import Command as Received
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, ParamError, Parameter, Parameters, ParamType
 from colibri.mavlink.services.command import CommandService
+from colibri.mavlink.services.command import ReceivedCommand as Received
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Bits, Codec, mav
 from tests.support.log_conversations import DownloadLog, ListLogs
@@ -29,10 +29,13 @@ from tests.support.unruly_link import MINUTE_US, TARGET, Link, Vehicle
 BAD_LINKS = {"seed": st.integers(0, 10**6), "loss": st.floats(0.0, 0.3), "unruly": st.floats(0.0, 1.0)}
 ITEMS = [some_item(number) for number in range(12)]
 PARAMETERS = (
-    *(Parameter(name=f"MANY_{number}", kind=Kind.REAL, default=0.5 * number, description="") for number in range(60)),
-    Parameter(name="INTEGER", kind=Kind.INT, default=0, description=""),
-    Parameter(name="LIMITED", kind=Kind.INT, default=1, minimum=0, maximum=2, description=""),
-    Parameter(name="FIXED", kind=Kind.REAL, default=1.0, description="", read_only=True),
+    *(
+        Parameter(name=f"MANY_{number}", kind=ParamType.REAL, default=0.5 * number, description="")
+        for number in range(60)
+    ),
+    Parameter(name="INTEGER", kind=ParamType.INT, default=0, description=""),
+    Parameter(name="LIMITED", kind=ParamType.INT, default=1, minimum=0, maximum=2, description=""),
+    Parameter(name="FIXED", kind=ParamType.REAL, default=1.0, description="", read_only=True),
 )
 LOG = Random(1).randbytes(12_001)
 PATIENTLY = Repeat(500_000, 60)
@@ -46,7 +49,7 @@ class Rig:
         self.commands = CommandService(dict.fromkeys(numbers, self.obeyed.append), StatusText())
         self.parameters = Parameters(PARAMETERS)
         self.ground = Ground(rules) if rules else Ground()
-        memory = Memory()
+        memory = MemoryFiles()
         memory.make_folder(("logs",))
         for name, data in (("0.ulg", LOG), ("1.ulg", b"")):
             memory.create(("logs", name))

@@ -3,24 +3,24 @@
 import pytest
 
 from colibri.mavlink.files.flight_log import WRITE_BYTES, WRITE_EVERY_US, FlightLog
-from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import FileRefusal, Quota, Reading
+from colibri.mavlink.files.memory import MemoryFiles
+from colibri.mavlink.files.tree import FileRefusal, OpenFile, Quota
 
 
 @pytest.fixture
-def memory() -> Memory:
-    memory = Memory()
+def memory() -> MemoryFiles:
+    memory = MemoryFiles()
     memory.make_folder(("logs",))
     return memory
 
 
-def names(memory: Memory) -> list[str]:
+def names(memory: MemoryFiles) -> list[str]:
     return [entry.name for entry in memory.list(("logs",))]  # type: ignore[union-attr]
 
 
-def content(memory: Memory, name: str) -> bytes:
+def content(memory: MemoryFiles, name: str) -> bytes:
     reading = memory.open(("logs", name))
-    assert isinstance(reading, Reading)
+    assert isinstance(reading, OpenFile)
     return bytes(reading.read(0, reading.size))  # type: ignore[arg-type]
 
 
@@ -30,7 +30,7 @@ def fly(log: FlightLog, data: bytes = b"") -> None:
     log.update(False, 2)
 
 
-def test_each_flight_has_its_own(memory: Memory) -> None:
+def test_each_flight_has_its_own(memory: MemoryFiles) -> None:
     log = FlightLog(memory, ("logs",))
     fly(log, b"one")
     fly(log, b"two")
@@ -39,7 +39,7 @@ def test_each_flight_has_its_own(memory: Memory) -> None:
     assert content(memory, "00003.ulg") == b"three"
 
 
-def test_it_is_written_every_second_and_when_much_waits(memory: Memory) -> None:
+def test_it_is_written_every_second_and_when_much_waits(memory: MemoryFiles) -> None:
     log = FlightLog(memory, ("logs",))
     log.update(True, 0)
     log.record(b"x")
@@ -52,7 +52,7 @@ def test_it_is_written_every_second_and_when_much_waits(memory: Memory) -> None:
     assert content(memory, "00001.ulg") == b"x" + b"y" * WRITE_BYTES
 
 
-def test_the_oldest_logs_go(memory: Memory) -> None:
+def test_the_oldest_logs_go(memory: MemoryFiles) -> None:
     log = FlightLog(memory, ("logs",), kept=3)
     memory.create(("logs", "notes.txt"))
     for _ in range(5):
@@ -61,7 +61,7 @@ def test_the_oldest_logs_go(memory: Memory) -> None:
 
 
 def test_the_oldest_logs_give_their_space() -> None:
-    memory = Memory(Quota(1000, 100))
+    memory = MemoryFiles(Quota(1000, 100))
     memory.make_folder(("logs",))
     log = FlightLog(memory, ("logs",))
     for _ in range(3):
@@ -74,7 +74,7 @@ def test_the_oldest_logs_give_their_space() -> None:
     assert [*refusals, log.refusal] == [None, FileRefusal.NO_SPACE]
 
 
-def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: Memory) -> None:
+def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: MemoryFiles) -> None:
     log = FlightLog(memory, ("logs",))
     log.update(True, 0)
     log.record(b"x")
@@ -87,7 +87,7 @@ def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: Memory) -> N
     assert content(memory, "00001.ulg") == b"again"
 
 
-def test_without_a_place_nothing_is_logged(memory: Memory) -> None:
+def test_without_a_place_nothing_is_logged(memory: MemoryFiles) -> None:
     memory.create(("file",))
     log = FlightLog(memory, ("file",))
     fly(log, b"x")
@@ -95,7 +95,7 @@ def test_without_a_place_nothing_is_logged(memory: Memory) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "x.ulg", "-1.ulg", "².ulg", "00000.ulg", "7.txt", "12"])
-def test_other_files_are_no_logs(memory: Memory, name: str) -> None:
+def test_other_files_are_no_logs(memory: MemoryFiles, name: str) -> None:
     memory.create(("logs", name))
     fly(FlightLog(memory, ("logs",), kept=1))
     assert set(names(memory)) == {"00001.ulg", name} - {""}

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.files import ftp
 from colibri.mavlink.files.ftp import Ftp
-from colibri.mavlink.files.ftp_wire import DATA_BYTES, Error, Opcode
-from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.ftp_wire import DATA_BYTES, FtpError, Opcode
+from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.files.tree import Tree
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import Codec
@@ -18,16 +18,16 @@ from tests.support.ftp_client import HEADER, OTHER, PEER, TEXT, Client, parsed
 
 
 @pytest.fixture
-def memory() -> Memory:
-    memory = Memory()
+def memory() -> MemoryFiles:
+    memory = MemoryFiles()
     memory.create(("text",))
     memory.write(("text",), 0, TEXT)
     return memory
 
 
 @pytest.fixture
-def service(memory: Memory) -> Ftp:
-    return Ftp(Tree(memory, {"logs": Memory()}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
+def service(memory: MemoryFiles) -> Ftp:
+    return Ftp(Tree(memory, {"logs": MemoryFiles()}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
 
 
 @pytest.fixture
@@ -41,9 +41,9 @@ def test_a_file_is_read(client: Client) -> None:
     assert client.do(Opcode.READ, offset=len(TEXT) - 5, size=DATA_BYTES) == TEXT[-5:]
     assert client.do(Opcode.READ, offset=3, size=0) == TEXT[3 : 3 + DATA_BYTES]
     past = client.ask(Opcode.READ, offset=len(TEXT), size=1)
-    assert (past.error, past.offset) == (Error.END_OF_FILE, len(TEXT))
+    assert (past.error, past.offset) == (FtpError.END_OF_FILE, len(TEXT))
     assert client.do(Opcode.TERMINATE) == b""
-    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
+    assert client.ask(Opcode.READ, size=1).error == FtpError.INVALID_SESSION
 
 
 @pytest.mark.parametrize("path", [b"text", b"/text", b"//./text", b"/text\0", b"/text\0garbage"])
@@ -58,12 +58,12 @@ def test_a_path_may_have_a_query(client: Client) -> None:
 
 @pytest.mark.parametrize("size", [DATA_BYTES, 80, 1])
 @pytest.mark.parametrize("length", [0, 1, 80, 160, DATA_BYTES, 2 * DATA_BYTES, 1000])
-def test_a_burst_brings_the_rest_of_a_file(client: Client, memory: Memory, size: int, length: int) -> None:
+def test_a_burst_brings_the_rest_of_a_file(client: Client, memory: MemoryFiles, size: int, length: int) -> None:
     memory.truncate(("text",), length)
     client.do(Opcode.OPEN_TO_READ, b"text")
     replies = client.burst(0, size)
     if length == 0:
-        assert [reply.error for reply in replies] == [Error.END_OF_FILE]
+        assert [reply.error for reply in replies] == [FtpError.END_OF_FILE]
         return
     assert b"".join(reply.data for reply in replies) == TEXT[:length]
     assert [reply.sequence for reply in replies] == [client.sequence + 1 + number for number in range(len(replies))]
@@ -82,7 +82,7 @@ def test_bursts_of_several_clients_share_the_pace(service: Ftp) -> None:
     assert set(served) == set(range(20))
 
 
-def test_a_client_that_is_gone_is_not_sent_a_large_file(client: Client, memory: Memory) -> None:
+def test_a_client_that_is_gone_is_not_sent_a_large_file(client: Client, memory: MemoryFiles) -> None:
     memory.write(("text",), 4_000_000, b"x")
     client.do(Opcode.OPEN_TO_READ, b"text")
     replies = client.burst(0, DATA_BYTES)
@@ -101,7 +101,7 @@ def test_a_burst_ends_with_its_session(client: Client, opcode: int) -> None:
     assert client.poll() == []
 
 
-def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory) -> None:
+def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: MemoryFiles) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.send(Opcode.BURST, size=100)
     client.poll()
@@ -111,17 +111,17 @@ def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory
     client.send(Opcode.BURST, size=100)
     memory.remove(("text",))
     (gone,) = client.poll()
-    assert gone.error == Error.NOT_FOUND
+    assert gone.error == FtpError.NOT_FOUND
     assert client.poll() == []
 
 
-def test_a_file_is_written(client: Client, memory: Memory) -> None:
+def test_a_file_is_written(client: Client, memory: MemoryFiles) -> None:
     assert client.do(Opcode.CREATE, b"new") == b""
     second = client.ask(Opcode.WRITE, b"world", offset=6)
     assert (second.opcode, second.offset, second.size) == (Opcode.ACK, 6, 0)  # MAVProxy tells the parts by the offset
     client.do(Opcode.WRITE, b"hello ", offset=0)
     client.do(Opcode.TERMINATE)
-    assert client.ask(Opcode.WRITE, b"x").error == Error.INVALID_SESSION
+    assert client.ask(Opcode.WRITE, b"x").error == FtpError.INVALID_SESSION
     client.do(Opcode.OPEN_TO_WRITE, b"new")
     client.do(Opcode.WRITE, b"H", offset=0)
     assert memory.open(("new",)).read(0, 100) == b"Hello world"  # type: ignore[union-attr]
@@ -131,42 +131,42 @@ def test_a_file_is_written(client: Client, memory: Memory) -> None:
 
 def test_what_is_open_to_read_is_not_written_and_the_reverse(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
-    assert client.ask(Opcode.WRITE, b"x").error == Error.PROTECTED
+    assert client.ask(Opcode.WRITE, b"x").error == FtpError.PROTECTED
     client.do(Opcode.TERMINATE)
     client.do(Opcode.OPEN_TO_WRITE, b"text")
-    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
-    assert client.ask(Opcode.BURST, size=1).error == Error.INVALID_SESSION
+    assert client.ask(Opcode.READ, size=1).error == FtpError.INVALID_SESSION
+    assert client.ask(Opcode.BURST, size=1).error == FtpError.INVALID_SESSION
 
 
 @pytest.mark.parametrize(
     ("opcode", "data", "offset", "error"),
     [
-        (Opcode.OPEN_TO_READ, b"nope", 0, Error.NOT_FOUND),
-        (Opcode.OPEN_TO_READ, b"../text", 0, Error.NOT_FOUND),
-        (Opcode.OPEN_TO_READ, b"\xff\xfe", 0, Error.NOT_FOUND),
-        (Opcode.OPEN_TO_READ, b"logs", 0, Error.FAIL_ERRNO),
-        (Opcode.LIST, b"nope", 0, Error.NOT_FOUND),
-        (Opcode.LIST, b"text", 0, Error.FAIL_ERRNO),
-        (Opcode.LIST, b"", 99, Error.END_OF_FILE),
-        (Opcode.LIST, b"logs", 0, Error.END_OF_FILE),
-        (Opcode.CREATE, b"@PARAM/param.pck", 0, Error.PROTECTED),
-        (Opcode.OPEN_TO_WRITE, b"@PARAM/param.pck", 0, Error.PROTECTED),
-        (Opcode.CREATE, b"nope/new", 0, Error.NOT_FOUND),
-        (Opcode.CREATE, b"tab\tname", 0, Error.FAIL_ERRNO),
-        (Opcode.REMOVE, b"nope", 0, Error.NOT_FOUND),
-        (Opcode.MAKE_FOLDER, b"text", 0, Error.EXISTS),
-        (Opcode.MAKE_FOLDER, b"/", 0, Error.EXISTS),
-        (Opcode.REMOVE_FOLDER, b"text", 0, Error.FAIL_ERRNO),
-        (Opcode.RENAME, b"nope\0new", 0, Error.NOT_FOUND),
-        (Opcode.RENAME, b"text\0logs", 0, Error.EXISTS),
-        (Opcode.RENAME, b"text", 0, Error.INVALID_DATA_SIZE),
-        (Opcode.RENAME, b"text\0", 0, Error.INVALID_DATA_SIZE),
-        (Opcode.RENAME, b"text\0..", 0, Error.NOT_FOUND),
-        (Opcode.TRUNCATE, b"text", len(TEXT) + 1, Error.END_OF_FILE),
-        (Opcode.TRUNCATE, b"nope", 0, Error.NOT_FOUND),
-        (Opcode.CHECKSUM, b"nope", 0, Error.NOT_FOUND),
-        (17, b"text", 0, Error.UNKNOWN_COMMAND),
-        (200, b"", 0, Error.UNKNOWN_COMMAND),
+        (Opcode.OPEN_TO_READ, b"nope", 0, FtpError.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"../text", 0, FtpError.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"\xff\xfe", 0, FtpError.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"logs", 0, FtpError.FAIL_ERRNO),
+        (Opcode.LIST, b"nope", 0, FtpError.NOT_FOUND),
+        (Opcode.LIST, b"text", 0, FtpError.FAIL_ERRNO),
+        (Opcode.LIST, b"", 99, FtpError.END_OF_FILE),
+        (Opcode.LIST, b"logs", 0, FtpError.END_OF_FILE),
+        (Opcode.CREATE, b"@PARAM/param.pck", 0, FtpError.PROTECTED),
+        (Opcode.OPEN_TO_WRITE, b"@PARAM/param.pck", 0, FtpError.PROTECTED),
+        (Opcode.CREATE, b"nope/new", 0, FtpError.NOT_FOUND),
+        (Opcode.CREATE, b"tab\tname", 0, FtpError.FAIL_ERRNO),
+        (Opcode.REMOVE, b"nope", 0, FtpError.NOT_FOUND),
+        (Opcode.MAKE_FOLDER, b"text", 0, FtpError.EXISTS),
+        (Opcode.MAKE_FOLDER, b"/", 0, FtpError.EXISTS),
+        (Opcode.REMOVE_FOLDER, b"text", 0, FtpError.FAIL_ERRNO),
+        (Opcode.RENAME, b"nope\0new", 0, FtpError.NOT_FOUND),
+        (Opcode.RENAME, b"text\0logs", 0, FtpError.EXISTS),
+        (Opcode.RENAME, b"text", 0, FtpError.INVALID_DATA_SIZE),
+        (Opcode.RENAME, b"text\0", 0, FtpError.INVALID_DATA_SIZE),
+        (Opcode.RENAME, b"text\0..", 0, FtpError.NOT_FOUND),
+        (Opcode.TRUNCATE, b"text", len(TEXT) + 1, FtpError.END_OF_FILE),
+        (Opcode.TRUNCATE, b"nope", 0, FtpError.NOT_FOUND),
+        (Opcode.CHECKSUM, b"nope", 0, FtpError.NOT_FOUND),
+        (17, b"text", 0, FtpError.UNKNOWN_COMMAND),
+        (200, b"", 0, FtpError.UNKNOWN_COMMAND),
     ],
 )
 def test_refusals(client: Client, opcode: int, data: bytes, offset: int, error: int) -> None:
@@ -183,7 +183,7 @@ def test_changes(client: Client) -> None:
     client.do(Opcode.REMOVE, b"made")
     client.do(Opcode.MAKE_FOLDER, b"d")
     client.do(Opcode.RENAME, b"text\0d/renamed\0")
-    assert client.ask(Opcode.REMOVE_FOLDER, b"d").data == bytes((Error.FAIL_ERRNO, 39))  # ENOTEMPTY
+    assert client.ask(Opcode.REMOVE_FOLDER, b"d").data == bytes((FtpError.FAIL_ERRNO, 39))  # ENOTEMPTY
     client.do(Opcode.TRUNCATE, b"d/renamed", offset=3)
     assert client.listed(b"d") == [b"Frenamed\t3"]
     client.do(Opcode.REMOVE, b"d/renamed")
@@ -193,14 +193,14 @@ def test_changes(client: Client) -> None:
 
 @pytest.mark.parametrize("opcode", [Opcode.CREATE, Opcode.WRITE, Opcode.LIST, Opcode.READ, Opcode.NONE])
 def test_a_size_that_no_payload_has_is_refused(client: Client, opcode: int) -> None:
-    assert client.ask(opcode, b"x" * DATA_BYTES, size=240).error == Error.INVALID_DATA_SIZE
+    assert client.ask(opcode, b"x" * DATA_BYTES, size=240).error == FtpError.INVALID_DATA_SIZE
 
 
 def test_an_answer_is_not_answered(client: Client) -> None:
-    assert client.send(Opcode.ACK) == client.send(Opcode.NAK, bytes([Error.UNKNOWN_COMMAND])) == []
+    assert client.send(Opcode.ACK) == client.send(Opcode.NAK, bytes([FtpError.UNKNOWN_COMMAND])) == []
 
 
-def test_a_long_folder_is_listed_in_parts(client: Client, memory: Memory) -> None:
+def test_a_long_folder_is_listed_in_parts(client: Client, memory: MemoryFiles) -> None:
     memory.make_folder(("many",))
     names = [f"{number:03}" + "x" * (number % 200) for number in range(300)]
     for name in names:
@@ -213,7 +213,7 @@ def test_entries_have_times_where_they_are_asked_for(client: Client) -> None:
     assert client.listed(b"/", Opcode.LIST_WITH_TIME) == expected
 
 
-def test_a_name_that_cannot_be_told_is_skipped(client: Client, memory: Memory) -> None:
+def test_a_name_that_cannot_be_told_is_skipped(client: Client, memory: MemoryFiles) -> None:
     longest = DATA_BYTES - len(b"F\t0\0")
     memory.create(("x" * longest,))
     assert client.listed(b"/")[-1] == b"F%s\t0" % (b"x" * longest)
@@ -224,7 +224,7 @@ def test_a_name_that_cannot_be_told_is_skipped(client: Client, memory: Memory) -
 
 
 @pytest.mark.parametrize("length", [0, 1, 1000, ftp.CHECKSUM_BYTES_A_POLL, 3 * ftp.CHECKSUM_BYTES_A_POLL + 1])
-def test_checksum(client: Client, memory: Memory, length: int) -> None:
+def test_checksum(client: Client, memory: MemoryFiles, length: int) -> None:
     """https://mavlink.io/en/guide/crc.html: from 0, not inverted; a large file takes some polls."""
     data = random.Random(length).randbytes(length)
     memory.create(("data",))
@@ -255,7 +255,7 @@ def test_checksum(client: Client, memory: Memory, length: int) -> None:
     ],
 )
 def test_a_repeated_request_gets_the_remembered_answer(
-    client: Client, memory: Memory, opcode: int, data: bytes
+    client: Client, memory: MemoryFiles, opcode: int, data: bytes
 ) -> None:
     memory.make_folder(("empty",))
     first = client.ask(opcode, data)
@@ -267,7 +267,7 @@ def test_a_repeated_request_gets_the_remembered_answer(
     assert client.send(opcode, data)[0].opcode == Opcode.NAK
 
 
-def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Memory) -> None:
+def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: MemoryFiles) -> None:
     client.do(Opcode.CREATE, b"new")
     created = client.sequence
     client.do(Opcode.WRITE, b"hello")
@@ -289,7 +289,7 @@ def test_memory_is_bounded(service: Ftp) -> None:
     assert len(service._checksums) <= ftp.MAX_SESSIONS  # noqa: SLF001
 
 
-def test_every_client_has_its_own_sessions(service: Ftp, memory: Memory) -> None:
+def test_every_client_has_its_own_sessions(service: Ftp, memory: MemoryFiles) -> None:
     memory.create(("other",))
     memory.write(("other",), 0, b"other")
     one, two = Client(service), Client(service, OTHER)
@@ -299,15 +299,15 @@ def test_every_client_has_its_own_sessions(service: Ftp, memory: Memory) -> None
     assert two.do(Opcode.READ, size=5) == b"other"
     two.do(Opcode.RESET)
     assert one.do(Opcode.READ, size=5) == TEXT[:5]
-    assert two.ask(Opcode.READ, size=5).error == Error.INVALID_SESSION
+    assert two.ask(Opcode.READ, size=5).error == FtpError.INVALID_SESSION
 
 
 def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> None:
     for session in range(ftp.MAX_SESSIONS_OF_A_PEER):
         Client(service, PEER, session).do(Opcode.OPEN_TO_READ, b"text")
     full = Client(service, PEER, 200)
-    assert full.ask(Opcode.OPEN_TO_READ, b"text").error == Error.NO_SESSIONS
-    assert full.ask(Opcode.CREATE, b"never").error == Error.NO_SESSIONS
+    assert full.ask(Opcode.OPEN_TO_READ, b"text").error == FtpError.NO_SESSIONS
+    assert full.ask(Opcode.CREATE, b"never").error == FtpError.NO_SESSIONS
     assert b"Fnever\t0" not in full.listed(b"/")
     Client(service, OTHER).do(Opcode.OPEN_TO_READ, b"text")
     Client(service, PEER, 3).do(Opcode.TERMINATE)
@@ -319,14 +319,14 @@ def test_an_idle_session_ends(client: Client) -> None:
     client.now_us += ftp.SESSION_ENDS_AFTER_US
     client.do(Opcode.READ, size=1)
     client.now_us += ftp.SESSION_ENDS_AFTER_US + 1
-    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
+    assert client.ask(Opcode.READ, size=1).error == FtpError.INVALID_SESSION
 
 
 def test_only_an_idle_session_is_taken_over(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.do(Opcode.OPEN_TO_READ, b"text")  # the answer was lost, and MAVSDK asks with another number
-    assert client.ask(Opcode.OPEN_TO_READ, b"@PARAM/param.pck").error == Error.NO_SESSIONS
-    assert client.ask(Opcode.CREATE, b"new").error == Error.NO_SESSIONS
+    assert client.ask(Opcode.OPEN_TO_READ, b"@PARAM/param.pck").error == FtpError.NO_SESSIONS
+    assert client.ask(Opcode.CREATE, b"new").error == FtpError.NO_SESSIONS
     assert b"Fnew\t0" not in client.listed(b"/")
     assert client.do(Opcode.READ, size=3) == TEXT[:3]
     client.now_us += ftp.TAKEN_OVER_AFTER_US
@@ -366,9 +366,9 @@ REQUESTS = st.one_of(
 
 @given(st.lists(st.tuples(REQUESTS, st.sampled_from([PEER, OTHER]), st.integers(0, 30_000_000)), max_size=60))
 def test_nothing_that_is_asked_raises(requests: list[tuple[bytes, Peer, int]]) -> None:
-    memory = Memory()
+    memory = MemoryFiles()
     memory.create(("text",))
-    service = Ftp(Tree(memory, {"logs": Memory()}, {"@PARAM/param.pck": lambda query: query.encode()}))
+    service = Ftp(Tree(memory, {"logs": MemoryFiles()}, {"@PARAM/param.pck": lambda query: query.encode()}))
     codec = Codec(255, 190)
     now_us = 0
     for payload, peer, later_us in requests:
@@ -379,4 +379,4 @@ def test_nothing_that_is_asked_raises(requests: list[tuple[bytes, Peer, int]]) -
             assert reply.opcode in (Opcode.ACK, Opcode.NAK)
             assert reply.size <= DATA_BYTES
             if reply.opcode == Opcode.NAK:
-                assert reply.error in set(Error)
+                assert reply.error in set(FtpError)

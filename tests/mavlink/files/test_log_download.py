@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.files import log_download
 from colibri.mavlink.files.log_download import BLOCK_BYTES, MESSAGES_A_POLL, Logs
-from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
 from tests.support.messages import GROUND, OTHER, message, on_the_wire
@@ -22,8 +22,8 @@ CONTENT = {"00001.ulg": BIG, "00002.ulg": b"", "00003.ulg": bytes(range(180))}
 
 
 @pytest.fixture
-def memory() -> Memory:
-    memory = Memory()
+def memory() -> MemoryFiles:
+    memory = MemoryFiles()
     memory.make_folder(("logs",))
     memory.make_folder(("logs", "no log"))
     for name, data in CONTENT.items():
@@ -33,7 +33,7 @@ def memory() -> Memory:
 
 
 @pytest.fixture
-def logs(memory: Memory) -> Logs:
+def logs(memory: MemoryFiles) -> Logs:
     return Logs(memory, ("logs",))
 
 
@@ -75,12 +75,12 @@ def test_logs_are_listed(logs: Logs) -> None:
 
 @pytest.mark.parametrize("folder", [("logs",), ("nope",)])
 def test_without_logs_one_entry_says_so(folder: tuple[str, ...]) -> None:
-    memory = Memory()
+    memory = MemoryFiles()
     memory.make_folder(("logs",))
     assert entries(Logs(memory, folder)) == [(0, 0, 0, 0, 0)]
 
 
-def test_a_list_is_paced(memory: Memory, logs: Logs) -> None:
+def test_a_list_is_paced(memory: MemoryFiles, logs: Logs) -> None:
     for number in range(100):
         memory.create(("logs", f"1{number:04}.ulg"))
     ask(logs, "LOG_REQUEST_LIST", 0, 0xFFFF)
@@ -142,7 +142,7 @@ def test_another_log_or_the_end_stops_a_download(logs: Logs) -> None:
     assert drain(logs, []) == []
 
 
-def test_ids_are_those_of_the_last_list(memory: Memory, logs: Logs) -> None:
+def test_ids_are_those_of_the_last_list(memory: MemoryFiles, logs: Logs) -> None:
     entries(logs)
     memory.remove(("logs", "00001.ulg"))
     assert data(logs, 2, 0, 90) == [(2, 0, bytes(range(90)))]
@@ -151,14 +151,14 @@ def test_ids_are_those_of_the_last_list(memory: Memory, logs: Logs) -> None:
     assert data(logs, 1, 0, 90) == [(1, 0, bytes(range(90)))]
 
 
-def test_a_log_that_vanishes_ends(memory: Memory, logs: Logs) -> None:
+def test_a_log_that_vanishes_ends(memory: MemoryFiles, logs: Logs) -> None:
     ask(logs, "LOG_REQUEST_DATA", 0, 0, CHUNK)
     list(logs.poll(0))
     memory.remove(("logs", "00001.ulg"))
     assert blocks(drain(logs, [])) == [(0, MESSAGES_A_POLL * BLOCK_BYTES, b"")]
 
 
-def test_logs_are_erased_but_for_the_one_being_written(memory: Memory) -> None:
+def test_logs_are_erased_but_for_the_one_being_written(memory: MemoryFiles) -> None:
     logs = Logs(memory, ("logs",), lambda: "00003.ulg")
     ask(logs, "LOG_REQUEST_DATA", 0, 0, ALL)
     ask(logs, "LOG_ERASE")
@@ -187,7 +187,7 @@ REQUESTS = st.one_of(
 
 @given(st.lists(st.tuples(REQUESTS, st.sampled_from([GROUND, OTHER])), max_size=30))
 def test_nothing_that_is_asked_raises(requests: list[tuple[Message, Peer]]) -> None:
-    memory = Memory()
+    memory = MemoryFiles()
     memory.create(("a",))
     memory.write(("a",), 0, b"x" * 300)
     logs = Logs(memory)

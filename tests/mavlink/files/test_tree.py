@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from colibri.mavlink.files.folder import Folder
-from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, Quota, Reading, Tree, can_be_new, names_of
+from colibri.mavlink.files.memory import MemoryFiles
+from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, OpenFile, Quota, Tree, can_be_new, names_of
 
 QUOTA = Quota(200, 6)
 LONG = "x" * 256
@@ -31,7 +31,7 @@ OPERATIONS = st.lists(
 
 def content(files: Files, names: Names) -> bytes:
     reading = files.open(names)
-    assert isinstance(reading, Reading)
+    assert isinstance(reading, OpenFile)
     data = reading.read(0, reading.size)
     assert isinstance(data, bytes)
     return data
@@ -40,7 +40,7 @@ def content(files: Files, names: Names) -> bytes:
 def plain(outcome: object) -> object:
     if isinstance(outcome, list):
         return [entry._replace(modified_s=0) for entry in outcome]
-    if isinstance(outcome, Reading):
+    if isinstance(outcome, OpenFile):
         return outcome.size, outcome.read(0, 1000), outcome.read(5, 3), outcome.read(1000, 5)
     return outcome
 
@@ -49,7 +49,7 @@ def plain(outcome: object) -> object:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_path_factory: object) -> None:
     path: Path = tmp_path_factory.mktemp("files")  # type: ignore[attr-defined]
-    folder, memory = Folder(path, QUOTA), Memory(QUOTA)
+    folder, memory = Folder(path, QUOTA), MemoryFiles(QUOTA)
     for name, *arguments in operations:
         of_disk = getattr(folder, str(name))(*arguments)
         of_memory = getattr(memory, str(name))(*arguments)
@@ -63,7 +63,9 @@ def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_p
     again.close()
 
 
-@pytest.mark.parametrize("make", [lambda path: Folder(path, QUOTA), lambda _: Memory(QUOTA)], ids=["folder", "memory"])
+@pytest.mark.parametrize(
+    "make", [lambda path: Folder(path, QUOTA), lambda _: MemoryFiles(QUOTA)], ids=["folder", "memory"]
+)
 def test_quota(make: object, tmp_path: Path) -> None:
     files: Files = make(tmp_path / "q")  # type: ignore[operator]
     for name in "abcde":
@@ -146,7 +148,7 @@ def test_a_folder_swapped_for_a_link_leads_nowhere(tmp_path: Path) -> None:
     folder.make_folder(("a",))
     folder.create(("a", "secret"))
     reading = folder.open(("a", "secret"))
-    assert isinstance(reading, Reading)
+    assert isinstance(reading, OpenFile)
     (tmp_path / "root" / "a").rename(tmp_path / "root" / "b")
     (tmp_path / "root" / "a").symlink_to(tmp_path / "outside")
     assert isinstance(reading.read(0, 6), FileRefusal)
@@ -159,7 +161,7 @@ def test_what_vanishes_is_not_found(tmp_path: Path) -> None:
     folder.create(("a",))
     folder.write(("a",), 0, b"hello")
     reading = folder.open(("a",))
-    assert isinstance(reading, Reading)
+    assert isinstance(reading, OpenFile)
     assert reading.read(1, 3) == b"ell"
     (tmp_path / "a").unlink()
     assert reading.read(0, 5) is FileRefusal.NOT_FOUND
@@ -188,15 +190,15 @@ def test_paths(path: str, names: object) -> None:
 @pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\tb", "a\nb", "\x1b[2J", "\ud800", "x" * 256])
 def test_names_that_nobody_could_list_again_are_refused(name: str) -> None:
     assert not can_be_new(name)
-    assert isinstance(Memory().create((name,)), FileRefusal)
+    assert isinstance(MemoryFiles().create((name,)), FileRefusal)
 
 
 @pytest.fixture
 def tree() -> Tree:
-    logs = Memory()
+    logs = MemoryFiles()
     logs.create(("1.ulg",))
     logs.write(("1.ulg",), 0, b"log")
-    root = Memory()
+    root = MemoryFiles()
     root.create(("mine",))
     root.make_folder(("logs",))  # hidden behind the mount
     root.create(("logs", "hidden"))
@@ -229,7 +231,7 @@ def test_a_tree_opens_everything(tree: Tree) -> None:
 
 
 def test_a_folder_has_a_second_path() -> None:
-    root = Memory()
+    root = MemoryFiles()
     root.make_folder(("logs",))
     tree = Tree(root, {}, {}, {"@MAV_LOG": "logs"})
     assert tree.create(("@MAV_LOG", "a")) is None
@@ -242,10 +244,10 @@ def test_a_folder_has_a_second_path() -> None:
 
 def test_what_is_generated_stays_as_it_was_when_opened() -> None:
     contents = iter([b"one", b"three"])
-    tree = Tree(Memory(), {}, {"g": lambda _: next(contents)})
+    tree = Tree(MemoryFiles(), {}, {"g": lambda _: next(contents)})
     first, second = tree.open(("g",)), tree.open(("g",))
-    assert isinstance(first, Reading)
-    assert isinstance(second, Reading)
+    assert isinstance(first, OpenFile)
+    assert isinstance(second, OpenFile)
     assert (first.size, first.read(0, 9), second.size, second.read(0, 9)) == (3, b"one", 5, b"three")
 
 

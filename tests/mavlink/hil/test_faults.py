@@ -17,9 +17,9 @@ from colibri.mavlink.hil.faults import (
     SLOW,
     TABLE,
     WRONG,
+    Equipment,
     Fault,
-    Part,
-    Row,
+    FaultRow,
     fault_from,
     judged,
 )
@@ -27,11 +27,11 @@ from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery, decode_ba
 from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
 from colibri.mavlink.wire.refusal import Refusal
 
-ALL_PARTS = list(Part)
+ALL_PARTS = list(Equipment)
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
 
 
-def refusal(fault: Fault, parts: list[Part] = ALL_PARTS) -> Refusal:
+def refusal(fault: Fault, parts: list[Equipment] = ALL_PARTS) -> Refusal:
     judgement = judged(fault, parts)
     assert isinstance(judgement, Refusal)
     return judgement
@@ -42,7 +42,7 @@ def test_no_fault_is_told_twice() -> None:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.unit}-{row.kind}")
-def test_each_has_usual_numbers_within_its_limits(row: Row) -> None:
+def test_each_has_usual_numbers_within_its_limits(row: FaultRow) -> None:
     fault = judged(Fault(row.unit, row.kind), ALL_PARTS)
     assert isinstance(fault, Fault)
     assert fault.values[: len(row.values)] == tuple(value.usual for value in row.values)
@@ -67,10 +67,10 @@ def test_what_cannot_be_is_denied_with_words() -> None:
 def test_what_no_plant_does_is_not_supported() -> None:
     assert refusal(Fault(MOTOR, SLOW)) == Refusal("no plant does this fault", RESULT_UNSUPPORTED)
     assert refusal(Fault(104, OFF)).result == RESULT_UNSUPPORTED
-    assert refusal(Fault(ACCELEROMETER, OFF), [Part.ROTORS]) == Refusal(
+    assert refusal(Fault(ACCELEROMETER, OFF), [Equipment.ROTORS]) == Refusal(
         "flown by the state, not by sensors", RESULT_UNSUPPORTED
     )
-    assert refusal(Fault(BATTERY, OFF), [Part.ROTORS]) == Refusal("no battery to fail", RESULT_UNSUPPORTED)
+    assert refusal(Fault(BATTERY, OFF), [Equipment.ROTORS]) == Refusal("no battery to fail", RESULT_UNSUPPORTED)
 
 
 @given(ANYTHING, ANYTHING, ANYTHING, st.tuples(ANYTHING, ANYTHING, ANYTHING, ANYTHING))

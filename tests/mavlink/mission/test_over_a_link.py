@@ -11,7 +11,7 @@ from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.conversation import Repeat
 from colibri.mavlink.client.plans import Download, Upload
 from colibri.mavlink.mission.items import FENCE, PLAN_TYPES
-from colibri.mavlink.mission.service import Progress
+from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import mav
 from tests.support.mission_ends import FIRST, SECOND, VEHICLE, Ground, bits, fielded, some_item
@@ -90,7 +90,7 @@ class Conversations(RuleBasedStateMachine):
     @rule(peer=PEERS, seq=SEQUENCES)
     def sets_current(self, peer: Peer, seq: int) -> None:
         self.say(peer, "MISSION_SET_CURRENT", seq)
-        self.ground.progress = Progress(seq, mav.MISSION_STATE_ACTIVE, 1)
+        self.ground.progress = MissionProgress(seq, mav.MISSION_STATE_ACTIVE, 1)
 
     @rule(after_us=st.sampled_from([0, 4_000, 250_000, 1_000_000, 5_000_000, 3600_000_000]))
     def time_passes(self, after_us: int) -> None:

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RALLY, MissionItem
-from colibri.mavlink.mission.service import Progress
+from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.mission.upload import Rules
-from colibri.mavlink.services.command import DENIED, NOT_GIVEN, Command
+from colibri.mavlink.services.command import DENIED, NOT_GIVEN, ReceivedCommand
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.mission_ends import (
@@ -301,7 +301,7 @@ def test_version_1_frames_are_about_the_mission() -> None:
 def test_the_current_item_is_marked() -> None:
     ground = Ground()
     upload(ground)
-    ground.progress = Progress(1, mav.MISSION_STATE_ACTIVE, 1)
+    ground.progress = MissionProgress(1, mav.MISSION_STATE_ACTIVE, 1)
     replies = [ground.hear(FIRST, "MISSION_REQUEST_INT", *VEHICLE, seq, MISSION)[0] for seq in range(3)]
     assert [reply.fields.current for reply in replies] == [0, 1, 0]
 
@@ -312,7 +312,7 @@ def test_progress_is_sent_once_a_second_and_on_change() -> None:
     assert list(first.fields)[:4] == [0, 0xFFFF, mav.MISSION_STATE_NO_MISSION, 2]
     said = [len(ground.poll(100_000)) for _ in range(20)]
     assert said == [0] * 9 + [1] + [0] * 9 + [1]
-    ground.progress = Progress(4, mav.MISSION_STATE_ACTIVE, 1)
+    ground.progress = MissionProgress(4, mav.MISSION_STATE_ACTIVE, 1)
     (message,) = ground.poll(4_000)
     assert (message.fields.seq, message.fields.mission_state, message.fields.mission_mode) == (4, 3, 1)
     assert list(ground.service.current())[:4] == [4, 0xFFFF, 3, 1]
@@ -353,7 +353,7 @@ def test_setting_the_current_item() -> None:
 def test_the_command_to_set_the_current_item(p1: float, p2: float, expected: tuple[int, bool] | None) -> None:
     ground = Ground()
     ground.poll()
-    command = Command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, p1, p2, nan, nan, nan, nan, nan, None, FIRST, 0)
+    command = ReceivedCommand(mav.MAV_CMD_DO_SET_MISSION_CURRENT, p1, p2, nan, nan, nan, nan, nan, None, FIRST, 0)
     refusal = ground.service.do_set_mission_current(command)
     assert ground.set == ([expected] if expected else [])
     assert (refusal is None) is bool(expected)

@@ -7,17 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.mavlink.parameters.file import ParameterFileError, read, write
-from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Parameter, Parameters, float32
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Parameter, Parameters, ParamType, float32
 
 
 def parameters_of() -> Parameters:
     return Parameters(
         [
-            Parameter(name="INTEGER", kind=Kind.INT, default=0, description=""),
-            Parameter(name="REAL", kind=Kind.REAL, default=0.5, description=""),
-            Parameter(name="PART", kind=Kind.REAL, default=0.5, minimum=0.0, maximum=0.7, description=""),
-            Parameter(name="CHOICE", kind=Kind.INT, default=1, values=((1, "One"), (3, "Three")), description=""),
-            Parameter(name="FIXED", kind=Kind.INT, default=1, description="", read_only=True),
+            Parameter(name="INTEGER", kind=ParamType.INT, default=0, description=""),
+            Parameter(name="REAL", kind=ParamType.REAL, default=0.5, description=""),
+            Parameter(name="PART", kind=ParamType.REAL, default=0.5, minimum=0.0, maximum=0.7, description=""),
+            Parameter(name="CHOICE", kind=ParamType.INT, default=1, values=((1, "One"), (3, "Three")), description=""),
+            Parameter(name="FIXED", kind=ParamType.INT, default=1, description="", read_only=True),
         ]
     )
 

@@ -3,10 +3,10 @@
 import json
 from zlib import crc32
 
-from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import Reading, Tree
+from colibri.mavlink.files.memory import MemoryFiles
+from colibri.mavlink.files.tree import OpenFile, Tree
 from colibri.mavlink.parameters.metadata import Metadata, checksum, metadata_json
-from colibri.mavlink.parameters.store import Kind, Parameter
+from colibri.mavlink.parameters.store import Parameter, ParamType
 from tests.support.messages import GROUND, on_the_wire
 
 PARAMETERS = b'{"version": 1, "parameters": []}'
@@ -14,12 +14,12 @@ PARAMETERS = b'{"version": 1, "parameters": []}'
 
 def test_the_message_leads_to_the_parameters() -> None:
     metadata = Metadata(PARAMETERS)
-    tree = Tree(Memory(), {}, metadata.files)
+    tree = Tree(MemoryFiles(), {}, metadata.files)
 
     def read(uri: str) -> bytes:
         assert uri.startswith("mftp:///")
         reading = tree.open((uri.removeprefix("mftp:///"),))
-        assert isinstance(reading, Reading)
+        assert isinstance(reading, OpenFile)
         data = reading.read(0, reading.size)
         assert isinstance(data, bytes)
         return data
@@ -47,7 +47,7 @@ def test_the_checksum_is_that_of_mavlink() -> None:
 
 SPEED = Parameter(
     name="SPEED",
-    kind=Kind.REAL,
+    kind=ParamType.REAL,
     default=0.1,
     minimum=0.0,
     maximum=0.7,
@@ -58,7 +58,9 @@ SPEED = Parameter(
     group="Flight",
     reboot_required=True,
 )
-TRACK = Parameter(name="TRACK", kind=Kind.INT, default=2, description="Which", values=((2, "Two"),), read_only=True)
+TRACK = Parameter(
+    name="TRACK", kind=ParamType.INT, default=2, description="Which", values=((2, "Two"),), read_only=True
+)
 
 
 def test_parameters_as_the_schema_has_them() -> None:

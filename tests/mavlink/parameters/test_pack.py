@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
 from colibri.mavlink.parameters.pack import BLOCK_BYTES, packed
-from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Parameter, Parameters
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Parameter, Parameters, ParamType
 
 
 def unpacked(file: bytes | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -25,13 +25,13 @@ def unpacked(file: bytes | None) -> tuple[dict[str, Any], dict[str, Any] | None]
 
 def parameters_of(names: list[str]) -> Parameters:
     parameters = Parameters(
-        Parameter(name=name, kind=Kind.INT, default=-i, description="")
+        Parameter(name=name, kind=ParamType.INT, default=-i, description="")
         if i % 2
-        else Parameter(name=name, kind=Kind.REAL, default=i / 3.0, description="")
+        else Parameter(name=name, kind=ParamType.REAL, default=i / 3.0, description="")
         for i, name in enumerate(names)
     )
     for parameter in list(parameters)[::3]:
-        parameters.set(parameter.name, INT32_MIN if parameter.kind == Kind.INT else 1.7)
+        parameters.set(parameter.name, INT32_MIN if parameter.kind == ParamType.INT else 1.7)
     return parameters
 
 
@@ -48,7 +48,7 @@ def test_values_and_defaults_come_back(names: list[str]) -> None:
 
 @pytest.mark.parametrize("value", [INT32_MIN, INT32_MAX, -8388607, -4194305, 2139095041, 2143289343, 0, -1])
 def test_integers_are_packed_as_integers(value: int) -> None:
-    parameters = Parameters([Parameter(name="X", kind=Kind.INT, default=5, description="")])
+    parameters = Parameters([Parameter(name="X", kind=ParamType.INT, default=5, description="")])
     parameters.set("X", value)
     assert unpacked(packed(parameters, "withdefaults=1")) == ({"X": value}, {"X": 5})
 

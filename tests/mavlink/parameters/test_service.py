@@ -9,26 +9,26 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.parameters.service import ParameterService
-from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, ParamError, Parameter, Parameters
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, ParamError, Parameter, Parameters, ParamType
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 
 VEHICLE = Codec(1, AUTOPILOT_COMPONENT)
 STATION = Codec(245, 190)
 ME, OTHER = Peer(3, 245, 190), Peer(4, 255, 230)
 FRAME_US = 4_000
-INT32, REAL32 = int(Kind.INT), int(Kind.REAL)
+INT32, REAL32 = int(ParamType.INT), int(ParamType.REAL)
 
 
 def parameters_of(count: int = 0) -> Parameters:
-    many = [Parameter(name=f"MANY_{i:011}", kind=Kind.INT, default=i, description="") for i in range(count)]
-    limited = Parameter(name="LIMITED", kind=Kind.INT, default=1, minimum=0, maximum=2, description="")
+    many = [Parameter(name=f"MANY_{i:011}", kind=ParamType.INT, default=i, description="") for i in range(count)]
+    limited = Parameter(name="LIMITED", kind=ParamType.INT, default=1, minimum=0, maximum=2, description="")
     return Parameters(
         [
             *many,
-            Parameter(name="INTEGER", kind=Kind.INT, default=0, description=""),
-            Parameter(name="REAL", kind=Kind.REAL, default=0.5, minimum=-1e9, maximum=1e9, description=""),
+            Parameter(name="INTEGER", kind=ParamType.INT, default=0, description=""),
+            Parameter(name="REAL", kind=ParamType.REAL, default=0.5, minimum=-1e9, maximum=1e9, description=""),
             limited,
-            Parameter(name="FIXED", kind=Kind.REAL, default=1.0, description="", read_only=True),
+            Parameter(name="FIXED", kind=ParamType.REAL, default=1.0, description="", read_only=True),
         ]
     )
 

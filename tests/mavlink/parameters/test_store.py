@@ -8,20 +8,20 @@ import pytest
 from colibri.mavlink.parameters.store import (
     INT32_MAX,
     INT32_MIN,
-    Kind,
     ParamError,
     Parameter,
     Parameters,
+    ParamType,
     Prepared,
     Value,
     float32,
 )
 
-COUNT = Parameter(name="COUNT", kind=Kind.INT, default=3, minimum=-5, maximum=9, description="Of things")
-ANY = Parameter(name="ANY", kind=Kind.INT, default=0, description="Anything")
-SPEED = Parameter(name="SPEED", kind=Kind.REAL, default=0.1, minimum=0.1, maximum=0.7, description="Of it")
-TRACK = Parameter(name="TRACK", kind=Kind.INT, default=0, description="Which", values=((0, "Line"), (2, "Circle")))
-ID = Parameter(name="ID", kind=Kind.INT, default=7, description="Its own", read_only=True)
+COUNT = Parameter(name="COUNT", kind=ParamType.INT, default=3, minimum=-5, maximum=9, description="Of things")
+ANY = Parameter(name="ANY", kind=ParamType.INT, default=0, description="Anything")
+SPEED = Parameter(name="SPEED", kind=ParamType.REAL, default=0.1, minimum=0.1, maximum=0.7, description="Of it")
+TRACK = Parameter(name="TRACK", kind=ParamType.INT, default=0, description="Which", values=((0, "Line"), (2, "Circle")))
+ID = Parameter(name="ID", kind=ParamType.INT, default=7, description="Its own", read_only=True)
 
 
 @pytest.fixture
@@ -148,7 +148,7 @@ def test_loading_and_resetting(parameters: Parameters) -> None:
     ],
 )
 def test_a_parameter_that_cannot_be(change: dict[str, object]) -> None:
-    wanted = {"name": "COUNT", "kind": Kind.INT, "default": 3, "maximum": 9, "description": "", **change}
+    wanted = {"name": "COUNT", "kind": ParamType.INT, "default": 3, "maximum": 9, "description": "", **change}
     with pytest.raises(ValueError, match=r"name|default"):
         Parameter(**wanted)  # type: ignore[arg-type]
 

@@ -18,9 +18,9 @@ from colibri.mavlink.services.command import (
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     UNSUPPORTED_MAV_FRAME,
-    Command,
     CommandService,
     Handler,
+    ReceivedCommand,
 )
 from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
@@ -48,9 +48,9 @@ CALIBRATE: int = mav.MAV_CMD_PREFLIGHT_CALIBRATION
 class Vehicle:
     def __init__(self, refusal: Refusal | None = None) -> None:
         self.refusal = refusal
-        self.obeyed: list[Command] = []
+        self.obeyed: list[ReceivedCommand] = []
 
-    def __call__(self, command: Command) -> Refusal | None:
+    def __call__(self, command: ReceivedCommand) -> Refusal | None:
         self.obeyed.append(command)
         return self.refusal
 

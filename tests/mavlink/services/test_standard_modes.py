@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 
 from colibri.mavlink.node.service import Send
-from colibri.mavlink.services.command import FAILED, Command
+from colibri.mavlink.services.command import FAILED, ReceivedCommand
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.messages import FLOATS, GROUND, NAN, on_the_wire
@@ -20,14 +20,14 @@ class Vehicle:
     def __init__(self) -> None:
         self.flown: list[int] = []
 
-    def __call__(self, custom_mode: int, command: Command) -> Refusal | None:
+    def __call__(self, custom_mode: int, command: ReceivedCommand) -> Refusal | None:
         assert command.peer == GROUND
         self.flown.append(custom_mode)
         return None
 
 
-def command(p1: float = 0.0, p2: float = 0.0) -> Command:
-    return Command(0, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, GROUND, 0)
+def command(p1: float = 0.0, p2: float = 0.0) -> ReceivedCommand:
+    return ReceivedCommand(0, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, GROUND, 0)
 
 
 def asked(p2: float) -> list[Send]:

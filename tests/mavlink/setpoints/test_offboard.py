@@ -10,7 +10,7 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler
 from colibri.mavlink.setpoints.offboard import Offboard
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint, PositionSetpoint
-from colibri.mavlink.telemetry.snapshot import Home
+from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 from tests.support.streamed import FIRST, SECOND, message, messages
@@ -18,7 +18,7 @@ from tests.support.streamed import FIRST, SECOND, message, messages
 INF = float("inf")
 LOCAL, GLOBAL, ATTITUDE = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET"
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
-HOME = Home((3.0, 4.0, 2.0), 0.0)
+HOME = HomePosition((3.0, 4.0, 2.0), 0.0)
 PLACE = (10.0, 20.0, 5.0)
 HEADING = radians(150.0)
 ALL = {"x": 1.0, "y": 2.0, "z": -3.0, "vx": 4.0, "vy": 5.0, "vz": -6.0, "afx": 7.0, "afy": 8.0, "afz": -9.0}

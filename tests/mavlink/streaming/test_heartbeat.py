@@ -5,11 +5,11 @@ import pytest
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.identity import GENERIC, PX4, Identity
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from tests.support.messages import message, on_the_wire
 
-AT_REST = Snapshot(time_us=0, base_mode=mav.MAV_MODE_FLAG_GUIDED_ENABLED, custom_mode=(4 << 16) | (3 << 24))
+AT_REST = TelemetrySnapshot(time_us=0, base_mode=mav.MAV_MODE_FLAG_GUIDED_ENABLED, custom_mode=(4 << 16) | (3 << 24))
 
 
 def beats(service: HeartbeatService, from_us: int, until_us: int) -> list[tuple[int, Send]]:

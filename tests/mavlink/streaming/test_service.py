@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Peer, Send, to
-from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command
+from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, ReceivedCommand
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
-from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.messages import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
@@ -36,7 +36,7 @@ def flying(kind: str = SILENT) -> StreamService:
 
 def ask(stream: StreamService, command: int, p1: float, p2: float = 0.0, peer: Peer = GROUND) -> int:
     handler: Any = stream.handlers()[command]
-    refusal: Refusal | None = handler(Command(command, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, peer, 0))
+    refusal: Refusal | None = handler(ReceivedCommand(command, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, peer, 0))
     return ACCEPTED if refusal is None else refusal.result
 
 
@@ -182,7 +182,7 @@ def test_a_message_comes_on_request_to_whoever_asks() -> None:
 def test_what_is_not_known_yet_may_be_asked_for_later() -> None:
     stream = StreamService(TELEMETRY)
     assert ask(stream, REQUEST, ATTITUDE) == TEMPORARILY_REJECTED
-    stream.update(Snapshot(time_us=0))
+    stream.update(TelemetrySnapshot(time_us=0))
     assert ask(stream, REQUEST, HOME) == TEMPORARILY_REJECTED
     stream.update(FLYING)
     assert ask(stream, REQUEST, HOME) == ACCEPTED

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
+from colibri.mavlink.telemetry.snapshot import BatteryState, TelemetrySnapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import mav
 from tests.support.snapshots import ARBITRARY, FLYING, TELEMETRY, sent
@@ -178,11 +178,11 @@ def test_each_figure_of_the_solver_has_a_name() -> None:
 
 @pytest.mark.parametrize("name", ["HOME_POSITION", "BATTERY_STATUS", "WIND_COV", "TRAJECTORY_REPRESENTATION_WAYPOINTS"])
 def test_what_is_not_known_is_not_told(name: str) -> None:
-    assert TELEMETRY[name](Snapshot(time_us=0)) is None
+    assert TELEMETRY[name](TelemetrySnapshot(time_us=0)) is None
 
 
 def test_unknown_values_are_those_of_the_definition() -> None:
-    bare = Snapshot(time_us=0)
+    bare = TelemetrySnapshot(time_us=0)
     (status,) = sent("SYS_STATUS", bare)
     assert (status.voltage_battery, status.current_battery, status.battery_remaining) == (65535, -1, -1)
     (radio,) = sent("RC_CHANNELS", bare)
@@ -213,7 +213,7 @@ PREARM, GEOFENCE = mav.MAV_SYS_STATUS_PREARM_CHECK, mav.MAV_SYS_STATUS_GEOFENCE
 def test_arming_checks_and_the_fence_are_a_bit_each(
     changes: dict[str, Any], bit: int, enabled: bool, healthy: bool
 ) -> None:
-    (fields,) = sent("SYS_STATUS", Snapshot(time_us=0, **changes))
+    (fields,) = sent("SYS_STATUS", TelemetrySnapshot(time_us=0, **changes))
     assert bit == GEOFENCE or fields.onboard_control_sensors_present & bit
     assert bool(fields.onboard_control_sensors_enabled & bit) is enabled
     assert bool(fields.onboard_control_sensors_health & bit) is healthy
@@ -248,6 +248,6 @@ def test_unix_time_goes_on_from_the_start() -> None:
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
 @given(ARBITRARY)
-def test_whatever_the_snapshot_holds_nothing_raises(snapshot: Snapshot) -> None:
+def test_whatever_the_snapshot_holds_nothing_raises(snapshot: TelemetrySnapshot) -> None:
     for name in TELEMETRY:
         sent(name, snapshot)

@@ -12,7 +12,7 @@ from colibri.common.types import Array
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.flight_topics import DECISION, FLIGHT_TOPICS, TRUTH, Topic
-from colibri.mavlink.ulog.inputs import CHUNK_BYTES, InputRecord, Kind, encode_input
+from colibri.mavlink.ulog.inputs import CHUNK_BYTES, InputRecord, RecordKind, encode_input
 from colibri.mavlink.ulog.log import FileLog, MemoryLog, TopicLog, TopicReader
 from colibri.mavlink.ulog.reader import FlightFile, LogFormatError
 
@@ -32,7 +32,7 @@ def fill(log: TopicLog) -> None:
     for number in range(ROWS):
         for topic in FLIGHT_TOPICS:
             log.add(topic, rows_of(topic)[number].tolist())
-    log.append(encode_input(0, Kind.SETUP, b"{}"))
+    log.append(encode_input(0, RecordKind.SETUP, b"{}"))
     log.close()
 
 
@@ -56,7 +56,7 @@ def test_a_file_and_memory_have_the_same_rows(path: Path, tmp_path: Path) -> Non
     for log in (FlightFile(path), memory, FlightFile(saved)):
         for topic in FLIGHT_TOPICS:
             assert found(log, topic).tobytes() == rows_of(topic).tobytes()
-    assert list(FlightFile(saved).inputs()) == [InputRecord(0, Kind.SETUP, b"{}")]
+    assert list(FlightFile(saved).inputs()) == [InputRecord(0, RecordKind.SETUP, b"{}")]
 
 
 @given(numbers=st.lists(st.floats(), min_size=22, max_size=22), time_us=st.integers(0, 10**12))
@@ -77,11 +77,11 @@ def test_what_a_law_does_not_report_stays_not_a_number() -> None:
 @given(content=st.binary(max_size=3 * CHUNK_BYTES))
 def test_a_record_of_any_length_comes_back(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     log = tmp_path_factory.mktemp("log") / "flight.ulg"
-    records = [InputRecord(7, Kind.FRAME, content), InputRecord(9, Kind.DATAGRAM, b"")]
-    written = b"".join(encode_input(time_us, Kind(kind), each) for time_us, kind, each in records)
+    records = [InputRecord(7, RecordKind.FRAME, content), InputRecord(9, RecordKind.DATAGRAM, b"")]
+    written = b"".join(encode_input(time_us, RecordKind(kind), each) for time_us, kind, each in records)
     log.write_bytes(BEGINNING + written)
     assert list(FlightFile(log).inputs()) == records
-    log.write_bytes(BEGINNING + encode_input(7, Kind.FRAME, b"x" * 2 * CHUNK_BYTES)[:-1])
+    log.write_bytes(BEGINNING + encode_input(7, RecordKind.FRAME, b"x" * 2 * CHUNK_BYTES)[:-1])
     assert list(FlightFile(log).inputs()) == []
 
 

@@ -13,8 +13,8 @@ from pyulog import ULog
 
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
-from colibri.mavlink.telemetry.snapshot import BatteryState, EstimatorState, Setpoint, Snapshot, SolverState
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
+from colibri.mavlink.telemetry.snapshot import BatteryState, EstimatorState, Setpoint, SolverState, TelemetrySnapshot
 from colibri.mavlink.ulog import messages, samples, sensing, topics, truth
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Thinning
@@ -22,7 +22,7 @@ from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, TRUTH
 from colibri.mavlink.ulog.inputs import INPUT
 from colibri.mavlink.ulog.log import RowEncoder, TopicLog
 from colibri.mavlink.ulog.recorder import Recorder
-from colibri.mavlink.ulog.status import Status, nav_state, status_message
+from colibri.mavlink.ulog.status import VehicleStatus, nav_state, status_message
 
 BEGINNING = beginning("Test", {"AN_INT": 3, "A_FLOAT": 0.5})
 NUMBERS = np.random.default_rng(1)
@@ -182,20 +182,22 @@ def test_modes_have_px4s_numbers() -> None:
         14,
         31,
     ]
-    status = Status(armed=True, custom_mode=4 << 16 | 5 << 24, failsafe=True, armable=False, armed_us=5, takeoff_us=6)
+    status = VehicleStatus(
+        armed=True, custom_mode=4 << 16 | 5 << 24, failsafe=True, armable=False, armed_us=5, takeoff_us=6
+    )
     found = data(read(status_message(9, status, system_id=7)), topics.STATUS)
     names = "timestamp armed_time takeoff_time arming_state nav_state system_id failsafe pre_flight_checks_pass"
     assert fields(found, names) == [9, 5, 6, 2, 5, 7, 1, 0]
 
 
-def snapshot(time_us: int, **changes: Any) -> Snapshot:
+def snapshot(time_us: int, **changes: Any) -> TelemetrySnapshot:
     seen: dict[str, Any] = {"armed": True, "controls": (0.1, 0.2, 0.3, 0.4), "position_enu_m": (1.0, 2.0, 3.0)}
     battery = BatteryState(3, 11.5, 2.0, 0.5, 0.75, 600.0, 5.0, charge_state=2)
-    return Snapshot(time_us=time_us, battery=battery, **(seen | changes))
+    return TelemetrySnapshot(time_us=time_us, battery=battery, **(seen | changes))
 
 
 def test_a_vehicle_of_ground_stations_is_recorded() -> None:
-    parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
+    parameters = Parameters([Parameter(name="A", kind=ParamType.REAL, default=1.0, description="")])
     recorded = Appended()
     recorder = Recorder(recorded, "Test", 1, parameters, with_battery=True)
     recorded.append(recorder.begin())

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from colibri.plant.process.server import Pace
+from colibri.plant.process.server import FramePacer
 
 
 @pytest.mark.parametrize(
@@ -17,13 +17,13 @@ from colibri.plant.process.server import Pace
     ids=["by the wall clock", "a moment is caught up", "a long pause is not caught up"],
 )
 def test_when_frames_are_due(speed: float, asked: list[tuple[int, float, float]]) -> None:
-    pace = Pace(speed, 10.0)
+    pace = FramePacer(speed, 10.0)
     for time_us, now_s, due_s in asked:
         assert pace.due_s(time_us, now_s) == pytest.approx(due_s)
 
 
 def test_flat_out_every_frame_is_due_at_once() -> None:
-    pace = Pace(inf, 10.0)
+    pace = FramePacer(inf, 10.0)
     assert pace.due_s(0, 10.0) <= 10.0
     assert pace.due_s(1_000_000, 500.0) <= 500.0
     assert pace.due_s(2_000_000, 500.001) <= 500.001

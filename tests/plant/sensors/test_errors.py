@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from colibri.plant.environment.random_streams import Chance, Source, streams
+from colibri.plant.environment.random_streams import Chance, RandomStream, streams
 from colibri.plant.sensors.errors import GaussMarkov, Triad
 
 INTERVAL_S = 0.01
@@ -15,7 +15,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 def chance(seed: int = 0) -> Chance:
-    (stream,) = streams(seed, Source.SENSORS, 1)
+    (stream,) = streams(seed, RandomStream.SENSORS, 1)
     return stream
 
 
@@ -56,10 +56,14 @@ def test_a_drift_keeps_its_variance_and_forgets_in_its_time(elapsed_s: float) ->
 
 
 def test_streams_are_the_seeds_and_nobody_elses() -> None:
-    def first(seed: int, source: Source, count: int) -> list[list[float]]:
+    def first(seed: int, source: RandomStream, count: int) -> list[list[float]]:
         return [list(islice(stream, 2000)) for stream in streams(seed, source, count)]
 
-    assert first(7, Source.SENSORS, 3) == first(7, Source.SENSORS, 5)[:3]
-    everything = [*first(7, Source.SENSORS, 3), *first(8, Source.SENSORS, 3), *first(7, Source.WEATHER, 3)]
+    assert first(7, RandomStream.SENSORS, 3) == first(7, RandomStream.SENSORS, 5)[:3]
+    everything = [
+        *first(7, RandomStream.SENSORS, 3),
+        *first(8, RandomStream.SENSORS, 3),
+        *first(7, RandomStream.WEATHER, 3),
+    ]
     correlation = np.corrcoef(np.array(everything)) - np.eye(len(everything))
     assert np.abs(correlation).max() < 0.1

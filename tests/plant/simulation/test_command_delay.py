@@ -7,7 +7,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
-from colibri.plant.simulation.plant import Actuation, Plant
+from colibri.plant.simulation.plant import DelayedCommands, Plant
 from colibri.plant.vehicle.description import load_vehicle
 
 VEHICLE = load_vehicle("hummingbird").without(["battery"])
@@ -20,7 +20,7 @@ def command(share: float, armed: bool = True) -> ActuatorCommand:
 
 def test_the_last_that_has_arrived_is_followed() -> None:
     first, second, third = command(0.1), command(0.2), command(0.3)
-    actuation = Actuation(first)
+    actuation = DelayedCommands(first)
     actuation.arrive(10, second)
     actuation.arrive(14, third)
     assert list(actuation.spans(0, 8)) == [(first, 8)]
@@ -29,7 +29,7 @@ def test_the_last_that_has_arrived_is_followed() -> None:
 
 
 def test_an_overtaken_command_is_never_followed() -> None:
-    actuation = Actuation(command(0.0))
+    actuation = DelayedCommands(command(0.0))
     actuation.arrive(0, command(0.1))
     actuation.arrive(0, command(0.2))
     assert list(actuation.spans(0, 8)) == [(command(0.2), 8)]

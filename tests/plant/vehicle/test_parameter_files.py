@@ -12,7 +12,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, enu_of
 from colibri.common.types import Array, FourRotors
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.parameters.file import read
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world, state_frame
 from colibri.plant.sensors.suite import SensorSuite
@@ -127,7 +127,7 @@ def test_px4_parameters_warn_of_delay_and_rangefinder() -> None:
 def test_the_file_for_px4_is_one_of_qgroundcontrol(name: str) -> None:
     vehicle = load_vehicle(name)
     wanted = px4_parameters(vehicle)
-    kinds = {key: Kind.INT if isinstance(value, int) else Kind.REAL for key, value in wanted.items()}
+    kinds = {key: ParamType.INT if isinstance(value, int) else ParamType.REAL for key, value in wanted.items()}
     defined = [Parameter(name=key, kind=kind, default=0, description=key) for key, kind in kinds.items()]
     found = read(px4_file(vehicle, "by a test"), Parameters(defined))
     assert list(found) == list(wanted)

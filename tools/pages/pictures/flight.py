@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.experiments import fly
-from colibri.experiments.table import Table
+from colibri.experiments.table import SampleTable
 from colibri.plant.vehicle.description import load_vehicle
 
 LAP_S = 6.0
@@ -57,7 +57,7 @@ def _arms(axes: Any) -> list[Any]:
     return [axes.plot([], [], [], color=_BODY, lw=2.6, solid_capstyle="round")[0] for _ in range(2)]
 
 
-def _set_the_scene(axes: Any, table: Table) -> None:
+def _set_the_scene(axes: Any, table: SampleTable) -> None:
     lap = table[table["t"] >= FROM_S]
     axes.plot(lap["x_ref"], lap["y_ref"], lap["z_ref"], color=_TRACK, lw=1.0)
     axes.plot(lap["x_ref"], lap["y_ref"], np.zeros(len(lap)), color="#e3e8ee", lw=1.0)
@@ -70,7 +70,7 @@ def _set_the_scene(axes: Any, table: Table) -> None:
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
 
 
-def _lines_at(table: Table, first: int, last: int) -> list[Array]:
+def _lines_at(table: SampleTable, first: int, last: int) -> list[Array]:
     """Return shadow, trail, thrust and both arms, each as points in ENU, (n, 3), m."""
     trail = np.column_stack([table[axis][first : last + 1] for axis in "xyz"])
     row = table[last]

@@ -23,7 +23,7 @@ from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
-from colibri.view.observer import CHOICES, Observer
+from colibri.view.observer import CHOICES, VehicleObserver
 from colibri.view.page.page import Page
 from colibri.view.page.server import serve
 from colibri.view.run import WAITS_S, Show, read_flights
@@ -122,7 +122,7 @@ def fly_by_orders(vehicle: LiveVehicle) -> None:
     vehicle.order(lambda observer: observer.take_off(PLACES_M[0][2]))
     wait(lambda: vehicle.at(perf_counter()).position_enu_m[2] > PLACES_M[0][2] - NEAR_M)
     for place in PLACES_M:
-        vehicle.order(partial(Observer.go_to, place_enu_m=place))
+        vehicle.order(partial(VehicleObserver.go_to, place_enu_m=place))
         wait(partial(is_near, vehicle, place))
 
 
@@ -131,7 +131,7 @@ def is_near(vehicle: LiveVehicle, place: Vector) -> bool:
 
 
 def on_its_way(vehicle: LiveVehicle) -> float:
-    vehicle.order(partial(Observer.go_to, place_enu_m=PLACES_M[1]))
+    vehicle.order(partial(VehicleObserver.go_to, place_enu_m=PLACES_M[1]))
     sleep(ON_ITS_WAY_S)
     return perf_counter()
 

@@ -3,14 +3,14 @@
 from colibri.mavlink.wire.dialect import Message
 from colibri.sitl.ground_station import Station
 from colibri.sitl.vehicle import Sitl
-from colibri.view.observer import COMPONENT, SYSTEM, Observer
-from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings
+from colibri.view.observer import COMPONENT, SYSTEM, VehicleObserver
+from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape
 
 
 class Watching(Station):
-    """A station that feeds an `Observer`."""
+    """A station that feeds an `VehicleObserver`."""
 
-    observer: Observer
+    observer: VehicleObserver
 
     def add(self, message: Message) -> None:
         self.observer.receive(message.frame, self._flight.time_us / 1e6)
@@ -21,18 +21,18 @@ class Watching(Station):
         return super().departing(now_us)
 
 
-def watched(sitl: Sitl) -> Observer:
+def watched(sitl: Sitl) -> VehicleObserver:
     station = sitl.client(SYSTEM, COMPONENT, beats=False)
     station.__class__ = Watching
     assert isinstance(station, Watching)
-    station.observer = Observer()
+    station.observer = VehicleObserver()
     return station.observer
 
 
 class Watched:
     """A simulated flight as a live vehicle."""
 
-    airframe = Airframe()
+    airframe = VehicleShape()
     is_live = True
 
     def __init__(self, sitl: Sitl, name: str) -> None:

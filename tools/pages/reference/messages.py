@@ -12,7 +12,7 @@ import colibri.mavlink as mavlink_package
 from colibri.analysis.tables import markdown
 from colibri.autopilot.commander import commands, motion_commands
 from colibri.autopilot.ground import stations, system_commands
-from colibri.mavlink.mission.service import MissionService, Vehicle
+from colibri.mavlink.mission.service import MissionService, MissionVehicle
 from colibri.mavlink.services import standard_modes
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.streaming import service as streaming_service
@@ -61,7 +61,7 @@ def taken() -> dict[str, str]:
             handles = getattr(kind, "handles", None)
             if kind.__module__ == module.__name__ and isinstance(handles, frozenset):
                 found |= dict.fromkeys(handles, (getdoc(kind) or "").partition("\n\n")[0].replace("\n", " "))
-    nowhere = Vehicle(*([lambda *_: None] * len(Vehicle._fields)))  # type: ignore[arg-type]
+    nowhere = MissionVehicle(*([lambda *_: None] * len(MissionVehicle._fields)))  # type: ignore[arg-type]
     plans = MissionService({}, nowhere, StatusText())
     doc = (getdoc(MissionService) or "").partition(":")[0] + "."
     return found | dict.fromkeys(plans.handles, doc)

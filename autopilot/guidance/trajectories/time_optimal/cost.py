@@ -17,7 +17,7 @@ from colibri.autopilot.guidance.trajectories.minimum_snap import (
     powers,
     stiffness,
 )
-from colibri.autopilot.guidance.trajectories.reach import Motion, Reach
+from colibri.autopilot.guidance.trajectories.reach import Derivatives, Reach
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
 
@@ -110,7 +110,7 @@ class FlightCost:
 
     def _beyond(self, states: Array) -> Array:
         """Return the excess over each limit for velocity to snap, (demands, n)."""
-        demands = self._reach.demands(Motion(*states), self.charge_ah)
+        demands = self._reach.demands(Derivatives(*states), self.charge_ah)
         return np.stack([demand.beyond(self._margin) for demand in demands])
 
 

@@ -9,8 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS, limits, settings
-from colibri.autopilot.commander.rules.failsafe_rule import CLEAR_AFTER_US, Flight, Memory, Setting, Verdict, following
-from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, Row
+from colibri.autopilot.commander.rules.failsafe_rule import (
+    CLEAR_AFTER_US,
+    FailsafeDecision,
+    FailsafeMemory,
+    FailsafeSetting,
+    FlightState,
+    following,
+)
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, FailsafeRow
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
@@ -23,30 +30,30 @@ from tools.pages.tables import with_tables
 PAGE = Path(__file__).parents[4] / "docs" / "failsafes.md"
 SECOND_US = 1_000_000
 NOW_US = 100 * SECOND_US
-IN_FLIGHT = Flight(armed=True, standing=False, mode=Mode.MISSION, saving=Action.NONE)
-ARMED = Memory(armed=True)
+IN_FLIGHT = FlightState(armed=True, standing=False, mode=Mode.MISSION, saving=Action.NONE)
+ARMED = FailsafeMemory(armed=True)
 CONDITIONS = st.sampled_from(list(Condition))
 ACTIONS = st.sampled_from(list(Action))
 
 
-def everything(action: Action, delay_us: int = 0) -> dict[Condition, Setting]:
-    return dict.fromkeys(Condition, Setting(delay_us, action))
+def everything(action: Action, delay_us: int = 0) -> dict[Condition, FailsafeSetting]:
+    return dict.fromkeys(Condition, FailsafeSetting(delay_us, action))
 
 
-def begun(wanted: Mapping[Condition, Action], flight: Flight = IN_FLIGHT) -> Verdict:
-    set_to = {condition: Setting(0, wanted.get(condition, Action.NONE)) for condition in Condition}
+def begun(wanted: Mapping[Condition, Action], flight: FlightState = IN_FLIGHT) -> FailsafeDecision:
+    set_to = {condition: FailsafeSetting(0, wanted.get(condition, Action.NONE)) for condition in Condition}
     return following(ARMED, NOW_US, dict.fromkeys(wanted, NOW_US - SECOND_US), set_to, flight)
 
 
 def test_parameters_make_the_settings() -> None:
     parameters = Parameters(definitions(load_profile("flight"), load_vehicle("hummingbird")))
-    assert settings(parameters)[Condition.SETPOINTS_LOST] == Setting(SECOND_US, Action.HOLD)
-    assert settings(parameters)[Condition.STATION_LOST] == Setting(10 * SECOND_US, Action.NONE)
+    assert settings(parameters)[Condition.SETPOINTS_LOST] == FailsafeSetting(SECOND_US, Action.HOLD)
+    assert settings(parameters)[Condition.STATION_LOST] == FailsafeSetting(10 * SECOND_US, Action.NONE)
     parameters.set("NAV_DLL_ACT", 2)
     parameters.set("COM_DL_LOSS_T", 20.0)
     parameters.set("COM_LOW_BAT_ACT", 1)
     set_to = settings(parameters)
-    assert set_to[Condition.STATION_LOST] == Setting(20 * SECOND_US, Action.RETURN)
+    assert set_to[Condition.STATION_LOST] == FailsafeSetting(20 * SECOND_US, Action.RETURN)
     assert set_to[Condition.BATTERY_LOW].action is Action.RETURN
     assert set_to[Condition.BATTERY_CRITICAL].action is Action.LAND
     assert {number.name for number in NUMBERS} <= set(limits(parameters))
@@ -82,7 +89,7 @@ def test_nothing_that_begins_later_downgrades(each: list[tuple[Condition, Action
         if condition in since:
             continue
         since[condition] = NOW_US + step * 8000 - SECOND_US
-        set_to[condition] = Setting(0, action)
+        set_to[condition] = FailsafeSetting(0, action)
         flight = IN_FLIGHT._replace(mode=mode, saving=saving)
         memory, done, _ = following(memory, NOW_US + step * 8000, since, set_to, flight)
         saving = done if done is not Action.NONE else saving
@@ -107,7 +114,9 @@ def test_a_condition_must_outlast_its_delay(delay_us: int, held_us: int) -> None
     assert done is (Action.RETURN if held_us > delay_us else Action.NONE)
 
 
-def run(memory: Memory, seconds: float, since: Mapping[Condition, int], action: Action, flight: Flight) -> list[str]:
+def run(
+    memory: FailsafeMemory, seconds: float, since: Mapping[Condition, int], action: Action, flight: FlightState
+) -> list[str]:
     """Go on for so long; return all that is said, and keep `memory` in the last place."""
     said: list[str] = []
     for now_us in range(NOW_US, NOW_US + round(seconds * SECOND_US), 8000):
@@ -117,7 +126,7 @@ def run(memory: Memory, seconds: float, since: Mapping[Condition, int], action: 
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
-def test_the_end_of_a_condition_is_reported_once(row: Row) -> None:
+def test_the_end_of_a_condition_is_reported_once(row: FailsafeRow) -> None:
     memory = begun({row.condition: Action.HOLD}).memory
     assert run(memory, 3.0, {}, Action.HOLD, IN_FLIGHT) == ([] if row.kept else [f"{row.condition}: cleared"])
 
@@ -152,25 +161,25 @@ def test_on_the_ground_the_rotors_stop(condition: Condition, action: Action) -> 
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
-def test_disarmed_only_grounded_rows_are_reported(row: Row) -> None:
-    lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
-    _, done, said = following(Memory(), NOW_US, {row.condition: 0}, everything(Action.LAND), lying)
+def test_disarmed_only_grounded_rows_are_reported(row: FailsafeRow) -> None:
+    lying = FlightState(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
+    _, done, said = following(FailsafeMemory(), NOW_US, {row.condition: 0}, everything(Action.LAND), lying)
     assert done is Action.NONE
     assert bool(said) is row.grounded
     assert all(severity == WARNING for severity, _ in said)
 
 
 def test_all_that_holds_begins_anew_at_arming() -> None:
-    lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
+    lying = FlightState(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
     since, set_to = {Condition.BATTERY_LOW: 0}, everything(Action.RETURN)
-    memory = following(Memory(), NOW_US, since, set_to, lying).memory
+    memory = following(FailsafeMemory(), NOW_US, since, set_to, lying).memory
     assert Condition.BATTERY_LOW in memory.held_us
     assert following(memory, NOW_US + 8000, since, set_to, lying._replace(armed=True)).action is Action.TERMINATE
 
 
 def test_in_flight_conditions_end_with_the_flight() -> None:
     memory = begun({Condition.STATION_LOST: Action.LAND, Condition.GPS_LOST: Action.HOLD}).memory
-    lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
+    lying = FlightState(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
     after = following(memory, NOW_US + 8000, dict.fromkeys(Condition, 0), everything(Action.LAND), lying)
     assert set(after.memory.held_us) == {row.condition for row in TABLE if row.grounded}
     assert not any("cleared" in text for _, text in after.lines)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.lpv_mpc import feed_forward, model
-from colibri.autopilot.control.lpv_mpc.feed_forward import Flat, Guidance
+from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
 from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
@@ -23,7 +23,7 @@ PACKED = packed(MODEL)
 FROM_WRENCH = exact_inverse(MODEL.allocation)
 WIDE = ForceLimits(tan(1.2), 0.2, 19.0, 0.2)
 CALM = Disturbance(np.zeros(3), np.zeros(3))
-GUIDANCE = Guidance(
+GUIDANCE = Approach(
     k1_s2=30.0,
     k2_s=11.0,
     max_error_m=1.1,

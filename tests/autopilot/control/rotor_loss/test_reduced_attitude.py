@@ -13,7 +13,7 @@ from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.rotor_loss.reduced_attitude import (
     ReducedAttitude,
     ThreeRotorsError,
-    Weights,
+    Tolerances,
     balancing_thrust,
     trio_without,
 )
@@ -31,7 +31,7 @@ HOVER = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.
 
 
 def law(lost: int, vehicle: str = "hummingbird") -> ReducedAttitude:
-    return ReducedAttitude(load_vehicle(vehicle), lost, INTERVAL_S, FOLLOWS, SPIN_RAD_S, Weights())
+    return ReducedAttitude(load_vehicle(vehicle), lost, INTERVAL_S, FOLLOWS, SPIN_RAD_S, Tolerances())
 
 
 @pytest.mark.parametrize("vehicle", ["hummingbird", "iris"])

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
-from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, Observer, gains, observe
+from colibri.autopilot.control.vehicle_model.disturbance_observer import MEASURED, ObserverModel, gains, observe
 from colibri.common.jit import packed
 
 INTERVAL_S = 0.008
 AIRFRAME = Airframe(0.7, 9.81, 0.0, 0.0, 0.0)
 INERTIA = np.array([0.003, 0.004, 0.006])
-OBSERVER = Observer(*gains(9.0, INTERVAL_S), *gains(12.0, INTERVAL_S), 6.0, 0.3, AIRFRAME, INERTIA, INTERVAL_S)
+OBSERVER = ObserverModel(*gains(9.0, INTERVAL_S), *gains(12.0, INTERVAL_S), 6.0, 0.3, AIRFRAME, INERTIA, INTERVAL_S)
 HOVER = np.array([0.7 * 9.81, 0.0, 0.0, 0.0])
 NO_MOMENT = np.zeros(3)
 
 
-def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: Observer = OBSERVER) -> np.ndarray:
+def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: ObserverModel = OBSERVER) -> np.ndarray:
     """Let level thrust and a constant disturbance act, but for gyroscopic coupling, which the caller avoids."""
     measured = np.zeros(MEASURED)
     measured[8] = 1.0
@@ -62,7 +62,7 @@ def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
     now = before.copy()
     now[:3] += h * drag / 0.7
     now[3:6] += h * np.array(turn)
-    observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3, airframe, INERTIA, h)
+    observer = ObserverModel(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3, airframe, INERTIA, h)
     estimate = observe(np.concatenate([before[:6], np.zeros(6)]), before, now, HOVER, momentum, 0.7, packed(observer))
     assert estimate[:6] == pytest.approx(now[:6], abs=1e-11)
     assert estimate[6:] == pytest.approx(np.zeros(6), abs=1e-9)

@@ -17,7 +17,7 @@ from colibri.autopilot.guidance.mission.executor import (
 )
 from colibri.autopilot.guidance.mission.items import MISSION_RULES
 from colibri.autopilot.guidance.mission.legs import MissionContext
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Return, TakeOff
+from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Orbit, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.refusal import Refusal
@@ -110,7 +110,7 @@ def test_circling(radius: float, flown: float) -> None:
     flight = begun(item("NAV_LOITER_TURNS", (20.0, 0.0, 8.0), p1=2.0, p3=radius), item("NAV_RETURN_TO_LAUNCH"))
     flight.step()
     (order,) = flight.orders
-    assert isinstance(order, Circle)
+    assert isinstance(order, Orbit)
     assert order.radius_m == flown
     while not flight.reached:
         flight.step()
@@ -130,7 +130,7 @@ def test_a_stale_judgement_ends_nothing() -> None:
     flight.arrived = True
     flight.turns = 7.0
     flight.fly(MINUTE_S)
-    assert flight.kinds() == ["Circle", "Circle", "GoTo"]
+    assert flight.kinds() == ["Orbit", "Circle", "GoTo"]
     assert dist(from_home(flight), (90.0, 0.0, 5.0)) < 0.6
 
 

@@ -5,15 +5,17 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of, drag_force
-from colibri.autopilot.guidance.trajectories.reach import Motion, Reach
+from colibri.autopilot.guidance.trajectories.reach import Derivatives, Reach
 from colibri.plant.vehicle.description import load_vehicle
 
 VEHICLE = load_vehicle("hummingbird")
 
 
-def motion(velocity: tuple[float, float, float], acceleration: tuple[float, float, float], samples: int = 1) -> Motion:
+def motion(
+    velocity: tuple[float, float, float], acceleration: tuple[float, float, float], samples: int = 1
+) -> Derivatives:
     rows = [np.tile(np.array(row), (samples, 1)) for row in (velocity, acceleration, (0.0,) * 3, (0.0,) * 3)]
-    return Motion(*rows)
+    return Derivatives(*rows)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from colibri.view.page.page import Page
 from colibri.view.page.server import serve
 from colibri.view.run import Show
-from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings
+from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape
 
 pytestmark = pytest.mark.view
 HOSTILE = (
@@ -21,7 +21,7 @@ ADDS_HTML = "text => { const it = document.createElement('div'); it.innerHTML = 
 class Hostile:
     """A vehicle whose name and texts are HTML; a `Source`."""
 
-    is_live, span_s, airframe, surroundings = True, (0.0, 1.0), Airframe(), Surroundings()
+    is_live, span_s, airframe, surroundings = True, (0.0, 1.0), VehicleShape(), Surroundings()
 
     def __init__(self, name: str) -> None:
         self.name = name
