@@ -22,11 +22,12 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _MIN_FORCE = 0.05  # least demanded force in parts of the weight: a smaller one has no useful direction
+_SATURATING_RAD = 0.13  # least attitude error that may saturate the moments: at less, the loop is unstable in wind
 _MIN_LIFT = 0.5  # near the ground: least lift in parts of the weight, at which the target is level
 
 
 class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The natural frequencies of its three loops."""
+    """The natural frequencies of its three loops; those of position and attitude are scaled down for weak rotors."""
 
     control_interval_s: ControlInterval
     position_frequency_rad_s: Positive
@@ -52,9 +53,11 @@ class GeometricController:
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._inertia = np.array(vehicle.body.inertia_kg_m2)
-        self._k_position = square(settings.position_frequency_rad_s)
-        self._k_velocity = 2.0 * settings.position_frequency_rad_s
-        frequencies = np.array([settings.attitude_frequency_rad_s] * 2 + [settings.yaw_frequency_rad_s])
+        attitude_rad_s = min(settings.attitude_frequency_rad_s, _max_frequency_rad_s(vehicle))
+        position_rad_s = settings.position_frequency_rad_s * (attitude_rad_s / settings.attitude_frequency_rad_s)
+        self._k_position = square(position_rad_s)
+        self._k_velocity = 2.0 * position_rad_s
+        frequencies = np.array([attitude_rad_s] * 2 + [settings.yaw_frequency_rad_s])
         self._k_rotation = self._inertia * frequencies**2
         self._k_rate = self._inertia * 2.0 * frequencies
         self._mixer = Mixer(vehicle)
@@ -120,6 +123,13 @@ class GeometricController:
         gyroscopic = np.cross(rate, self._inertia * rate) - self._inertia * np.cross(rate, carried)
         moment: Array = feedback + gyroscopic
         return moment
+
+
+def _max_frequency_rad_s(vehicle: Vehicle) -> float:
+    """Return the natural frequency at which an error of `_SATURATING_RAD` takes all moment about roll or pitch."""
+    hover, full = square(vehicle.hover_speed), square(vehicle.rotors.max_speed)
+    moments_n_m = np.abs(vehicle.allocation()[1:3]).sum(axis=1) * max(min(hover, full - hover), 0.1 * full)
+    return float(np.sqrt((moments_n_m / np.array(vehicle.body.inertia_kg_m2[:2])).min() / _SATURATING_RAD))
 
 
 def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> AttitudeTarget:

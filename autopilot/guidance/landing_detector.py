@@ -6,7 +6,7 @@ from typing import NamedTuple
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.elementary import acos
 
-_BELOW_M = 0.15
+_BELOW_M, _FAR_BELOW_M = 0.15, 1.0
 _STILL_M_S = 0.15
 _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
@@ -46,18 +46,21 @@ _MOVES = Landing()
 
 
 def watch(
-    landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
+    landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False, slides: bool = False
 ) -> tuple[Landing, bool]:
     """Return the state, and whether the vehicle stands: still for long while it `sinks`.
 
     If the velocity estimate `drifts`, as without GPS, only its changes count: at half thrust the vehicle would
-    accelerate, so a constant climb rate means that the ground holds it.
+    accelerate, so a constant climb rate means that the ground holds it. If wind `slides` it along the ground, only its
+    climb rate counts.
     """
     if not sinks:
         return _MOVES, False
     climb_m_s = state.velocity_enu_m_s[2]
     if drifts:
         still, for_us = abs(climb_m_s - landing.climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
+    elif slides:
+        still, for_us = abs(climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
     else:
         still, for_us = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S, _FOR_US
     if max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
@@ -116,6 +119,11 @@ class Hardest(NamedTuple):
 
 def is_below(height_m: float, state: VehicleState) -> bool:
     return height_m < state.position_enu_m[2] - _BELOW_M
+
+
+def is_far_below(height_m: float, state: VehicleState) -> bool:
+    """Whether a reference has sunk so far below that only the ground can hold the vehicle."""
+    return height_m < state.position_enu_m[2] - _FAR_BELOW_M
 
 
 def is_held_down(wanted_m: float, state: VehicleState, ground_m: float) -> bool:

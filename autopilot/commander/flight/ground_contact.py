@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.landing_detector import (
     Lack,
     Landing,
     is_clear,
+    is_far_below,
     is_held_down,
     watch,
 )
@@ -98,7 +99,9 @@ class GroundContact:
         if self._lack.lack_s < SUSPECTED_S:
             self._hardest = self._hardest.after(now_us, vehicle)
         fell = not sinks and self._hardest.is_recent(now_us) and is_held_down(wanted_m, vehicle, self.height_m)
-        self._landing, stands = watch(self._landing, now_us, vehicle, sinks or fell, drifts=drifts)
+        self._landing, stands = watch(
+            self._landing, now_us, vehicle, sinks or fell, drifts=drifts, slides=is_far_below(wanted_m, vehicle)
+        )
         if stands:
             self.land(now_us)
         return stands and fell

@@ -170,10 +170,13 @@ def test_the_battery_is_counted_across_flights(sitl: Sitl) -> None:
     assert consumed_mah > 15
 
 
-@pytest.mark.parametrize("wind", ["2@0", "7@90", "12@215"])
+@pytest.mark.parametrize(
+    ("vehicle", "wind"),
+    [("hummingbird", "2@0"), ("hummingbird", "7@90"), ("hummingbird", "12@215"), ("iris", "10@217"), ("iris", "12@37")],
+)
 @pytest.mark.sitl(controller="geometric-se3", airborne=1.0)
-def test_geometric_law_lands_upright_in_wind(sitl_fleet: Callable[..., list[Sitl]], wind: str) -> None:
-    (sitl,) = sitl_fleet(1, wind=wind)
+def test_geometric_law_lands_upright_in_wind(sitl_fleet: Callable[..., list[Sitl]], vehicle: str, wind: str) -> None:
+    (sitl,) = sitl_fleet(1, wind=wind, vehicle=vehicle)
     sitl.run(1.0)
     sitl.land()
     sitl.run(1.0)
