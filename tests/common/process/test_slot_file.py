@@ -76,7 +76,6 @@ def test_arrays_are_plain_and_other_things_are_not() -> None:
 
 
 def test_the_disk_has_room_for_all_of_it_from_the_start(tmp_path: Path) -> None:
-    """A page without any would be a SIGBUS in flight."""
     path = tmp_path / "slots"
     path.write_bytes(b"")
     os.truncate(path, 2 * SLOT)  # all of it a hole
@@ -85,3 +84,15 @@ def test_the_disk_has_room_for_all_of_it_from_the_start(tmp_path: Path) -> None:
     for each in (path, tmp_path / "new"):
         with each.open("rb") as file:
             assert os.lseek(file.fileno(), 0, os.SEEK_HOLE) == 2 * SLOT
+
+
+def test_a_truncated_file_is_written_again(tmp_path: Path) -> None:
+    """Where the file was mapped, the next write ended the process by SIGBUS."""
+    path = tmp_path / "flight"
+    slots = Slots(path)
+    for size, content in ((0, b"one"), (SLOT + 5, b"two"), (3, b"three")):
+        os.truncate(path, size)
+        assert slots.newest() in (None, b"one")
+        assert slots.write(content)
+        assert slots.newest() == content
+    assert opened(path) is None  # its size says that it was cut
