@@ -8,10 +8,10 @@ from pathlib import Path
 _NOT_REGULAR = "is a FIFO, device or socket: a regular file is required"
 
 
-def regular(path: str, flags: int) -> int:
+def regular(path: str, flags: int, mode: int = 0o666) -> int:
     """Open a regular file, as `opener` of `open`; OSError for anything else."""
     try:
-        file = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+        file = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, mode)
     except OSError as error:
         if error.errno != ENXIO:  # a FIFO without a reader
             raise
@@ -25,6 +25,11 @@ def regular(path: str, flags: int) -> int:
             else OSError(EINVAL, _NOT_REGULAR, path)
         )
     return file
+
+
+def private(path: str, flags: int) -> int:
+    """Open a regular file as `regular`, and create it for its owner only."""
+    return regular(path, flags, 0o600)
 
 
 def read_bytes(path: Path) -> bytes:

@@ -239,8 +239,8 @@ class Copter:
         received = next(arriving, None)
         if received is None:
             return False
-        datagram, link, address, loopback = received
-        self.stations.hub.receive(datagram, link, address, now_us, loopback=loopback)
+        datagram, link, address, owner = received
+        self.stations.hub.receive(datagram, link, address, now_us, owner=owner)
         return True
 
     def _refuse(self, inbox: Iterable[Received]) -> list[Outgoing]:

@@ -72,9 +72,9 @@ def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_
 
 
 class Received(NamedTuple):
-    """A datagram of a ground station: on which link, from which address, and whether from this computer."""
+    """A datagram of a ground station: on which link, from which address, and whether it may set up signing."""
 
     datagram: bytes
     link: int
     address: tuple[str, int] | None
-    loopback: bool = True
+    owner: bool = True

@@ -151,6 +151,7 @@ class Stations:
             signing=settings.signing,
             observers=(self._streams,),
             caught=defence.caught,
+            warn=lambda text: lines.say(WARNING, text),
             budget=budget,
         )
         self.snapshot: TelemetrySnapshot | None = None

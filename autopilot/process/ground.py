@@ -60,9 +60,11 @@ class GroundService:
             vehicle,
             system_id=spec.system_id,
             signing_key=spec.signing_key,
-            tick=tick_at(time()),
+            clock=lambda: tick_at(time()),
             params=spec.params,
         )
+        for warning in self._state.warnings:
+            status.say("said", f"warning: {warning}")
         self._boot_unix_us = spec.boot_unix_us
         if not (spec.boot_unix_us or spec.stepped):  # what is stepped is the same at every hour
             self._boot_unix_us = round(time() * 1e6)

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from ipaddress import ip_address
 from typing import Any
 
 from colibri.autopilot.control.interface import Clock
@@ -10,7 +9,7 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import Stations
 from colibri.common.types import Address
 from colibri.mavlink.links.link import GroundLink, LinkError
-from colibri.mavlink.links.open import beyond_loopback, check_reach, is_serial, open_ground_link
+from colibri.mavlink.links.open import calls_this_computer, check_reach, open_ground_link
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.node.router import Source
@@ -66,14 +65,17 @@ class Allowance:
 
 
 class GroundLinks:
-    """Carries datagrams between links and a vehicle's hub."""
+    """Carries datagrams between links and a vehicle's hub.
+
+    The owner of the vehicle is who it calls first, on this computer: any program and some web pages reach a port that
+    waits, and whoever sets up the key locks out all others.
+    """
 
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
         self._allowance = Allowance(clock, processor_clock)
-        self._loopback = [not (is_serial(link.url) or beyond_loopback(link.url)) for link in links]
-        self._serial = [is_serial(link.url) for link in links]
+        self._owner = bool(links) and calls_this_computer(links[0].url)
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
         self._clock = clock
@@ -110,7 +112,7 @@ class GroundLinks:
                 if not self._allowance.begin():
                     return
                 datagram, address = waiting.popleft()
-                yield Received(datagram, number, address, self._is_loopback(number, address))
+                yield Received(datagram, number, address, self._owner and number == 0)
                 self._allowance.end()
 
     def _forget(self, stations: Stations, number: int, address: Address) -> None:
@@ -164,8 +166,3 @@ class GroundLinks:
     def close(self) -> None:
         for link in self._links:
             link.close()
-
-    def _is_loopback(self, number: int, address: Address) -> bool:
-        if self._serial[number]:
-            return False  # nobody knows what is at its other end
-        return self._loopback[number] or ip_address(address[0]).is_loopback

@@ -111,8 +111,8 @@ class AutopilotLog:
         """Record and yield datagrams; raise LogError after the last."""
         failed: LogError | None = None
         for received in datagrams:
-            datagram, link, address, loopback = received
-            entry = ReceivedDatagram(link=link, address=address, loopback=loopback, datagram=datagram)
+            datagram, link, address, owner = received
+            entry = ReceivedDatagram(link=link, address=address, loopback=owner, datagram=datagram)
             try:
                 self.topics.append(encode_input(self._time_us, RecordKind.DATAGRAM, encoded(entry)))
             except LogError as error:

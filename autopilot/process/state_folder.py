@@ -1,6 +1,6 @@
 """The folder of --state: parameters, key, files, logs, plans, flight."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from colibri.autopilot.control.profile import Profile
@@ -8,7 +8,7 @@ from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.errors import unknown
-from colibri.common.files import read_bytes, read_text, write_bytes
+from colibri.common.files import private, read_bytes, read_text, regular
 from colibri.common.process.folder_lock import FolderLock
 from colibri.common.process.slot_file import Slots
 from colibri.common.serialization import of_bytes, to_bytes
@@ -17,7 +17,7 @@ from colibri.mavlink.files.tree import Quota
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.parameters.file import ParameterFileError, read, write
 from colibri.mavlink.parameters.store import Parameters, Value
-from colibri.mavlink.wire.signing import Signing, SigningError, parse_key
+from colibri.mavlink.wire.signing import Signing, SigningError, read_key
 from colibri.plant.vehicle.description import Vehicle
 
 KEY = "signing.key"
@@ -44,16 +44,20 @@ class StateFolder:
         *,
         system_id: int,
         signing_key: Path | None,
-        tick: int,
+        clock: Callable[[], int],
         params: Mapping[str, float] = {},
     ) -> None:
-        """Open the folder, or raise FolderInUseError or GroundError; `params` are initial values."""
+        """Open the folder, or raise FolderInUseError or GroundError.
+
+        `clock` is the wall clock of signatures, `params` are initial values.
+        """
         self._path = path
         self._profile = profile
         self._vehicle = vehicle
         self._system_id = system_id
         self._params = params
-        self.signing = Signing(self._read_key(signing_key), max(self._read_timestamp(), tick))
+        self.warnings: list[str] = []
+        self.signing = Signing(self._read_key(signing_key), clock, self._read_timestamp())
         try:
             self._lock = FolderLock(path, "--state") if path else None
             self.files = Folder(path / FILES) if path else None
@@ -126,8 +130,7 @@ class StateFolder:
             if key is None:
                 (self._path / KEY).unlink(missing_ok=True)
             else:
-                _replace(self._path / KEY, key)
-                (self._path / KEY).chmod(0o600)
+                _replace(self._path / KEY, key, private)
 
     def close(self) -> None:
         for kept in (self.files, self.logs, self._flight, self._lock):
@@ -146,11 +149,16 @@ class StateFolder:
         if path is None and self._path and (self._path / KEY).exists():
             path = self._path / KEY
         try:
-            return None if path is None else parse_key(read_bytes(path))
+            if path is None:
+                return None
+            key, warning = read_key(path)
         except OSError as error:
             raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
         except SigningError as error:
             raise GroundError(f"signing key {path}: {error}") from error
+        if warning:
+            self.warnings.append(f"signing key {path}: {warning}")
+        return key
 
     def _read_timestamp(self) -> int:
         """Return the last timestamp, because signatures must not repeat one."""
@@ -167,12 +175,15 @@ class StateFolder:
             raise GroundError(f"{path}: not a whole number; remove it once the clock is right") from error
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, content: bytes, opener: Callable[[str, int], int] = regular) -> None:
     """Write a file atomically; ignore errors."""
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(new, content)
+        if opener is private:
+            new.unlink(missing_ok=True)  # whoever has it open would read the key
+        with open(new, "wb", opener=opener) as file:
+            file.write(content)
         new.replace(path)
     except OSError:
         return

@@ -12,7 +12,7 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track, track_through
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
-from colibri.common.files import read_bytes, regular
+from colibri.common.files import regular
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
 from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
@@ -30,7 +30,7 @@ from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.flights.folder import occupied
 from colibri.mavlink.links.link import GroundLink
 from colibri.mavlink.links.open import check_reach, open_ground_link
-from colibri.mavlink.wire.signing import Signing, SigningError, parse_key, tick_at
+from colibri.mavlink.wire.signing import Signing, SigningError, read_key, tick_at
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 LOG, REPORT, RESPONSE, FIGURE = "companion.csv", "report.json", "companion.toml", "identification.png"
@@ -104,7 +104,7 @@ def _track_name(args: Namespace) -> str:
 def fly(args: Namespace) -> int:
     try:
         plan = plan_of(args)
-        signing = _signing(args.signing_key)
+        signing, warning = _signing(args.signing_key)
         check_reach([args.vehicle], signed=signing is not None, insecure=args.insecure)
         wire = _Wire(open_ground_link(args.vehicle))
     except Error as error:
@@ -119,8 +119,9 @@ def fly(args: Namespace) -> int:
         fail(str(error))
     companion.peer.client.sign_with(signing)
     status = Silent() if args.quiet else Status("companion", as_json=False)
-    if plan.note:
-        status.say("note", plan.note)
+    for note in (warning, plan.note):
+        if note:
+            status.say("note", note)
     with occupied(args.out):
         summary = FlightSummary()
         try:
@@ -215,13 +216,15 @@ class _Log:
         companion.rows.clear()
 
 
-def _signing(path: Path | None) -> Signing | None:
+def _signing(path: Path | None) -> tuple[Signing | None, str]:
+    """Return the signing of a key file, and a warning if others can read the key."""
     if path is None:
-        return None
+        return None, ""
     try:
-        return Signing(parse_key(read_bytes(path)), tick_at(time()))
+        key, warning = read_key(path)
     except (OSError, SigningError) as error:
         raise CompanionError(f"--signing-key {path}: {getattr(error, 'strerror', error)}") from error
+    return Signing(key, lambda: tick_at(time())), warning and f"--signing-key {path}: {warning}"
 
 
 def _identify(companion: Companion, status: Status, out: Path) -> None:

@@ -105,7 +105,6 @@ class Client:
         self._kind, self._only, self._all_components = kind, only, all_components
         self._heartbeat_at_us: int | None = None
         self._signing: Signing | None = None
-        self._now_us = 0
         self._lanes: dict[Hashable, list[Conversation]] = {}
         self._events: deque[Event] = deque(maxlen=_EVENTS)
 
@@ -115,7 +114,7 @@ class Client:
 
     def sign_with(self, signing: Signing | None) -> None:
         self._signing = signing
-        self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
+        self._codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0)
 
     def begin(self, conversation: Talk) -> Talk:
         """Queue a conversation: its first request is sent at the next poll when its lane is free."""
@@ -134,7 +133,6 @@ class Client:
         return self._codec.encode(name, *fields)
 
     def receive(self, datagram: bytes, now_us: int) -> list[Message]:
-        self._now_us = now_us
         messages = []
         for message in self._codec.decode(datagram):
             system, component = message.source
@@ -142,7 +140,7 @@ class Client:
             if not (is_autopilot or self._all_components) or self._only not in (0, system):
                 continue
             if self._signing is not None:
-                refusal = self._signing.refusal(message.name, message.frame, now_us)
+                refusal = self._signing.refusal(message.name, message.frame)
                 if refusal is not None:
                     self.dropped[refusal] += 1
                     continue
@@ -154,7 +152,6 @@ class Client:
         return messages
 
     def poll(self, now_us: int) -> list[bytes]:
-        self._now_us = now_us
         datagrams = []
         if self._heartbeat_every_us is not None and now_us >= (self._heartbeat_at_us or now_us):
             self._heartbeat_at_us = now_us + self._heartbeat_every_us
@@ -170,7 +167,6 @@ class Client:
     def poll_requests(self, now_us: int) -> list[bytes]:
         if not self._lanes:
             return []
-        self._now_us = now_us
         datagrams = []
         for conversation in [lane[0] for lane in self._lanes.values()]:
             datagrams += [self._codec.encode(name, *fields) for name, fields in conversation.poll(now_us)]

@@ -53,6 +53,11 @@ def beyond_loopback(url: str) -> bool:
     return not ip_address(_resolved(url, host)).is_loopback
 
 
+def calls_this_computer(url: str) -> bool:
+    """Whether an endpoint exchanges datagrams with one address only, of this computer."""
+    return url.startswith(("udpout:", "tcp:")) and not beyond_loopback(url)
+
+
 def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
     """Require a key or `insecure` for each URL that reaches the network."""
     for url in urls:

@@ -10,7 +10,7 @@ from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.router import Router, target_of
 from colibri.mavlink.node.service import IDLE, Peer, PolledService, Send, Service
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
-from colibri.mavlink.wire.signing import Signing
+from colibri.mavlink.wire.signing import TOO_EARLY, Signing
 
 CHANNELS = 32
 """Limit of open channels; the longest silent one that is not fixed is replaced."""
@@ -29,6 +29,13 @@ _TRIES = 3
 """Exceptions in `poll` before a service is switched off."""
 Caught: TypeAlias = Callable[[str, Exception, str], None]
 """(service, exception, consequence): reports an exception of a service."""
+WARN_EVERY_US = 10_000_000
+"""Interval of the warning of a refused key or signature."""
+FUTURE = "a signature is ahead of this computer's clock by more than 30 s: set the sender's clock"
+KEY_REFUSED = (
+    "a signing key is refused: it is taken from the first --gcs only, if that is udpout: or tcp: to this computer; "
+    "or start with --signing-key FILE"
+)
 
 
 class Outgoing(NamedTuple):
@@ -59,6 +66,7 @@ class Hub:
         signing: Signing | None = None,
         observers: Sequence[ChannelObserver] = (),
         caught: Caught | None = None,
+        warn: Callable[[str], None] | None = None,
         budget: Budget | None = None,
     ) -> None:
         """Create a component; without `caught` services' exceptions are raised.
@@ -84,7 +92,8 @@ class Hub:
         self._now_us = 0
         self._tidy_at_us = 0
         self._dropped_before: Counter[str] = Counter()
-        self._caught = caught
+        self._caught, self._warn = caught, warn
+        self._warn_at_us: dict[str, int] = {}
         self._raised: Counter[Service] = Counter()
 
     @property
@@ -110,9 +119,8 @@ class Hub:
         if number is not None:
             self._forget(number)
 
-    def receive(
-        self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
-    ) -> None:
+    def receive(self, datagram: bytes, link: int, address: Address | None, now_us: int, *, owner: bool = True) -> None:
+        """Handle a datagram; an `owner` may set up signing."""
         self._now_us = now_us
         number = self._numbers.get((link, address), self._numbers.get((link, None)))
         channel = None if number is None else self._channels[number]
@@ -126,7 +134,7 @@ class Hub:
             if channel is None:
                 codec.dropped["no room"] += 1
                 continue
-            self._take_in(message, channel, loopback)
+            self._take_in(message, channel, owner)
 
     def work(self, now_us: int) -> None:
         """Handle the messages that wait, one of each channel in turn, as far as the budget allows."""
@@ -183,9 +191,12 @@ class Hub:
             return "stranger"
         if self._signing is None:
             return None
-        return self._signing.refusal(message.name, message.frame, self._now_us)
+        reason = self._signing.refusal(message.name, message.frame)
+        if reason is TOO_EARLY:
+            self._warn_of(FUTURE)
+        return reason
 
-    def _take_in(self, message: Message, channel: Channel, loopback: bool) -> None:
+    def _take_in(self, message: Message, channel: Channel, owner: bool) -> None:
         if message.name == UNKNOWN:  # its CRC may be wrong, so nothing is learned from it
             self._forward(message, (0, 0), channel)
             return
@@ -193,7 +204,7 @@ class Hub:
         self._router.receive(message.source, channel.number)
         target = target_of(message.fields)
         if message.name == "SETUP_SIGNING":  # "must never be automatically forwarded", message_signing.html
-            self._set_up_signing(message, target, channel, loopback)
+            self._set_up_signing(message, target, channel, owner)
             return
         self._forward(message, target, channel)
         if self._router.concerns_us(target) and message.name in self._receivers:
@@ -245,24 +256,31 @@ class Hub:
         for number in self._router.onward(message.source, target, channel.number):
             self._channels[number].say(message.frame)
 
-    def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, loopback: bool) -> None:
-        """Obey SETUP_SIGNING from this computer to this component: it "should never be broadcast"."""
+    def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, owner: bool) -> None:
+        """Obey SETUP_SIGNING of the owner to this component: it "should never be broadcast"."""
         fields, signing = message.fields, self._signing
         addressed = target[0] == self._own[0] and self._router.concerns_us(target)
-        if not (signing and loopback and addressed):
+        if addressed and not owner:
+            self._warn_of(KEY_REFUSED)
+        if not (signing and owner and addressed) or not signing.set_up(
+            bytes(fields.secret_key), fields.initial_timestamp
+        ):
             channel.codec.dropped["signing not set up"] += 1
             return
-        if not signing.set_up(bytes(fields.secret_key), fields.initial_timestamp, self._now_us):
-            channel.codec.dropped["signing not set up"] += 1
         for each in self._channels.values():
             self._seal(each)
+
+    def _warn_of(self, text: str) -> None:
+        if self._warn is not None and self._now_us >= self._warn_at_us.get(text, 0):
+            self._warn_at_us[text] = self._now_us + WARN_EVERY_US
+            self._warn(text)
 
     def _seal(self, channel: Channel) -> None:
         signing = self._signing
         if signing is None or not signing.active:
             channel.codec.seal = None
         else:
-            channel.codec.seal = lambda frame: signing.sign(frame, channel.number, self._now_us)
+            channel.codec.seal = lambda frame: signing.sign(frame, channel.number)
 
     def _admit(self, link: int, address: Address | None) -> Channel | None:
         if len(self._channels) >= CHANNELS:

@@ -4,9 +4,14 @@ Specification: https://mavlink.io/en/guide/message_signing.html. All components 
 is 13 bytes after the frame: link id, timestamp, and the first 48 bits of the SHA-256 of key and all preceding bytes.
 """
 
+import os
+import stat
+from collections.abc import Callable
 from hashlib import sha256
 from hmac import compare_digest
+from pathlib import Path
 
+from colibri.common.files import regular
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED
 
@@ -18,6 +23,9 @@ EPOCH_S = 1_420_070_400
 LAST_TICK = (1 << 48) - 1
 NEW_STREAM_TICKS = 6_000_000
 """One minute: greatest lag of a new stream behind the own timestamp."""
+AHEAD_TICKS = 3_000_000
+"""Half a minute: greatest lead before the own clock. It is less, so that no accepted stamp keeps out a right clock."""
+TOO_EARLY = "signed in the future"
 STREAMS = 1024
 
 _TIMESTAMP_BYTES = 6
@@ -48,6 +56,15 @@ def parse_key(content: bytes) -> bytes:
     return key
 
 
+def read_key(path: Path) -> tuple[bytes, str]:
+    """Return the key of a file, and a warning if others can read it; a key that others can write is refused."""
+    with open(path, "rb", opener=regular) as file:
+        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode) if os.name == "posix" else 0o600
+        if mode & stat.S_IWOTH:
+            raise SigningError(f"anybody can write it (mode {mode:04o}): make a new key, and chmod 600 the file")
+        return parse_key(file.read()), f"mode {mode:04o} lets others use the key: chmod 600" if mode & 0o077 else ""
+
+
 def tick_at(unix_s: float) -> int:
     return min(max(round((unix_s - EPOCH_S) * 1e6 / TICK_US), 0), LAST_TICK)
 
@@ -55,17 +72,16 @@ def tick_at(unix_s: float) -> int:
 class Signing:
     """Verifies and signs frames; without a key, accepts all and signs none.
 
-    The own timestamp advances with simulated time, each signed frame and each later accepted one; it never decreases.
+    The own timestamp follows the clock, each signed frame and each later accepted one; it never decreases.
     """
 
-    def __init__(self, key: bytes | None, start: int, now_us: int = 0) -> None:
-        """Begin at timestamp `start`: the later of the wall clock's and the stored one."""
+    def __init__(self, key: bytes | None, clock: Callable[[], int], stored: int = 0) -> None:
+        """Begin at the later of the wall `clock`'s time and the `stored` one, in ticks."""
         self._key = _NO_KEY if key is None else key
-        start = min(max(start, 0), LAST_TICK)
-        self._start = start - now_us // TICK_US
+        self._clock = clock
         self._streams: dict[tuple[int, int, int], int] = {}
         self._forgotten = -1
-        self.timestamp = start  # ticks; to be stored for the next start
+        self.timestamp = min(max(stored, clock()), LAST_TICK)  # ticks; to be stored for the next start
         self.key_changed = False  # by SETUP_SIGNING; the owner may reset this
 
     @property
@@ -76,44 +92,44 @@ class Signing:
     def key(self) -> bytes | None:
         return self._key if self.active else None
 
-    def sign(self, frame: bytes, link_id: int, now_us: int) -> bytes:
+    def sign(self, frame: bytes, link_id: int) -> bytes:
         """Return the signature of `frame`, which already has the flag."""
-        self._advance(now_us)
-        self.timestamp = min(self.timestamp + 1, LAST_TICK)
+        self.timestamp = min(max(self.timestamp, self._clock()) + 1, LAST_TICK)
         head = bytes([link_id & 0xFF]) + self.timestamp.to_bytes(_TIMESTAMP_BYTES, "little")
         return head + self._digest(frame + head)
 
-    def refusal(self, name: str, frame: bytes, now_us: int) -> str | None:
+    def refusal(self, name: str, frame: bytes) -> str | None:
         if not self.active:
             return None
         if frame[0] != MARKER or not frame[_FLAGS_AT] & SIGNED:
             return None if name in _NEVER_SIGNED else "unsigned"
-        self._advance(now_us)
         if not compare_digest(self._digest(frame[:-_DIGEST_BYTES]), frame[-_DIGEST_BYTES:]):
             return "bad signature"
         timestamp = int.from_bytes(frame[-_DIGEST_BYTES - _TIMESTAMP_BYTES : -_DIGEST_BYTES], "little")
         stream = (frame[_SYSTEM_AT], frame[_COMPONENT_AT], frame[-SIGNATURE_BYTES])
-        if timestamp <= self._streams.get(stream, self._oldest_of_a_new_stream() - 1):
+        now = self._clock()
+        if timestamp > now + AHEAD_TICKS:
+            return TOO_EARLY
+        self.timestamp = max(self.timestamp, now)
+        if timestamp <= self._streams.get(stream, self._oldest_of_a_new_stream(now) - 1):
             return "replayed"
         self._remember(stream, timestamp)
         self.timestamp = max(self.timestamp, timestamp)
         return None
 
-    def set_up(self, key: bytes, initial_timestamp: int, now_us: int) -> bool:
+    def set_up(self, key: bytes, initial_timestamp: int) -> bool:
         """Apply SETUP_SIGNING (zeros turn signing off); return whether its values are valid."""
-        if len(key) != KEY_BYTES or not 0 <= initial_timestamp < LAST_TICK:
+        now = self._clock()
+        if len(key) != KEY_BYTES or not 0 <= initial_timestamp <= now + AHEAD_TICKS:
             return False
-        self._advance(now_us)
         self.key_changed |= key != self._key
         self._key = key  # streams are kept: an old key may come back, and what it signed must not
-        self.timestamp = max(self.timestamp, initial_timestamp)
+        self.timestamp = max(self.timestamp, now, initial_timestamp)
         return True
 
-    def _advance(self, now_us: int) -> None:
-        self.timestamp = min(max(self.timestamp, self._start + now_us // TICK_US), LAST_TICK)
-
-    def _oldest_of_a_new_stream(self) -> int:
-        return max(self.timestamp - NEW_STREAM_TICKS, self._forgotten + 1)
+    def _oldest_of_a_new_stream(self, now: int) -> int:
+        """Return the oldest timestamp of an unknown stream; a stored one from the future is not waited for."""
+        return max(min(self.timestamp, now + AHEAD_TICKS) - NEW_STREAM_TICKS, self._forgotten + 1)
 
     def _remember(self, stream: tuple[int, int, int], timestamp: int) -> None:
         """Store a stream's last timestamp; of too many, forget the oldest and reject new ones as old as it."""

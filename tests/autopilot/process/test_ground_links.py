@@ -139,8 +139,8 @@ def test_who_is_silent_is_heard_no_more(stations: Stations) -> None:
     links = GroundLinks([link], clock, clock)
 
     def there() -> list[str]:
-        for datagram, number, address, loopback in links.receive(stations):
-            stations.hub.receive(datagram, number, address, round(clock.now_s * 1e6), loopback=loopback)
+        for datagram, number, address, owner in links.receive(stations):
+            stations.hub.receive(datagram, number, address, round(clock.now_s * 1e6), owner=owner)
         (fact,) = links.facts(stations, 0.5)
         heard: list[str] = fact["heard"]
         return heard
@@ -154,19 +154,19 @@ def test_who_is_silent_is_heard_no_more(stations: Stations) -> None:
     assert there() == ["255/190"]
 
 
-@pytest.mark.parametrize(("url", "address", "loopback"), [
-    ("tcpin:127.0.0.1:5760", HERE, True),
-    ("udpin:0.0.0.0:14550", HERE, True),
-    ("udpin:0.0.0.0:14550", ("192.0.2.1", 5), False),
-    ("serial:/dev/ttyACM0:57600", ("/dev/ttyACM0", 57600), False),
+@pytest.mark.parametrize(("url", "owner"), [
+    ("udpout:127.0.0.1:14550", True),
+    ("tcp:127.0.0.1:5760", True),
+    ("udpin:127.0.0.1:14550", False),
+    ("tcpin:127.0.0.1:5760", False),
+    ("udpout:192.0.2.1:14550", False),
+    ("serial:/dev/ttyACM0:57600", False),
 ])  # fmt: skip
-def test_this_computers_network_address_counts_as_loopback(
-    stations: Stations, url: str, address: Address, loopback: bool
-) -> None:
-    clock, link = Clock(), FakeLink(0, 1)
-    link.url, link.here = url, address
-    (received,) = GroundLinks([link], clock, clock).receive(stations)
-    assert received.loopback is loopback
+def test_who_is_called_first_on_this_computer_is_the_owner(stations: Stations, url: str, owner: bool) -> None:
+    links = [FakeLink(0, 1), FakeLink(1, 1)]
+    links[0].url, links[1].url = url, "udpout:127.0.0.1:14540"
+    received = GroundLinks(links, Clock(), Clock()).receive(stations)
+    assert [each.owner for each in received] == [owner, False]
 
 
 def test_notes_of_links_are_handed_on() -> None:

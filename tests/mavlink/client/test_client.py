@@ -149,20 +149,20 @@ def test_progress_extends_the_wait() -> None:
 
 def test_signed_traffic() -> None:
     def signing(key: bytes) -> Signing:
-        return Signing(key * 32, 10**9)
+        return Signing(key * 32, lambda: 10**9)
 
     client, vehicle, stranger = Client(255, 190), Codec(1, 1), Codec(1, 1)
     client.sign_with(signing(b"a"))
     judge, foreign = signing(b"a"), signing(b"b")
-    vehicle.seal = lambda frame: judge.sign(frame, 1, 0)
-    stranger.seal = lambda frame: foreign.sign(frame, 2, 0)
+    vehicle.seal = lambda frame: judge.sign(frame, 1)
+    stranger.seal = lambda frame: foreign.sign(frame, 2)
     text = ("STATUSTEXT", 6, "hello")
     assert not client.receive(said(*text), 0)
     assert not client.receive(stranger.encode(*text), 0)
     assert client.receive(vehicle.encode(*text), 0)
     assert client.dropped == {"unsigned": 1, "bad signature": 1}
     (message,) = READS.decode(client.poll(0)[0])
-    assert judge.refusal(message.name, message.frame, 0) is None
+    assert judge.refusal(message.name, message.frame) is None
 
 
 def test_a_parameter_of_another_name_is_no_answer() -> None:

@@ -292,10 +292,10 @@ EVENTS = st.tuples(DATAGRAMS, st.integers(0, 2), st.none() | st.tuples(st.just("
 @given(st.lists(EVENTS, max_size=12), st.sampled_from([None, bytes(range(32))]))
 def test_nothing_that_comes_raises(events: list[tuple[Any, ...]], key: bytes | None) -> None:
     observer = Observer()
-    ours = Hub(1, 1, [Recorder()], signing=Signing(key, 3_600_000_000_000), observers=[observer])
+    ours = Hub(1, 1, [Recorder()], signing=Signing(key, lambda: 3_600_000_000_000), observers=[observer])
     ours.open(0, GCS)
-    for datagram, link, address, now_us, loopback in events:
-        ours.receive(datagram, link, address, now_us, loopback=loopback)
+    for datagram, link, address, now_us, owner in events:
+        ours.receive(datagram, link, address, now_us, owner=owner)
         ours.poll(now_us)
         for out in ours.take_outbox():
             assert 0 < len(out.datagram) <= DATAGRAM_BYTES

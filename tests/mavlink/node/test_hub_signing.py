@@ -5,13 +5,17 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from colibri.mavlink.node.hub import Hub
+from colibri.mavlink.node.hub import FUTURE, KEY_REFUSED, WARN_EVERY_US, Hub
 from colibri.mavlink.node.service import to_all
-from colibri.mavlink.wire.signing import Signing
+from colibri.mavlink.wire.signing import AHEAD_TICKS, TOO_EARLY, Signing
 from tests.support.hub_ends import GCS, HEARTBEAT, SDK, Recorder, Station, frames_to
 
 KEY = bytes(range(32))
 START = 3_600_000_000_000
+
+
+def now() -> int:
+    return START
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def packed(mav: Any, name: str = "heartbeat", *fields: Any) -> bytes:
 
 
 def test_signed_traffic_both_ways(service: Recorder) -> None:
-    ours, theirs = Hub(1, 1, [service], signing=Signing(KEY, START)), signed()
+    ours, theirs = Hub(1, 1, [service], signing=Signing(KEY, now)), signed()
     ours.receive(packed(theirs), 0, GCS, 0)
     ours.receive(packed(theirs, "ping", 1, 2, 0, 0), 0, GCS, 0)
     assert service.names == ["HEARTBEAT", "PING"]
@@ -43,7 +47,7 @@ def test_signed_traffic_both_ways(service: Recorder) -> None:
 
 
 def test_unsigned_wrong_and_repeated_messages_change_nothing(service: Recorder) -> None:
-    ours = Hub(1, 1, [service], signing=Signing(KEY, START))
+    ours = Hub(1, 1, [service], signing=Signing(KEY, now))
     ours.receive(Station().says(), 0, GCS, 0)
     ours.receive(packed(signed(key=b"x" * 32)), 0, GCS, 0)
     ours.receive(packed(signed(timestamp=0)), 0, GCS, 0)
@@ -61,8 +65,8 @@ def setup(key: bytes = KEY, target: tuple[int, int] = (1, 1), initial: int = STA
     return Station().says("SETUP_SIGNING", *target, list(key), initial)
 
 
-def test_signing_is_set_up_over_loopback_and_told_to_nobody(service: Recorder) -> None:
-    ours = Hub(1, 1, [service], signing=Signing(None, START))
+def test_signing_is_set_up_by_the_owner_and_told_to_nobody(service: Recorder) -> None:
+    ours = Hub(1, 1, [service], signing=Signing(None, now))
     ours.receive(Station(245).says(), 0, SDK, 0)
     ours.receive(setup(), 0, GCS, 0)
     assert ours.take_outbox() == []
@@ -80,24 +84,36 @@ def test_signing_is_set_up_over_loopback_and_told_to_nobody(service: Recorder) -
 
 
 @pytest.mark.parametrize("target", [(0, 0), (2, 1), (1, 7), (0, 1)])
-def test_signing_setup_is_addressed_to_us_over_loopback_in_good_time(target: tuple[int, int]) -> None:
-    signing = Signing(None, START)
+def test_signing_setup_is_addressed_to_us_by_the_owner_in_time(target: tuple[int, int]) -> None:
+    signing = Signing(None, now)
     ours = Hub(1, 1, [], signing=signing)
     ours.receive(Station(2).says(), 0, SDK, 0)
     ours.take_outbox()
     ours.receive(setup(target=target), 0, GCS, 0)
     assert ours.take_outbox() == []
     before = ours.dropped["signing not set up"]
-    ours.receive(setup(), 0, GCS, 0, loopback=False)
+    ours.receive(setup(), 0, GCS, 0, owner=False)
     ours.receive(setup(initial=2**64 - 1), 0, GCS, 0)
     assert not signing.active
     assert ours.dropped == {"signing not set up": before + 2}
 
 
 def test_a_new_key_must_be_signed_with_the_old_one(service: Recorder) -> None:
-    signing = Signing(KEY, START)
+    signing = Signing(KEY, now)
     ours = Hub(1, 1, [service], signing=signing)
     ours.receive(setup(b"x" * 32), 0, GCS, 0)
     assert signing.key == KEY
     ours.receive(packed(signed(), "setup_signing", 1, 0, list(b"x" * 32), START), 0, GCS, 0)
     assert signing.key == b"x" * 32
+
+
+def test_refused_keys_and_stamps_are_reported_once_in_a_while() -> None:
+    said: list[str] = []
+    ours = Hub(1, 1, [], signing=Signing(None, now), warn=said.append)
+    for now_us in (0, 1, WARN_EVERY_US - 1, WARN_EVERY_US):
+        ours.receive(setup(), 0, GCS, now_us, owner=False)
+    assert said == [KEY_REFUSED] * 2
+    ours = Hub(1, 1, [], signing=Signing(KEY, now), warn=said.append)
+    ours.receive(packed(signed(timestamp=START + AHEAD_TICKS + 1)), 0, GCS, 0)
+    assert said[2:] == [FUTURE]
+    assert ours.dropped == {TOO_EARLY: 1}
