@@ -4,11 +4,13 @@ Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice
 
 - The client chooses the session number (PX4 and MAVSDK only support 0; MAVProxy picks a fresh one for each transfer).
   So sessions are per client, and every answer echoes the request's session.
+- Each channel may have few sessions, whatever ids it sends. Where all are taken, the one with most loses its oldest.
 - A client that reopens a session number after a moment's idleness has lost track of it and takes it over; before, it is
   refused.
 - MAVSDK repeats a request with a new sequence number, so operations are idempotent where possible.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -35,7 +37,7 @@ from colibri.mavlink.wire.dialect import Message
 PATH_US = 400.0
 """Work to find a file or folder, or to generate a file."""
 MAX_SESSIONS = 32
-MAX_SESSIONS_OF_A_PEER = 8
+MAX_SESSIONS_OF_A_CHANNEL = 8
 SESSION_ENDS_AFTER_US = 20_000_000
 TAKEN_OVER_AFTER_US = 1_000_000
 """Twice MAVSDK's repeat interval."""
@@ -75,6 +77,7 @@ class _Checksum:
     request: Request
     names: Names
     reading: OpenFile
+    used_us: int
     done: int = 0
     register: int = _UINT32_MAX
 
@@ -235,9 +238,21 @@ class Ftp:
             again = session.names == names and (session.reading is None) == (reading is None)
             idle_us = request.now_us - session.used_us
             return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(FtpError.NO_SESSIONS)
-        of_peer = sum(peer == request.peer for peer, _ in self._sessions)
-        full = len(self._sessions) >= MAX_SESSIONS or of_peer >= MAX_SESSIONS_OF_A_PEER
-        return Nak(FtpError.NO_SESSIONS) if full else None
+        return None if self._has_room(request, self._sessions) else Nak(FtpError.NO_SESSIONS)
+
+    def _has_room(self, request: Request, taken: dict[Key, _Session] | dict[Key, _Checksum]) -> bool:
+        """Make room for a client, if it must be."""
+        of_channels = Counter(peer.channel for peer, _ in taken)
+        own = of_channels[request.peer.channel]
+        if len(taken) < MAX_SESSIONS or own >= MAX_SESSIONS_OF_A_CHANNEL:
+            return own < MAX_SESSIONS_OF_A_CHANNEL
+        channel, most = of_channels.most_common(1)[0]
+        if own >= most:
+            return False
+        victim = min((key for key in taken if key[0].channel == channel), key=lambda key: taken[key].used_us)
+        self._close(victim)
+        self._checksums.pop(victim, None)
+        return True
 
     def _used(self, request: Request) -> _Session | None:
         session = self._sessions.get(request.key)
@@ -316,9 +331,9 @@ class Ftp:
         reading = self._files.open(names)
         if isinstance(reading, FileRefusal):
             return reading
-        if len(self._checksums) >= MAX_SESSIONS:
+        if not self._has_room(request, self._checksums):
             return Nak(FtpError.NO_SESSIONS)
-        checksum = _Checksum(request, names, reading)
+        checksum = _Checksum(request, names, reading, request.now_us)
         outcome = _sum(checksum)
         if outcome is None:
             self._checksums[request.key] = checksum

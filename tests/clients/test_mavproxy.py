@@ -14,6 +14,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.earth.home import DEFAULT_HOME
 from tests.clients.support.mavproxy import MavProxy
+from tools.harness.ports import bound_socket
 from tools.harness.processes import wait_for
 from tools.harness.sitl_process import SitlProcess, vehicle
 
@@ -154,7 +155,12 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_signing_is_set_up_and_removed(tmp_path: Path) -> None:
-    with connected(tmp_path) as (proxy, flown):
+    waiting, called = bound_socket()
+    waiting.close()  # for MAVProxy, as only who is called may set up a key
+    with (
+        vehicle(tmp_path, links=(called,), speed=SPEED) as flown,
+        MavProxy(tmp_path, called.replace("udpout", "udpin")) as proxy,
+    ):
         key = flown.state / "0" / "signing.key"
         proxy.type("signing setup open-sesame", "Setup signing key")
         proxy.type("long DO_CHANGE_SPEED 1 3 -1", r"Got COMMAND_ACK: DO_CHANGE_SPEED: ACCEPTED")

@@ -303,7 +303,7 @@ def test_every_client_has_its_own_sessions(service: Ftp, memory: MemoryFiles) ->
 
 
 def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> None:
-    for session in range(ftp.MAX_SESSIONS_OF_A_PEER):
+    for session in range(ftp.MAX_SESSIONS_OF_A_CHANNEL):
         Client(service, PEER, session).do(Opcode.OPEN_TO_READ, b"text")
     full = Client(service, PEER, 200)
     assert full.ask(Opcode.OPEN_TO_READ, b"text").error == FtpError.NO_SESSIONS
@@ -312,6 +312,22 @@ def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> No
     Client(service, OTHER).do(Opcode.OPEN_TO_READ, b"text")
     Client(service, PEER, 3).do(Opcode.TERMINATE)
     full.do(Opcode.OPEN_TO_READ, b"text")
+
+
+def test_one_channel_cannot_take_all_sessions(service: Ftp) -> None:
+    """Neither under many ids, nor from many ports: the owner opens a file, and keeps its first one."""
+    owner = Client(service, Peer(99, 255, 190))
+    owner.do(Opcode.OPEN_TO_READ, b"text")
+    opened = [
+        Client(service, Peer(channel, system, 190), session).ask(Opcode.OPEN_TO_READ, b"text").opcode
+        for channel in range(6)
+        for system in range(2, 7)
+        for session in range(8)
+    ]
+    assert opened[:40] == [Opcode.ACK] * ftp.MAX_SESSIONS_OF_A_CHANNEL + [Opcode.NAK] * 32
+    assert len(service._sessions) == ftp.MAX_SESSIONS  # noqa: SLF001
+    Client(service, Peer(99, 255, 190), 7).do(Opcode.OPEN_TO_READ, b"text")
+    assert owner.do(Opcode.READ, size=3) == TEXT[:3]
 
 
 def test_an_idle_session_ends(client: Client) -> None:
