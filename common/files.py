@@ -37,6 +37,13 @@ def read_bytes(path: Path) -> bytes:
         return file.read()
 
 
+def read_with_mode(path: Path) -> tuple[bytes, int]:
+    """Return the content and the permissions of a file; where there are none, those of its owner only."""
+    with open(path, "rb", opener=regular) as file:
+        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode) if os.name == "posix" else 0o600
+        return file.read(), mode
+
+
 def read_text(path: Path, encoding: str = "utf-8") -> str:
     with open(path, encoding=encoding, opener=regular) as file:
         return file.read()

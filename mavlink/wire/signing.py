@@ -4,14 +4,12 @@ Specification: https://mavlink.io/en/guide/message_signing.html. All components 
 is 13 bytes after the frame: link id, timestamp, and the first 48 bits of the SHA-256 of key and all preceding bytes.
 """
 
-import os
-import stat
 from collections.abc import Callable
 from hashlib import sha256
 from hmac import compare_digest
 from pathlib import Path
 
-from colibri.common.files import regular
+from colibri.common.files import read_with_mode
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED
 
@@ -58,11 +56,10 @@ def parse_key(content: bytes) -> bytes:
 
 def read_key(path: Path) -> tuple[bytes, str]:
     """Return the key of a file, and a warning if others can read it; a key that others can write is refused."""
-    with open(path, "rb", opener=regular) as file:
-        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode) if os.name == "posix" else 0o600
-        if mode & stat.S_IWOTH:
-            raise SigningError(f"anybody can write it (mode {mode:04o}): make a new key, and chmod 600 the file")
-        return parse_key(file.read()), f"mode {mode:04o} lets others use the key: chmod 600" if mode & 0o077 else ""
+    content, mode = read_with_mode(path)
+    if mode & 0o002:
+        raise SigningError(f"anybody can write it (mode {mode:04o}): make a new key, and chmod 600 the file")
+    return parse_key(content), f"mode {mode:04o} lets others use the key: chmod 600" if mode & 0o077 else ""
 
 
 def tick_at(unix_s: float) -> int:
