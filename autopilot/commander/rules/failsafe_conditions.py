@@ -22,7 +22,7 @@ PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
 _FROZEN_M, _FROZEN_RAD = 0.05, 0.05
 """Motion expected from the rates before an unchanged state counts as a fault, not as rounding."""
 _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
-"""Fallbacks without a solved QP; recovery, which turns the vehicle upright, is excluded."""
+"""Fallbacks after a QP that was not solved, as is recovery if a QP was tried."""
 
 
 class FailsafeInputs(NamedTuple):
@@ -155,6 +155,12 @@ def _battery(charge: str, voltage: str) -> Callable[[FailsafeInputs, Limits], bo
     return lambda inputs, limits: battery_below(inputs.battery, limits[charge], limits[voltage])
 
 
+def _lacks_plan(decided: Diagnostics) -> bool:
+    if decided.fallback is Fallback.RECOVERY:
+        return decided.qp_status is not None
+    return decided.fallback in _PLANLESS
+
+
 HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.ATTITUDE_LOST: lambda inputs, _: inputs.estimate is not None and not inputs.estimate.health.attitude,
     Condition.TILTED: _tilted,
@@ -167,7 +173,7 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.BATTERY_CRITICAL: _battery("BAT_CRIT_THR", "BAT_CRIT_VOLT"),
     Condition.BATTERY_LOW: _battery("BAT_LOW_THR", "BAT_LOW_VOLT"),
     Condition.FENCE_BREACHED: _fence_breached,
-    Condition.PLAN_FAILED: lambda inputs, _: inputs.decided is not None and inputs.decided.fallback in _PLANLESS,
+    Condition.PLAN_FAILED: lambda inputs, _: inputs.decided is not None and _lacks_plan(inputs.decided),
     Condition.DEADLINE_MISSED: lambda inputs, _: inputs.late,
 }
 """Conditions that begin with the first sample at which they hold."""

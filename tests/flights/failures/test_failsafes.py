@@ -93,8 +93,8 @@ def test_missed_frames_lead_to_what_is_set(sitl: Sitl) -> None:
 def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[Sitl]]) -> None:
     flight = load_profile("flight")
     law = flight.table("lpv-mpc")
-    hopeless = {**flight.controllers, "lpv-mpc": {**law, "qp": {**law["qp"], "max_iterations": 1}}}
-    (sitl,) = sitl_fleet(1, airborne=20.0, profile=replace(flight, controller="lpv-mpc", controllers=hopeless))
+    hopeless = {"lpv-mpc": {**law, "qp": {**law["qp"], "max_iterations": 1}}}
+    (sitl,) = sitl_fleet(1, airborne=20.0, track="lemniscate:lap=2", profile=replace(flight, controllers=hopeless))
     sitl.select(Mode.TRACK)
     assert sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=1.0) == pytest.approx(0.5, abs=0.05)
     sitl.step()

@@ -7,7 +7,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.command import NOT_GIVEN
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import Bits, mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 from tests.support.flying import ACCEPTED, DENIED, QUICK, RELATIVE, SYSTEM, degrees_e7, orbit, refused
@@ -183,10 +183,12 @@ def test_a_speed_parameter_acts_at_once(sitl: Sitl) -> None:
 def test_a_parameter_that_changes_in_flight_jolts_nothing(sitl: Sitl, name: str, value: float) -> None:
     sitl.goto(30.0, 0.0, 5.0, wait=False)
     sitl.run(1.5)
-    sitl.get_param(name)  # its type is known from now on: it is set at once
+    kind = mav.MAV_PARAM_TYPE_INT32 if isinstance(value, int) else mav.MAV_PARAM_TYPE_REAL32
+    sent = Bits(value) if isinstance(value, int) else value
+    sitl.gcs.send("PARAM_SET", SYSTEM, 1, name.encode(), sent, kind)
     tilts = [sitl.euler]
-    sitl.set_param(name, value)
-    sitl.run(0.3, lambda: tilts.append(sitl.euler))
+    sitl.run(0.5, lambda: tilts.append(sitl.euler))
+    assert sitl.get_param(name) == pytest.approx(value, rel=1e-6)
     jolts = np.degrees(np.linalg.norm(np.diff(np.array(tilts), axis=0), axis=1))
     assert jolts.max() < 1.2
     sitl.run(1.0)
