@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
 
-from colibri.common.errors import Error, unknown
+from colibri.common.errors import Error, checked, unknown
 from colibri.common.files import read_bytes
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -19,12 +19,23 @@ _MOST = 1e12
 """Products of a few numbers up to there, and quotients, are finite."""
 
 
+def plain(value: Any) -> Any:
+    """Return NumPy's numbers and arrays, also those in lists, tuples and tables, as Python's."""
+    if hasattr(value, "dtype") and hasattr(value, "tolist"):
+        return value.tolist()
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    return {key: plain(each) for key, each in value.items()} if type(value) is dict else value
+
+
 def toml_names(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
-def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Error]) -> T:
+def read_named(what: str, folder: Path, name_or_path: str | PurePath, kind: type[T], error: type[Error]) -> T:
     """Read the TOML file of that name in `folder`, or at a path that ends in `.toml`."""
+    checked(what, name_or_path, (str, PurePath), f"a name, a .toml file or a {what.capitalize()}", error)
+    name_or_path = str(name_or_path)
     if name_or_path.endswith(".toml"):
         return read_toml(Path(name_or_path), kind, error)
     return read_toml(_named(what, folder, name_or_path, error), kind, error)
@@ -101,6 +112,7 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
     Raises:
         SettingsError: A key is missing, unknown or invalid.
     """
+    checked("table", table, Mapping, "a mapping of keys to values", SettingsError)
     try:
         return msgspec.convert(dict(table), type=kind)
     except msgspec.ValidationError as reason:
@@ -109,9 +121,10 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
 
 def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
     """Return a copy with another, validated value at a dotted key: `body.mass_kg`, `rotors.strength.0`."""
+    checked("key", key, str, "a dotted name", error)
     tree = _tree(table)
     parent, last = _place(tree, key, error)
-    parent[last] = value
+    parent[last] = list(value) if isinstance(value, range) else plain(value)
     try:
         return msgspec.convert(tree, type=type(table))
     except msgspec.ValidationError as reason:

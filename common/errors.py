@@ -29,6 +29,12 @@ def unknown(what: str, given: object, known: Iterable[str]) -> str:
     return f'unknown {what} "{text}" ({hint})'
 
 
+def checked(what: str, given: object, kinds: type | tuple[type, ...], wanted: str, error: type[Error]) -> None:
+    """Raise an error for a value of a wrong type."""
+    if not isinstance(given, kinds):
+        raise error(f'{what} must be {wanted}, not {type(given).__name__} "{shown(given)}"')
+
+
 def shown(given: object, most: int = 60) -> str:
     """Return a value for a message: control characters escaped, and cut to `most` characters."""
     text = str(given)

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, cast, ge
 
 import msgspec
 
-from colibri.common.config import UNREADABLE
+from colibri.common.config import UNREADABLE, plain
 from colibri.common.errors import Error, unknown
 
 ENDLESS = "max"
@@ -67,7 +67,7 @@ class Field(NamedTuple):
 
     def read(self, given: Any) -> Any:
         """Return the validated value of a Python value or text; `None` is the default."""
-        if given is None or given == "":
+        if given is None or (isinstance(given, str) and not given):
             return self.default
         if not self.repeated:
             return self._one(given)
@@ -84,8 +84,7 @@ class Field(NamedTuple):
         return Path(text) if self.kind is Path else text
 
     def _one(self, given: Any) -> Any:
-        if hasattr(given, "dtype"):  # a number of numpy's
-            given = given.item()
+        given = plain(given)
         if isinstance(given, str | PurePath):
             return self.read_text(str(given))
         if hasattr(given, "_asdict") and get_origin(self.kind) is Mapping:
@@ -99,9 +98,12 @@ class Field(NamedTuple):
         if isinstance(given, tuple(kind for kind in self._kinds if isinstance(kind, type))):
             return given
         try:
-            return msgspec.convert(given, self.kind, dec_hook=lambda kind, value: kind(value))
+            read = msgspec.convert(given, self.kind, dec_hook=lambda kind, value: kind(value))
+            return self.read_text(str(read)) if hasattr(read, "_fields") and self.option.read is not None else read
         except msgspec.ValidationError as error:
             words = " or ".join("a name" if kind is str else f"a {kind.__name__}" for kind in self._kinds)
+            if self.choices or (self.option.read is not None and self.option.metavar):
+                words = self.option.metavar or f"one of {', '.join(self.choices)}"
             where = str(error).partition(" - at ")[2]
             reason = f"must be {words}, not {type(given).__name__}" if not where else str(error).replace("`", "")
             raise ArgumentTypeError(reason) from error

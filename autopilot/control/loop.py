@@ -27,6 +27,7 @@ from colibri.autopilot.control.registry import (
     LawError,
     check_answer,
     check_controller,
+    check_preview,
     check_rotor_speeds,
     in_words,
     load_controller,
@@ -60,6 +61,7 @@ class ControlLoop:
             self.controller.warm_up()
         self.vehicle = vehicle
         self.preview = self.controller.preview
+        check_preview(self._name, self.preview)
         self.takes_attitude = isinstance(self.controller, AttitudeController)
         self.plan_columns = self.controller.plan_columns if isinstance(self.controller, PlanController) else None
         self._take_in(self.controller)

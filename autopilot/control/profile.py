@@ -1,13 +1,13 @@
 """Profiles, read strictly from TOML: the control law, its settings and the start of a flight."""
 
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
 from colibri.autopilot.control.settings import ControlInterval, current_name
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.config import Table, named_text, read_named, replaced, toml_names
+from colibri.common.config import Table, named_text, plain, read_named, replaced, toml_names
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -67,8 +67,9 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         Raises:
             ProfileError: The key is unknown, or the value invalid.
         """
-        above, _, law = key.partition(".")
+        above, _, law = str(key).partition(".")
         whole = above == "controllers" and law and "." not in law
+        value = plain(value)
         changed = (
             replaced(self, above, {**self.controllers, law: value}, ProfileError)
             if whole
@@ -100,6 +101,7 @@ def load_profile(given: str | Profile) -> Profile:
     """
     if isinstance(given, Profile):
         return given
+    given = str(given) if isinstance(given, PurePath) else given
     tables = read_named("profile", _FOLDER, given, ProfileTables, ProfileError)
     values = {key: getattr(tables, key) for key in tables.__struct_fields__}
     values["controller"] = current_name(tables.controller)

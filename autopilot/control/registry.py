@@ -15,7 +15,7 @@ import numpy as np
 from colibri.autopilot.control.interface import Clock, Controller, Decision, Preview
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.errors import Error, ForeignError, InFlightError, unknown
+from colibri.common.errors import Error, ForeignError, InFlightError, checked, unknown
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
@@ -70,6 +70,7 @@ def load_controller(name: str) -> Factory:
 
 
 def _entry(name: str) -> EntryPoint:
+    checked("controller", name, str, "a name", ControllerError)
     name = current_name(name)
     for entry in registered().select(name=name):
         return entry
@@ -105,11 +106,14 @@ def _sha256(file: str | None) -> str:
 def check_controller(name: str, controller: object) -> None:
     if not isinstance(controller, Controller):
         raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
-    interval_us, preview = controller.control_interval_us, controller.preview
+    interval_us = controller.control_interval_us
     if not isinstance(interval_us, Integral) or not 1_000 <= interval_us <= 1_000_000 or interval_us % 1_000:
         raise ControllerError(
             f"controller {name}: control_interval_us must be whole milliseconds up to a second, not {interval_us} µs"
         )
+
+
+def check_preview(name: str, preview: object) -> None:
     if not isinstance(preview, Preview) or not all(isinstance(each, Integral) and each > 0 for each in preview):
         raise ControllerError(f"controller {name}: preview must be a colibri.Preview of whole numbers, not {preview}")
     if preview.samples > _MAX_PREVIEW:

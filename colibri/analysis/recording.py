@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from hashlib import sha256
 from math import isnan
+from pathlib import Path, PurePath
 from typing import IO, NamedTuple
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 
 from colibri.analysis.logs import RecordingError, Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.common.errors import checked
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import plan_of
 from colibri.mavlink.ulog.flight_topics import DECISION, TRUTH
 from colibri.mavlink.ulog.log import TopicReader
 from colibri.plant.vehicle.description import Vehicle
@@ -163,7 +166,10 @@ class FlightReader:
         )
 
 
-def read_recording(plan: FlightPlan, log: TopicReader | None = None) -> Recording:
+def read_recording(flight: FlightPlan | str | PurePath, log: TopicReader | None = None) -> Recording:
+    """Return a recorded flight, by its folder or its plan."""
+    checked("flight", flight, (str, PurePath, FlightPlan), "a folder or a FlightPlan", RecordingError)
+    plan = flight if isinstance(flight, FlightPlan) else plan_of(Path(flight))
     reader = FlightReader(plan, log)
     parts = list(reader)
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)}

@@ -4,7 +4,8 @@ from argparse import ArgumentTypeError
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
 from math import prod
-from pathlib import Path
+from pathlib import Path, PurePath
+from types import NoneType
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -23,8 +24,8 @@ from colibri.campaigns.values import (
     read_draw,
     read_values,
 )
-from colibri.common.config import read_settings, read_toml
-from colibri.common.errors import unknown
+from colibri.common.config import plain, read_settings, read_toml
+from colibri.common.errors import checked, unknown
 from colibri.common.process.arguments import seeds
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec
@@ -33,7 +34,9 @@ from colibri.mavlink.hil.feedback import Feedback
 Logs: TypeAlias = Literal["none", "lost", "all"]
 OF_ALL = ("link",)
 """Options that must be equal for all flights of a campaign."""
-_MAX_SEED = 2**63
+_MAX_SEED = 2**63 - 1
+MAX_UNASKED = 1_000_000
+"""Flights of a campaign without `yes`."""
 
 
 class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -88,7 +91,7 @@ class Campaign(NamedTuple):
     """A validated campaign; see `CampaignTables`."""
 
     name: str
-    seeds: tuple[int, ...]
+    seeds: Sequence[int]
     root_seed: int
     paired: bool
     metrics: tuple[Metric, ...]
@@ -154,11 +157,13 @@ class Campaign(NamedTuple):
 
 def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, Any]) -> Tables:
     """Read a file and override it by keywords, factor by factor."""
+    checked("file", file, (str, PurePath, NoneType), "the name of a TOML file", CampaignError)
     base = kind() if file is None else read_toml(Path(file), kind, CampaignError)
     known = kind.__struct_fields__
     for name in given:
         if name not in known:
             raise CampaignError(unknown("option", name, known))
+    given = {name: plain(value) for name, value in given.items()}
     read_settings(given, kind)
     named = {name_in_tables(*each) for table in kind.FACTORS for each in given.get(table, {}).items()}
     changed = dict(given) | {
@@ -193,15 +198,17 @@ def campaign_of(tables: CampaignTables) -> Campaign:
     return planned
 
 
-def read_seeds(given: Any) -> tuple[int, ...]:
+def read_seeds(given: Any) -> Sequence[int]:
+    given = plain(given)
     try:
-        read = tuple(given) if isinstance(given, list | tuple | range) else tuple(seeds(str(given)))
+        found: Sequence[int] = given if isinstance(given, list | tuple | range) else seeds(str(given))
     except ArgumentTypeError:
-        read = ()
-    right = all(isinstance(seed, int) and 0 <= seed < _MAX_SEED for seed in read)
-    if not read or not right or len(set(read)) < len(read):
+        found = ()
+    ends = (found[0], found[-1]) if isinstance(found, range) and found else found  # a range is not expanded
+    right = all(type(seed) is int and 0 <= seed < _MAX_SEED for seed in ends)
+    if not ends or not right or (not isinstance(found, range) and len(set(found)) < len(found)):
         raise CampaignError(f"seeds: expected 1-20, a seed, or several different ones, not {given}")
-    return read
+    return found if isinstance(found, range) else tuple(found)
 
 
 def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
 from colibri.campaigns.values import CampaignError
-from colibri.common.errors import unknown
+from colibri.common.errors import checked, unknown
 from colibri.experiments.flight import Flight
 
 NAMES = (*KEYS, "lost_at_s", "path_lag_s")
@@ -32,10 +32,13 @@ def usual(*, sensors: bool) -> tuple[Metric, ...]:
 
 
 def read_metrics(given: Any) -> tuple[Metric, ...]:
-    if isinstance(given, Mapping):
+    if isinstance(given, Mapping) and given:
+        for name, of in given.items():
+            checked(f"metric {name}", of, Callable, "a function of a Flight", CampaignError)  # type: ignore[arg-type]
         return tuple(Metric(str(name), of) for name, of in given.items())
     if isinstance(given, str) or callable(given):
         given = given.split(",") if isinstance(given, str) else [given]
+    checked("metrics", given, (list, tuple), "names or functions", CampaignError)
     if not given:
         raise CampaignError(f"metrics: name at least one: {', '.join(NAMES)}")
     return tuple(map(_metric, given))

@@ -2,21 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from pathlib import Path
+from numbers import Integral
+from pathlib import Path, PurePath
+from types import NoneType
 from typing import Any
 from warnings import warn
 
-from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, tables_of
+from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
+from colibri.common.errors import checked
 from colibri.common.process.folder_lock import FolderLock
 from colibri.flights.effects import NoEffectWarning
-
-MAX_UNASKED = 1_000_000
 
 
 def campaign(
@@ -49,6 +50,7 @@ def campaign(
     Raises:
         Error: An input is invalid.
     """
+    checked("out", out, (str, PurePath, NoneType), "a folder", CampaignError)
     planned = campaign_of(tables_of(CampaignTables, file, tables))
     engine = engine_of(workers, executor)
     folder = Path(out) if out else None
@@ -60,11 +62,13 @@ def campaign(
 
 def engine_of(workers: int | None, executor: Any) -> Engine:
     if executor is None:
-        if workers is not None and workers < 1:
-            raise CampaignError(f"workers: must be at least 1, not {workers}")
+        if workers is not None and not (isinstance(workers, Integral) and workers >= 1):
+            raise CampaignError(f"workers: must be a whole number of at least 1, not {workers}")
         return Pool(workers)
     if workers is not None:
         raise CampaignError("workers: a cluster has its own: leave workers out")
+    if not isinstance(executor, str) and not hasattr(executor, "submit"):
+        raise CampaignError(f"executor: must be an address or a distributed.Client, not {type(executor).__name__}")
     from colibri.campaigns.engines.cluster import Cluster
 
     return Cluster(executor)

@@ -127,7 +127,10 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
         return _span(key, name, span)
     if isinstance(given, str) and given.count(":") == 2 and all(map(_reads_as_number, given.split(":"))):
         return _span(key, "linspace", [float(part) for part in given.split(":")])
-    values = tuple(given) if isinstance(given, list | tuple | range) else (given,)
+    if isinstance(given, range) and len(given[: _MAX_SPAN + 1]) > _MAX_SPAN:
+        raise CampaignError(f"{key}: at most {_MAX_SPAN} values, not {given}")
+    several = isinstance(given, list | tuple | range) and not hasattr(given, "_fields")
+    values = tuple(given) if several else (given,)
     if not values:
         raise CampaignError(f"{key}: no values: give at least one")
     if twice := first_twice(map(shown, values)):

@@ -1,7 +1,7 @@
 """`colibri.fly`: fly from Python."""
 
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 from warnings import warn
 
@@ -9,7 +9,7 @@ from colibri.analysis.outcome import files_of, fly_to_its_end
 from colibri.analysis.recording import COLUMNS, FlightReader
 from colibri.analysis.report import Report, report_rows
 from colibri.analysis.series.figure_series import FigureSeries
-from colibri.common.errors import unknown
+from colibri.common.errors import checked, unknown
 from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
 from colibri.experiments.table import SampleTable, table_of
@@ -95,6 +95,7 @@ class Flight:
         Raises:
             OptionError: The folder is not empty, or cannot be written.
         """
+        checked("folder", folder, (str, PurePath), "a name", OptionError)
         path = Path(folder)
         try:
             if path.exists() and any(path.iterdir()):

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
-from colibri.common.errors import InFlightError
+from colibri.common.errors import InFlightError, checked
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, loading
-from colibri.flights.plan import FlightPlan, FrameCount, unseen
+from colibri.flights.plan import FlightPlan, FrameCount, PlanError, unseen
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.flights.provenance import write_provenance
 from colibri.mavlink.ulog.log import TopicLog
@@ -28,6 +28,7 @@ def fly_plan(
     Raises:
         FlightError: The flight ended early; the reason is also in `FAILURE`.
     """
+    checked("plan", plan, FlightPlan, "a FlightPlan, as of FlightPlan.of", PlanError)
     if topics is None:
         write_provenance(plan)
     if plan.spec.link == "udp":

@@ -10,7 +10,7 @@ from colibri.autopilot.guidance.trajectories.loading import file_text, load_trac
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.spec import AutopilotSpec, name_of
-from colibri.common.errors import Error
+from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
 from colibri.flights.effects import Setting, without_effect
 from colibri.flights.spec import FlightSpec
@@ -88,6 +88,7 @@ class FlightPlan:
             LinkError: The URL of a ground station is invalid, or reachable from the network without a key.
             ProfileError, VehicleError, TrackError: A file is invalid, or the vehicle cannot fly so.
         """
+        checked("spec", spec, FlightSpec, "a FlightSpec, as of FlightSpec.of", PlanError)
         if spec.gcs and spec.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {spec.link} there is no autopilot to connect to")
         check_reach(spec.gcs, signed=spec.signing_key is not None, insecure=spec.insecure)

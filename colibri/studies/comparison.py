@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.campaigns.definition import Campaign, CampaignTables, Logs, Point, campaign_of
+from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Point, campaign_of
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.engines.progress import with_bar
 from colibri.campaigns.flight_table import FlightTable
@@ -29,6 +29,8 @@ from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_o
 def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:
     """Fly all contenders, tracks and seeds; `NAME-journal.jsonl` records each flight as it ends."""
     planned = _campaign(args, name, metrics, logs)
+    if planned.flights > MAX_UNASKED:
+        raise CampaignError(f"{planned.flights} flights are too many: at most {MAX_UNASKED} are compared")
     common = common_of(planned)
     points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
     last = points[len(planned.seeds) - 1 :: len(planned.seeds)]

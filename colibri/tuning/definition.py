@@ -1,6 +1,6 @@
 """A tuning as data."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -8,7 +8,15 @@ from typing import Any, ClassVar, NamedTuple
 import msgspec
 
 from colibri.autopilot.control.profile import Profile, ProfileError, profile_text
-from colibri.campaigns.definition import Campaign, CampaignTables, FlightTables, Point, campaign_of, read_seeds
+from colibri.campaigns.definition import (
+    MAX_UNASKED,
+    Campaign,
+    CampaignTables,
+    FlightTables,
+    Point,
+    campaign_of,
+    read_seeds,
+)
 from colibri.campaigns.factors import SCALED, factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
 from colibri.common.config import value_at
@@ -47,7 +55,7 @@ class Tuning(NamedTuple):
 
     campaign: Campaign
     common: Common
-    check_seeds: tuple[int, ...]
+    check_seeds: Sequence[int]
     trials: int
     prune_after: int
     space: dict[str, Range]
@@ -86,6 +94,8 @@ def tuning_of(tables: TuningTables) -> Tuning:
     campaign = campaign_of(
         CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})
     )
+    if campaign.flights > MAX_UNASKED:
+        raise TuningError(f"seeds: {campaign.flights} flights a trial are too many: at most {MAX_UNASKED}")
     _check_factors(campaign, space)
     objectives = read_objectives(tables.objectives, campaign.metrics)
     campaign = campaign._replace(metrics=metrics_of(objectives, campaign.metrics))
@@ -142,7 +152,7 @@ def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
         raise TuningError("profile: one is tuned: say which in fly")
 
 
-def _check_seeds(given: Any, seeds: tuple[int, ...]) -> tuple[int, ...]:
+def _check_seeds(given: Any, seeds: Sequence[int]) -> Sequence[int]:
     if given is None:
         return ()
     try:

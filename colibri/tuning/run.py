@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from importlib.metadata import version
-from pathlib import Path
+from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
+from types import NoneType
 from typing import Any
 
 import msgspec
@@ -14,6 +15,7 @@ from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.journal import claim, identity_of
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
+from colibri.common.errors import checked
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.file_lock import FileLock
 from colibri.tuning.flying import TrialFlights, fly_trial, scale_kept
@@ -68,6 +70,7 @@ def tune(
     """
     require_optuna()
     tuning = tuning_of(tables_of(TuningTables, file, tables))
+    checked("out", out, (str, PurePath, NoneType), "a folder", TuningError)
     if out is not None:
         return fly_tuning(tuning, lambda: engine_of(workers, executor), Path(out), resume=resume, watcher=watcher)
     with TemporaryDirectory(prefix="colibri-") as folder:

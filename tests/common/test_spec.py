@@ -113,7 +113,7 @@ def test_code_is_not_json() -> None:
         ({"start": {"z": "high"}}, "start: z: must be a number, not high"),
         ({"start": "zz=1"}, 'start: unknown key "zz" (did you mean "z"?)'),
         ({"profile": 3}, "profile: must be a name or a Profile, not int"),
-        ({"gusts": [3]}, "gusts: must be a Gust, not int"),
+        ({"gusts": [3]}, "gusts: must be SPEED@FROM:start=S,duration=S, not int"),
         ({"wind": "strong"}, "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not strong"),
     ],
 )

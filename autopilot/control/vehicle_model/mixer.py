@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.elementary import square
+from colibri.common.errors import checked
 from colibri.common.matrices import dot, inverse, matmul, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -12,6 +14,7 @@ class Mixer:
     """The inverse allocation of one vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
+        checked("vehicle", vehicle, Vehicle, "a Vehicle", AutopilotError)
         self._allocation = vehicle.allocation()
         self._inverse = exact_inverse(self._allocation)
         self._momentum = vehicle.rotor_momentum()

@@ -19,7 +19,7 @@ from colibri.autopilot.guidance.trajectories.tracks import (
     TrackOptions,
     YawChoice,
 )
-from colibri.common.errors import Error, unknown
+from colibri.common.errors import Error, checked, unknown
 
 GROUP = "colibri.tracks"
 
@@ -34,6 +34,7 @@ def track(name: str, text: str | None = None) -> Track:
     Raises:
         TrackError: The track or an option is unknown, a value is impossible, or the file cannot be flown.
     """
+    checked("track", name, str, "a name", TrackError)
     base, colon, given = name.partition(":")
     if base in THESIS_TRACKS and not colon:
         return THESIS_TRACKS[base]

@@ -2,25 +2,30 @@
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, current_process, get_context, parent_process
 from threading import Thread
 from typing import Any
 
 import cloudpickle
 
 from colibri.campaigns.engines.engine import Job, Killed, Result
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
 
 _AHEAD = 2
 """Jobs submitted per worker, so that no worker waits."""
+_NO_GUARD = 'worker processes cannot load the script: flights must begin under `if __name__ == "__main__":`'
 
 
 class Pool:
     """A pool of processes. A killed worker breaks it; submitted jobs are then repeated one by one."""
 
     def __init__(self, workers: int | None = None) -> None:
+        if getattr(current_process(), "_inheriting", False):  # a worker of a script without the guard loads it
+            sys.exit(1)
         self._workers = workers or len(os.sched_getaffinity(0))
 
     def each(
@@ -36,7 +41,9 @@ class Pool:
     def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
         """Yield jobs with results until all are done or the pool breaks; return those lost."""
         others = set(active_children())
-        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (packed,))
+        context = get_context("spawn")
+        has_begun = context.Event()
+        pool = ProcessPoolExecutor(workers, context, _begin, (packed, has_begun))
         waiting: dict[Future[Any], Job] = {}
         broken: list[Job] = []
         try:
@@ -67,6 +74,8 @@ class Pool:
             raise
         finally:
             pool.shutdown(cancel_futures=True)
+        if broken and not has_begun.is_set():
+            fail(_NO_GUARD, EXIT_FAILED)
         return broken
 
 
@@ -74,9 +83,10 @@ _given: tuple[Callable[[Any, Any], Any], Any]
 """In a worker: the function and its common argument."""
 
 
-def _begin(packed: bytes) -> None:
+def _begin(packed: bytes, has_begun: Any) -> None:
     """Prepare a worker, which ends with its parent."""
     global _given
+    has_begun.set()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
     _given = cloudpickle.loads(packed)

@@ -50,6 +50,8 @@ def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[
 
 def _setting(text: str) -> tuple[str, Any]:
     key, values = _pair(text, "KEY=VALUES, body.mass_kg=0.6:0.8:5 say")
+    if values.count(":") == 1 and all(isinstance(_value(part), int | float) for part in values.split(":")):
+        raise CampaignError(f"{key}: a range is FIRST:LAST:COUNT, {values}:5 say, not {values}")
     return key, values if values.count(":") == 2 else [_value(each) for each in values.split(",")]
 
 

@@ -179,7 +179,7 @@ def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
     ("options", "said"),
     [
         (["--trials", "1"], "trials: must be at least 2, not 1"),
-        (["--workers", "0"], "workers: must be at least 1, not 0"),
+        (["--workers", "0"], "workers: must be a whole number of at least 1, not 0"),
         (["--workers", "2", "--dask", "tcp://127.0.0.1:1"], "workers: a cluster has its own"),
     ],
 )
