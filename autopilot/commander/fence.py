@@ -29,6 +29,7 @@ class Fence:
         self._items: tuple[MissionItem, ...] = ()
         self._geofence = Geofence((), home.origin)
         self._breach: Refusal | None = None
+        self.against_arming: Refusal | None = None
         self._breach_due_us = 0
 
     def adopt(self, behaviour: Behaviour) -> None:
@@ -79,11 +80,13 @@ class Fence:
         """Return the distance to the nearest edge, m; negative outside."""
         return min(self._geofence.margin_m(place), self._around_home.margin_m(place))
 
-    def breach(self, place: Vector, now_us: int) -> Refusal | None:
-        """Check the current position, at 10 Hz because polygons are slow."""
+    def breach(self, place: Vector, now_us: int, margin_m: float) -> Refusal | None:
+        """Check the current position, at 10 Hz because polygons are slow; within the margin arming is refused, too."""
         if not self.exists:
-            self._breach = None
+            self._breach = self.against_arming = None
         elif now_us >= self._breach_due_us:
             self._breach_due_us = now_us + _LOOK_EVERY_US
-            self._breach = self.refusal(place)
+            self._breach = self.against_arming = self.refusal(place)
+            if self._breach is None and margin_m > 0.0 and self.margin_m(place) < margin_m:
+                self.against_arming = Refusal(f"within {margin_m:g} m (GF_MARGIN) of the geofence's edge")
         return self._breach

@@ -33,8 +33,9 @@ class Reporter:
         now_us, state, guidance, _ = sample
         self.samples += 1
         estimate, charge_state = parts.state_source.estimate, parts.supervisor.charge_state
-        breach = stations.fence.breach(state.position_enu_m, now_us)
-        pilot.readiness.update(self._arming_inputs(state, estimate, breach, charge_state))
+        fence = stations.fence
+        breach = fence.breach(state.position_enu_m, now_us, parts.supervisor.limits["GF_MARGIN"])
+        pilot.readiness.update(self._arming_inputs(state, estimate, fence.against_arming, charge_state))
         if estimate is not None:
             for severity, line in self._health.lines(estimate.health):
                 stations.say(severity, line)
@@ -43,13 +44,13 @@ class Reporter:
         stations.missions.watch_mode(pilot.state.mode)
         snapshot = parts.snapshots.take(
             *(now_us, state, pilot, guidance, decision, duration_s, controls),
-            *(parts.battery.state(charge_state), stations.fence, parts.state_source),
+            *(parts.battery.state(charge_state), fence, parts.state_source),
             breached=breach is not None,
         )
         stations.update(snapshot)
 
     def _arming_inputs(
-        self, state: VehicleState, estimate: Estimate | None, breach: Refusal | None, charge_state: int
+        self, state: VehicleState, estimate: Estimate | None, outside_fence: Refusal | None, charge_state: int
     ) -> ArmingInputs:
         """Return the inputs of the arming checks."""
         parts, pilot = self._parts, self._parts.pilot
@@ -59,7 +60,7 @@ class Reporter:
             pilot.ground.standing,
             parts.battery.left,
             sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None,
-            breach,
+            outside_fence,
             not_known(estimate.health) if estimate is not None else "",
             self._battery_fault(charge_state),
         )

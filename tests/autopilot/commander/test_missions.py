@@ -104,9 +104,9 @@ def test_the_home_fence_follows_home_and_parameters() -> None:
 
 def test_a_breach_is_judged_ten_times_a_second() -> None:
     cockpit = Cockpit(behaviour=Behaviour(max_distance_m=10.0))
-    assert cockpit.fence.breach((11.0, 0.0, 0.0), 0) is not None
-    assert cockpit.fence.breach((0.0, 0.0, 0.0), 99_000) is not None
-    assert cockpit.fence.breach((0.0, 0.0, 0.0), 100_000) is None
+    assert cockpit.fence.breach((11.0, 0.0, 0.0), 0, 0.0) is not None
+    assert cockpit.fence.breach((0.0, 0.0, 0.0), 99_000, 0.0) is not None
+    assert cockpit.fence.breach((0.0, 0.0, 0.0), 100_000, 0.0) is None
 
 
 def test_plans_that_were_kept_go_on_where_the_mission_stood() -> None:
