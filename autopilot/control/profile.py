@@ -8,6 +8,7 @@ import msgspec
 from colibri.autopilot.control.settings import ControlInterval, current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, named_text, plain, read_named, replaced, toml_names
+from colibri.plant.vehicle.description import Vehicle
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -23,11 +24,16 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
 
     vehicle: str
     integrator: Literal["rk4", "adaptive"]
-    position_enu_m: tuple[float, float, float]
-    rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)]
-    """Of every rotor, in turns per minute."""
+    position_enu_m: tuple[float, float, float] | None = None
+    """Without it, at the track's first point."""
+    rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)] | None = None
+    """Of every rotor, in turns per minute. Without it, that of hover."""
     frame_interval_s: ControlInterval | None = None
     """Between two frames of the plant at most: they divide the control interval. Without it, that interval."""
+
+    def rotor_speed(self, vehicle: Vehicle) -> float:
+        """Return the rotor speed at the start, in the vehicle's unit."""
+        return vehicle.hover_speed if self.rotor_speed_rpm is None else vehicle.speed_from_rpm(self.rotor_speed_rpm)
 
 
 class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -69,7 +69,7 @@ def copter_autopilot(
     estimator = estimator or estimator_for(settings.feedback, vehicle, settings.origin)
     parts = parts_of(profile, vehicle, settings, clock, values, first, estimator, strict)
     checkpointer = Checkpointer(fingerprint_of(profile, vehicle), parts)
-    start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+    start_speed = profile.simulation.rotor_speed(vehicle)
     return Autopilot(Copter(parts, checkpointer, history, start_speed, vehicle.gravity_m_s2), clock)
 
 

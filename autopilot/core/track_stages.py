@@ -56,7 +56,7 @@ def track_autopilot(
     state_source = StateSource(estimator, loop.frame_interval_us)
     delay = DelayCompensation(vehicle, profile.delay_s)
     planner = Planner(track, profile.references, loop.preview)
-    start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+    start_speed = profile.simulation.rotor_speed(vehicle)
     return Autopilot(TrackStages(loop, delay, state_source, planner, start_speed), clock)
 
 

@@ -5,10 +5,12 @@ from math import degrees, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
-from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
@@ -100,7 +102,7 @@ class FlightPlan:
                 _check_sensors(name, each)
         floor_m = _floor_m(spec, plant_vehicle)
         track, note = load_track(spec.track, vehicle, profile, floor_m, track_file)
-        start = spec.started(_usual_start(profile, track, spec.feedback))
+        start = spec.started(_usual_start(profile, plant_vehicle, track, spec.feedback))
         try:
             check_contact(plant_vehicle)
         except VehicleError as error:
@@ -203,10 +205,11 @@ def _check_sensors(name: str, vehicle: Vehicle) -> None:
         raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on while it finds its bearings")
 
 
-def _usual_start(profile: Profile, flown: Track, feedback: Feedback) -> Start:
-    """Return the default start: at rest with the first yaw; with sensors on the ground."""
-    x, y, z = profile.simulation.position_enu_m
+def _usual_start(profile: Profile, vehicle: Vehicle, flown: Track, feedback: Feedback) -> Start:
+    """Return the default start: at rest with the first yaw, on the track; with sensors on the ground."""
+    x, y, z = profile.simulation.position_enu_m or position(flown, np.zeros(1))[0].tolist()
     yaw_deg = degrees(start_yaw(flown, profile.references))
     if feedback is Feedback.SENSORS:
         return Start(x=x, y=y, psi=yaw_deg)
-    return Start(x=x, y=y, z=z, psi=yaw_deg, rotors=profile.simulation.rotor_speed_rpm)
+    given = profile.simulation.rotor_speed_rpm
+    return Start(x=x, y=y, z=z, psi=yaw_deg, rotors=vehicle.hover_rpm if given is None else given)

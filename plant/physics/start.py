@@ -65,8 +65,7 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
         raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")
 
 
-DEFAULT_STARTS = {
-    Feedback.STATE: Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0),
-    Feedback.SENSORS: Start(y=-1.0, psi=90.0),
-}
-"""The thesis's spiral; on sensors below it on the ground, where the estimator initialises."""
+def default_starts(vehicle: Vehicle) -> dict[Feedback, Start]:
+    """Return a hover near the thesis's spiral; on sensors below it on the ground, where the estimator initialises."""
+    flying = Start(y=-1.0, z=2.0, psi=90.0, rotors=vehicle.hover_rpm)
+    return {Feedback.STATE: flying, Feedback.SENSORS: Start(y=-1.0, psi=90.0)}

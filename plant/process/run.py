@@ -5,7 +5,7 @@ from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
-from colibri.plant.physics.start import DEFAULT_STARTS
+from colibri.plant.physics.start import default_starts
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import closing
 from colibri.plant.process.server import FreeServer, Server
@@ -18,7 +18,8 @@ from colibri.plant.vehicle.description import load_vehicle
 
 def builder_of(spec: PlantSpec) -> PlantBuilder:
     vehicle = load_vehicle(spec.vehicle).without(spec.without)
-    starts = {it: nudged(spec.started(DEFAULT_STARTS[it])) for it in served_by(vehicle)}
+    usual = default_starts(vehicle)
+    starts = {it: nudged(spec.started(usual[it])) for it in served_by(vehicle)}
     return PlantBuilder(spec, vehicle, starts, integrator=spec.integrator, origin=spec.home.origin)
 
 

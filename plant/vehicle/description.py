@@ -194,6 +194,11 @@ class Vehicle(Table, frozen=True, kw_only=True):
         return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
 
     @property
+    def hover_rpm(self) -> float:
+        """The same in turns per minute."""
+        return self.hover_speed / self.speed_from_rpm(1.0)
+
+    @property
     def ground_height_m(self) -> float:
         """Height of the ground, z of ENU: the vehicle at rest on its feet, a little sunk in, is at 0."""
         if self.ground is None:

@@ -5,7 +5,7 @@ from colibri.autopilot.core.track_stages import track_autopilot
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.flights.flight import InMemory, SteppedFlight
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.physics.start import DEFAULT_STARTS
+from colibri.plant.physics.start import default_starts
 from colibri.plant.physics.world import State
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
@@ -44,7 +44,7 @@ def fly(frames: int, wire: HostileWire) -> list[State]:
     profile = load_profile("thesis")
     vehicle = load_vehicle(profile.simulation.vehicle)
     autopilot = track_autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
-    builder = PlantBuilder(WorldSpec(), vehicle, DEFAULT_STARTS)
+    builder = PlantBuilder(WorldSpec(), vehicle, default_starts(vehicle))
     flight = SteppedFlight(builder.build(Feedback.STATE, FRAME_US), autopilot, wire)
     states = []
     for _ in range(frames):

@@ -154,9 +154,9 @@ def respond(
     responses[0] = 0.0
     _linearise(motion, speeds, model, T)
     for step in range(motion.shape[0] - 1):
-        blocks = 0
-        while blocks < means.shape[0] and means[blocks, step] != 0.0:
-            blocks += 1
+        blocks = means.shape[0]
+        while means[blocks - 1, step] == 0.0:  # not begun; without lag, those before have ended, too
+            blocks -= 1
         used = inputs * blocks
         _advance(responses, step, T, model.interval_s, used)
         X = responses[step + 1]

@@ -28,7 +28,7 @@ class Approach(NamedTuple):
     k1_s2: float  # on a large position error
     k2_s: float  # on its rate
     max_error_m: float  # of approach
-    follow_within_m: float  # the motion of farther references counts in proportion
+    follow_within_m: float  # impossible motion of farther references counts in proportion
     max_acceleration_m_s2: float  # of a decaying error
     exact_within_m: float  # nearer references are tracked directly
     interval_s: float
@@ -64,7 +64,7 @@ def follow(
     p, v, a, yaw = before_jump((position[:n], velocity[:n], acceleration[:n], yaw_rad[:n]), law[0].interval_s)
     near = (target.position, target.velocity, target.acceleration)
     put(yaw, target.yaw_rad)
-    approach(rigid[:3], rigid[3:6], (p, v, a), law, near)
+    approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)
@@ -199,14 +199,15 @@ def approach(
     position: Array,
     velocity: Array,
     references: tuple[Array, Array, Array],
+    feasible: float,  # part of their motion
     packed: Packed,
     near: tuple[Array, Array, Array],
 ) -> None:
     """Write references, ENU, (n, 3) each, that lead from the vehicle to the given ones.
 
     Near references stay as given. For farther ones the error decays with the gains, slowed down to the largest
-    acceleration; an error above the largest closes at constant speed. The motion of references out of reach counts in
-    proportion: an impossible one must not lead the vehicle astray.
+    acceleration; an error above the largest closes at constant speed. An impossible motion that is far away counts in
+    part: it must not lead the vehicle astray.
     """
     law = packed[0]
     away, squared = np.empty(3), 0.0
@@ -219,7 +220,8 @@ def approach(
             for n in range(references[order].shape[0]):
                 put(references[order][n], near[order][n])
         return
-    part, smooth = min(1.0, law.follow_within_m / distance), 1.0 - law.exact_within_m / distance
+    part = max(min(1.0, law.follow_within_m / distance), feasible)
+    smooth = 1.0 - law.exact_within_m / distance
     is_far, h = distance > law.max_error_m, law.interval_s
     error, error_rate, drift = np.zeros(3), np.empty(3), np.zeros(3)
     for i in range(3):
@@ -242,6 +244,23 @@ def approach(
             snap = -k1 * left_acceleration - k2 * jerk
             left += h * (left_rate + h / 2.0 * (left_acceleration + h / 3.0 * (jerk + h / 4.0 * snap)))
             left_rate += h * (left_acceleration + h / 2.0 * (jerk + h / 3.0 * snap))
+
+
+@compiled
+def feasible_part(
+    velocity: Array, acceleration: Array, disturbance: Disturbance, limits: ForceLimits, vehicle: Packed
+) -> float:
+    """Return 1 for references, ENU, (n, 3), that need at most the largest thrust, and 0 from twice that thrust on."""
+    airframe, worst = vehicle[0].airframe, 0.0
+    drag = airframe.drag_xy + airframe.rotor_drag * sqrt(airframe.mass_kg * airframe.gravity_m_s2)
+    for n in range(velocity.shape[0]):
+        squared = 0.0
+        for i in range(3):
+            wanted = acceleration[n, i] - disturbance.acceleration[i] + (airframe.gravity_m_s2 if i == 2 else 0.0)
+            force = airframe.mass_kg * wanted + drag * velocity[n, i]
+            squared += force * force
+        worst = max(worst, squared)
+    return min(max(2.0 - sqrt(worst) / limits.max_n, 0.0), 1.0)
 
 
 @compiled

@@ -65,9 +65,10 @@ class TargetBuilder:
         passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
         slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
         near, flat, last_flat, target = self._near, self._flat, _flat(3), self._target
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], self._law, near)
+        feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, self._law, near)
         feed_forward.ask(near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], self._law, near)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, self._law, near)
         feed_forward.ask(*ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
         target.yaw_rad[:], target.end_squared[:] = nominal[3], last_flat.squared[1]

@@ -17,7 +17,7 @@ from colibri.mavlink.hil.faults import GPS, OFF, Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.plant.environment.weather import Wind
-from colibri.plant.physics.start import DEFAULT_STARTS
+from colibri.plant.physics.start import default_starts
 from colibri.plant.simulation.plant import Plant, PlantBuilder
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
@@ -30,7 +30,7 @@ STATION = ("127.0.0.1", 14550)
 
 def plant(feedback: Feedback, interval_us: int) -> Plant:
     gusts = WorldSpec(wind=Wind(4.0, 30.0), turbulence="light", seed=5)
-    return PlantBuilder(gusts, VEHICLE, DEFAULT_STARTS).build(feedback, interval_us)
+    return PlantBuilder(gusts, VEHICLE, default_starts(VEHICLE)).build(feedback, interval_us)
 
 
 def on_track(feedback: Feedback) -> SteppedFlight[Any]:

@@ -72,20 +72,33 @@ def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> No
 Three: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def approached(position: np.ndarray, velocity: np.ndarray) -> tuple[Three, Three]:
+def approached(position: np.ndarray, velocity: np.ndarray, feasible: float) -> tuple[Three, Three]:
     p, v, a, _ = circle(3.0, 3.0)
     references, near = (p, v, a), (np.empty_like(p), np.empty_like(p), np.empty_like(p))
-    feed_forward.approach(position, velocity, references, packed(GUIDANCE), near)
+    feed_forward.approach(position, velocity, references, feasible, packed(GUIDANCE), near)
     return references, near
 
 
-def test_a_slow_motion_leads_back_from_far_away() -> None:
+def test_an_impossible_motion_leads_back_from_far_away() -> None:
     """At the approach speed of 3 m/s, 50 m away: neither the place nor the speed of the reference is asked for."""
-    _, near = approached(np.array([53.0, 0.0, 0.0]), np.array([-3.0, 0.0, 0.0]))
+    _, near = approached(np.array([53.0, 0.0, 0.0]), np.array([-3.0, 0.0, 0.0]), 0.0)
     assert np.abs(np.diff(near[0], axis=0) / INTERVAL_S - near[1][:-1]).max() < 0.2
     assert near[0][0] == pytest.approx([53.0, 0.0, 0.0], abs=0.03)
     assert near[1][0] == pytest.approx([-3.0, 0.0, 0.0], abs=0.1)
     assert np.abs(near[2][0]).max() < 1.6
+
+
+def test_a_possible_motion_counts_in_full_from_far_away() -> None:
+    """50 m away, beside the reference at its speed: the error closes at 3 m/s."""
+    (_, v, a), near = approached(np.array([53.0, 0.0, 0.0]), circle(3.0, 3.0)[1][0] - np.array([3.0, 0.0, 0.0]), 1.0)
+    assert near[1] == pytest.approx(v - np.array([3.0, 0.0, 0.0]), abs=0.05)
+    assert near[2] == pytest.approx(a, abs=0.1)
+
+
+@pytest.mark.parametrize(("period_s", "part"), [(4.0, 1.0), (1.2, 0.0)])
+def test_what_needs_more_than_the_largest_thrust_is_impossible(period_s: float, part: float) -> None:
+    _, v, a, _ = circle(3.0, period_s)
+    assert feed_forward.feasible_part(v, a, CALM, WIDE, PACKED) == part
 
 
 def test_the_approach_is_smooth_and_within_its_acceleration() -> None:
@@ -93,7 +106,7 @@ def test_the_approach_is_smooth_and_within_its_acceleration() -> None:
     still = np.zeros((STEPS + 2, 3))
     p, v, a = near = (still.copy(), still.copy(), still.copy())
     position, velocity = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -6.0])
-    feed_forward.approach(position, velocity, (still, still, still), packed(GUIDANCE), near)
+    feed_forward.approach(position, velocity, (still, still, still), 1.0, packed(GUIDANCE), near)
     assert np.linalg.norm(a, axis=1).max() < 10.0
     assert a[0, 2] > 5.0
     assert np.diff(p, axis=0) / INTERVAL_S == pytest.approx(0.5 * (v[1:] + v[:-1]), abs=1e-3)

@@ -58,13 +58,14 @@ def test_rotors_without_lag_have_what_they_are_commanded() -> None:
     assert levels[1].tolist() == [0, 0, 1, 1, 0, 0, 0, 0, 0]
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_deviations_are_the_motions_derivative(seed: int) -> None:
-    numbers = model_of(HUMMINGBIRD, INTERVAL_S)
+@pytest.mark.parametrize(("seed", "without"), [(0, []), (1, []), (2, ["rotor-lag"]), (3, ["rotor-lag"])])
+def test_deviations_are_the_motions_derivative(seed: int, without: list[str]) -> None:
+    vehicle = HUMMINGBIRD.without(without)
+    numbers = model_of(vehicle, INTERVAL_S)
     means, levels = lagging(STARTS, numbers.lag)
     rigid, squared, commands = start(seed)
     commands[:] = commands[0]
-    motion, speeds = rolled(HUMMINGBIRD, rigid, squared, commands)
+    motion, speeds = rolled(vehicle, rigid, squared, commands)
     responses = np.full((STEPS + 1, DEVIATIONS, ROTORS * (len(STARTS) - 1)), np.nan)
     respond(motion, speeds, means, levels, packed(numbers), empty_transition(STEPS), responses)
     step = 1e-4
@@ -74,7 +75,7 @@ def test_deviations_are_the_motions_derivative(seed: int) -> None:
         for sign in (1.0, -1.0):
             changed = commands.copy()
             changed[STARTS[block] : STARTS[block + 1], rotor] += sign * step
-            ends.append(rolled(HUMMINGBIRD, rigid, squared, changed)[0][-1])
+            ends.append(rolled(vehicle, rigid, squared, changed)[0][-1])
         difference = (ends[0] - ends[1]) / (2.0 * step)
         R = np.array(rotation_matrix(tuple(motion[-1, 6:10])))
         before, after = (np.array(rotation_matrix(tuple(end[6:10]))) for end in ends)

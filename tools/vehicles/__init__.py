@@ -1,0 +1,1 @@
+"""Flights of every vehicle of a folder, in memory."""
