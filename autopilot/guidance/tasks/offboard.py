@@ -13,6 +13,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
 
 UP = 2
+MAX_RATES_AGE_US = 300_000
 _BRAKE_1_S = 2.0
 """Rate at which an acceleration fades near the speed limit."""
 
@@ -33,10 +34,17 @@ class OffboardTask(EndlessTask):
             return PositionMotion(
                 position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits
             )
-        if isinstance(setpoint, AttitudeSetpoint) and self._tilt:
+        if isinstance(setpoint, AttitudeSetpoint) and self._tilt and not rates_stale(setpoint, context.now_us):
             self._hold = HoldTask()
             return self._tilt.by_command(self._tilt.generator.from_setpoint(setpoint), context)
+        if self._tilt:
+            self._tilt.forget()
         return self._hold.update(context)
+
+
+def rates_stale(setpoint: AttitudeSetpoint, now_us: int) -> bool:
+    """Check the age of body rates: those of a silent companion would turn the vehicle over. An attitude may stay."""
+    return setpoint.attitude is None and now_us - setpoint.time_us > MAX_RATES_AGE_US
 
 
 def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:

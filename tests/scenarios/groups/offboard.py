@@ -3,6 +3,7 @@
 from math import inf, nan
 
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.client.setpoints import attitude_target
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.vehicle import Sitl
 from tests.scenarios.words import conditions as see
@@ -27,6 +28,19 @@ def lost_at_its_time(sitl: Sitl) -> None:
 def begin_offboard(sitl: Sitl) -> None:
     sitl.run(0.2, lambda: do.setpoint(position=PLACE)(sitl))
     sitl.select(Mode.OFFBOARD)
+
+
+def silent_in_a_turn(sitl: Sitl) -> None:
+    """Ask for a roll of 1.5 rad/s, and be silent: the vehicle may lean by what 0.3 s of it amount to."""
+
+    def turn(rate_rad_s: float) -> None:
+        name, fields = attitude_target((1, 1), rates=(rate_rad_s, 0.0, 0.0), thrust=0.5, time_us=sitl.time_us)
+        sitl.gcs.send(name, *fields)
+
+    sitl.run(0.3, lambda: turn(0.0))
+    sitl.select(Mode.OFFBOARD)
+    turn(1.5)
+    do.hold(see.every(see.tilted_less(35.0), see.near(PLACE, 1.0)), for_=3.0)(sitl)
 
 
 SCENARIOS = (
@@ -88,6 +102,13 @@ SCENARIOS = (
             do.hold(see.every(see.mode(Mode.HOLD), see.near(PLACE, 0.1), see.ARMED), for_=2.0),
             do.check(see.says("setpoints lost")),
         ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="stale-body-rates",
+        peer="PX4: followed until COM_OF_LOSS_T",
+        holds="followed for 0.3 s: leans by less than 35 degrees, stays within 1 m",
+        steps=(silent_in_a_turn,),
         setting={"airborne": 5.0},
     ),
     Scenario(
