@@ -24,7 +24,9 @@ _UNEVEN = 0.1
 """Fraction of a drift that varies with the load on the computer."""
 _LEAST_EXCHANGES = 10
 """Fewest exchanges to estimate a drift from."""
-_MAX_DRIFT = 0.2
+_RATED = 10
+"""Answers that give the rate of a clock too fast or too slow for an offset."""
+MAX_DRIFT = 0.2
 """Largest plausible drift; a larger change of the offset is a restart of the vehicle."""
 _SURE = 4.0
 """Significance threshold of a drift, in standard deviations."""
@@ -48,6 +50,8 @@ class VehicleClock:
         self._best: Exchange | None = None
         self._drift = 0.0
         self._known = False
+        self.answered_us: int | None = None
+        self._answers: deque[tuple[int, int]] = deque(maxlen=_RATED)
 
     @property
     def known(self) -> bool:
@@ -57,6 +61,14 @@ class VehicleClock:
     def round_trip_us(self) -> int:
         trips = sorted(exchange.round_trip_us for exchange in self._exchanges)
         return trips[len(trips) // 2] if trips else 0
+
+    @property
+    def rate(self) -> float:
+        """Return the rate of the vehicle's clock relative to the own, over the last second; 1 if unknown."""
+        if len(self._answers) < _RATED:
+            return 1.0
+        (began_us, began), (ended_us, ended) = self._answers[0], self._answers[-1]
+        return (ended - began) / max(ended_us - began_us, 1)
 
     def own_us(self, vehicle_us: int) -> int:
         """Convert a time of the vehicle's clock to the own; raise `ValueError` before the first exchange."""
@@ -76,6 +88,8 @@ class VehicleClock:
         sent_us = ts1 // NS_PER_US
         if tc1 == 0 or not now_us - WINDOW_US <= sent_us <= now_us:
             return
+        self.answered_us = now_us
+        self._answers.append(((sent_us + now_us) // 2, tc1 // NS_PER_US))
         exchange = Exchange(now_us, now_us - sent_us, tc1 // NS_PER_US - (sent_us + now_us) // 2)
         if self._contradicts(exchange):
             self._outliers.append(exchange)
@@ -99,7 +113,7 @@ class VehicleClock:
         if best is None:
             return False
         explained_us = (exchange.round_trip_us + best.round_trip_us) // 2 + _RESET_US
-        drifted_us = _MAX_DRIFT * (exchange.received_us - best.received_us)
+        drifted_us = MAX_DRIFT * (exchange.received_us - best.received_us)
         return abs(exchange.offset_us - best.offset_us) > explained_us + drifted_us
 
 
@@ -118,4 +132,4 @@ def drift_of(exchanges: Iterable[Exchange]) -> float:
     ]
     drift = median(slopes)
     uncertain = median(abs(slope - drift) for slope in slopes) / sqrt(half)
-    return drift if _SURE * uncertain < abs(drift) <= _MAX_DRIFT else 0.0
+    return drift if _SURE * uncertain < abs(drift) <= MAX_DRIFT else 0.0

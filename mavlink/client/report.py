@@ -28,10 +28,8 @@ _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 class VehicleReport:
     """The last reports of a vehicle."""
 
-    heartbeat_us: int | None = None
     autopilot: int = -1  # MAV_AUTOPILOT
     mode: int = -1  # `custom_mode`
-    mode_us: int | None = None
     mode_reports_us: list[int] = field(default_factory=list)
     armed: bool = False
     system_status: int = 0  # MAV_STATE
@@ -44,6 +42,7 @@ class VehicleReport:
     home: Geodetic | None = None
     origin: Geodetic | None = None  # of its local frame
     texts: list[str] = field(default_factory=list)
+    reported_us: dict[str, int] = field(default_factory=dict)  # of the last report, by its subject
     _told: int = 0
     _sequence: int | None = None
     _tells_estimates: bool = False
@@ -63,27 +62,28 @@ class VehicleReport:
         fields, newest = message.fields, self._is_newest(message)
         match message.name:
             case "HEARTBEAT":
-                self.heartbeat_us, self.autopilot = now_us, fields.autopilot
+                self.autopilot = fields.autopilot
                 self.system_status = fields.system_status
+                self.reported_us["heartbeat"] = now_us
                 if newest:
                     self.armed = bool(fields.base_mode & MODE_ARMED)
                     self._set_mode(fields.custom_mode, now_us)
             case "CURRENT_MODE" if newest:
                 self._set_mode(fields.custom_mode, now_us)
             case "EXTENDED_SYS_STATE":
-                self.landed_state = fields.landed_state
+                self.landed_state, self.reported_us["landed"] = fields.landed_state, now_us
             case "SYS_STATUS":
-                self._take_status(fields)
+                self._take_status(fields, now_us)
             case "BATTERY_STATUS":
-                if fields.battery_remaining >= 0:
-                    self.battery = fields.battery_remaining / _PERCENT
+                self._take_battery(fields, now_us)
             case "ESTIMATOR_STATUS":
                 self._tells_estimates, flags = True, fields.flags
+                self.reported_us["estimator"] = now_us
                 self.estimator_ok = (
                     flags & _ESTIMATES == _ESTIMATES and bool(flags & _PLACES) and bool(flags & _HEIGHTS)
                 )
             case "GLOBAL_POSITION_INT":
-                self.altitude_amsl_m = fields.alt * _MM
+                self.altitude_amsl_m, self.reported_us["altitude"] = fields.alt * _MM, now_us
             case "HOME_POSITION":
                 self.home = _geodetic(fields)
             case "GPS_GLOBAL_ORIGIN":
@@ -92,7 +92,8 @@ class VehicleReport:
                 self.texts.append(fields.text)
 
     def _set_mode(self, mode: int, now_us: int) -> None:
-        self.mode, self.mode_us = mode, now_us
+        self.mode = mode
+        self.reported_us["mode"] = now_us
         self.mode_reports_us = [at_us for at_us in self.mode_reports_us if now_us - at_us < 1_000_000] + [now_us]
 
     def _is_newest(self, message: Message) -> bool:
@@ -103,15 +104,20 @@ class VehicleReport:
         self._sequence = sequence
         return True
 
-    def _take_status(self, fields: Any) -> None:
+    def _take_status(self, fields: Any, now_us: int) -> None:
+        self.reported_us["status"] = now_us
         if fields.onboard_control_sensors_present & _PREARM:
             self.prearm_ok = bool(fields.onboard_control_sensors_health & _PREARM)
         if not self._tells_estimates and fields.onboard_control_sensors_present & _AHRS:
             self.estimator_ok = bool(fields.onboard_control_sensors_health & _AHRS)
+            self.reported_us["estimator"] = now_us
         watched = fields.onboard_control_sensors_enabled & _FENCE
         self.fence_breached = bool(watched) and not fields.onboard_control_sensors_health & _FENCE
+        self._take_battery(fields, now_us)
+
+    def _take_battery(self, fields: Any, now_us: int) -> None:
         if fields.battery_remaining >= 0:
-            self.battery = fields.battery_remaining / _PERCENT
+            self.battery, self.reported_us["battery"] = fields.battery_remaining / _PERCENT, now_us
 
 
 def _geodetic(fields: Any) -> Geodetic:

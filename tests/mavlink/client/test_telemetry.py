@@ -66,6 +66,18 @@ def test_a_drifting_clock_of_a_simulator_is_followed(drift: float) -> None:
     assert not unknown
 
 
+@pytest.mark.parametrize("rate", [0.5, 1.0, 3.0])
+def test_a_clock_that_is_not_of_real_time_is_told_from_silence(rate: float) -> None:
+    clock = VehicleClock()
+    assert (clock.rate, clock.answered_us) == (1.0, None)
+    for now_us in range(0, 3_000_000, 100_000):
+        asked = clock.request(now_us)
+        assert asked is not None
+        clock.receive(round(rate * now_us) * 1000 + 1, asked[1], now_us + 2_000)
+    assert clock.answered_us == 2_902_000
+    assert clock.rate == pytest.approx(rate, rel=0.02)
+
+
 def test_what_is_no_answer_says_nothing_of_the_clock() -> None:
     clock = VehicleClock()
     clock.receive(0, 1_000_000, 2_000)
