@@ -18,10 +18,12 @@ from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
 from colibri.companion.steering.smooth_start import smoothly_started
+from colibri.companion.supervision.ages import ages_s
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
+from colibri.companion.supervision.consistency import Consistency
 from colibri.companion.supervision.ending import CompanionEnd, how_it_ended
-from colibri.companion.supervision.limits import FlightFacts, Limit, box_of, exceeded
+from colibri.companion.supervision.limits import CRITICAL, FlightFacts, FlightRegion, Limit, box_of, exceeded
 from colibri.companion.supervision.pace import SetpointRate
 from colibri.companion.supervision.phases import CompanionPhase, PhaseCondition, next_phase
 from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
@@ -52,6 +54,7 @@ class Companion:
         law: Factory | None = None,
     ) -> None:
         self._settings, self._vehicle = settings, vehicle
+        self._duration_s = min(settings.duration_s, track.duration_s)
         self.peer = VehiclePeer(settings.stack)
         self._response = settings.response or (settings.stack.response if settings.stack else _GUESSED)
         track = smoothly_started(track)
@@ -64,12 +67,14 @@ class Companion:
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._thrust: Thrust | None = None
         self.phase, self._since_us = CompanionPhase.CONNECTING, 0
-        self._begun = False
+        self._began_us: int | None = None
         self._next_us = 0
         self._newest: ReceivedState | None = None
         self._asked: LawDemand | None = None
         self._jumped_m = 0.0
-        self._law_error = ""
+        self._consistency = Consistency()
+        self._law_error = self._fault = ""
+        self._passed_us: int | None = None
         self._pace = SetpointRate()
         self._stopped = self._brakes = self._on_way = self._has_flown = False
         self.failing: list[str] = ["clock"]
@@ -93,17 +98,22 @@ class Companion:
     @property
     def waits_for(self) -> list[str]:
         if self.phase is CompanionPhase.CONNECTING:
-            return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
+            return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for the vehicle's parameters"]
         if self.phase is not CompanionPhase.CHECKING:
             return []
         if self.failing or self._settings.dry_run or self._settings.may_arm:
             return self.failing
         return ["all is checked: waits for a vehicle that flies, in a mode that holds or takes setpoints"]
 
-    def stop(self, why: str) -> None:
-        """End the flight: hand over, or never begin."""
+    @property
+    def has_flown(self) -> bool:
+        return self._has_flown
+
+    def stop(self, why: str, *, fault: bool = False) -> None:
+        """End the flight: hand over, or never begin. After a `fault` it has not ended in order."""
         if not self._stopped:
             self.said.append(why)
+        self._fault = self._fault or (why if fault else "")
         self._stopped = True
 
     def receive(self, datagram: bytes, now_us: int) -> None:
@@ -111,8 +121,8 @@ class Companion:
             self._take_in(received)
 
     def poll(self, now_us: int) -> list[bytes]:
-        if not self._begun:
-            self._begun, self._since_us, self._next_us = True, now_us, now_us
+        if self._began_us is None:
+            self._began_us = self._since_us = self._next_us = now_us
         if self.ended is not None:
             return []
         if self._thrust is None:
@@ -127,12 +137,16 @@ class Companion:
 
     def _take_in(self, received: ReceivedState) -> None:
         at_us, state = received
-        if self._newest is not None and at_us > self._newest.at_us:
+        if self._newest is not None:
+            if at_us <= self._newest.at_us:
+                return
             before = self._newest.state
             passed_s = (at_us - self._newest.at_us) * 1e-6
             there = tuple(p + passed_s * v for p, v in zip(before.position_enu_m, before.velocity_enu_m_s, strict=True))
-            self._jumped_m = dist(there, state.position_enu_m) if passed_s < 1.0 else 0.0
+            if passed_s < 1.0:
+                self._jumped_m = max(self._jumped_m, dist(there, state.position_enu_m))
         self._newest = received
+        self._consistency.add(at_us, state)
         self._predictor.corrected_in_s = _CORRECTED_IN * self.peer.clock.round_trip_us * 1e-6
         self._predictor.observe(at_us, state)
         if self._settings.identifies and self._on_way:
@@ -167,7 +181,12 @@ class Companion:
 
     def _look(self, now_us: int) -> None:
         if self.phase is CompanionPhase.CHECKING:
+            if self._settings.stay is not None and self._newest is not None:
+                place = self._settings.stay.place(self._newest.state.position_enu_m)
+                self._box = FlightRegion.at(place, self._settings.limits.margin_m)
             self.failing = failing(self._check_facts(now_us))
+            if self._settings.dry_run:
+                self._rehearse(now_us)
         elif (
             self.phase in (CompanionPhase.TAKING_OFF, CompanionPhase.TAKING_OVER, CompanionPhase.FLYING)
             and self.limit is None
@@ -176,14 +195,26 @@ class Companion:
             self.limit = exceeded(facts, self._settings.limits, self._box)
             if self.limit is not None:
                 self.said.append(f"{self.limit.name}: {self.limit.words(facts, self._settings.limits)}")
+        self._jumped_m = 0.0
+
+    def _rehearse(self, now_us: int) -> None:
+        """Add the failures of a law that runs but does not fly; its time counts from when all checks passed."""
+        if self._law_error:
+            self.failing.append(f"control law: {self._law_error}")
+        elif not self.failing and self._pace.kept(now_us, self.interval_us) < self._settings.limits.min_pace:
+            self.failing.append("overloaded: this computer is too slow for the control law")
+        if self._passed_us is None and not self.failing:
+            self._passed_us = now_us
+            self.said.append("all is checked: the law runs, and nothing is sent")
 
     def _situation(self, now_us: int) -> Situation:
         report, stack = self.peer.report, self.peer.stack
+        waited_s = (self._since_us - (self._began_us or 0)) * 1e-6
         return Situation(
             phase=self.phase,
             stack=stack,
             in_phase_s=(now_us - self._since_us) * 1e-6,
-            gives_up_s=inf if self._settings.dry_run else self._settings.gives_up_s,
+            gives_up_s=self._settings.gives_up_s - waited_s if self._passed_us is None else inf,
             mode=report.mode,
             modes=self._orders.own_modes(self.phase),
             failing=len(self.failing) + self._settings.dry_run,
@@ -207,7 +238,7 @@ class Companion:
 
     def _finished(self, now_us: int) -> bool:
         if self._settings.dry_run:
-            return (now_us - self._since_us) * 1e-6 >= self._settings.duration_s
+            return self._passed_us is not None and (now_us - self._passed_us) * 1e-6 >= self._duration_s
         if not self._on_way or self._asked is None:
             return False
         if self._settings.identifies:
@@ -218,9 +249,14 @@ class Companion:
         return (now_us - self._since_us - _STEADY_US) * 1e-6
 
     def _enter(self, phase: CompanionPhase, why: PhaseCondition, now_us: int) -> None:
+        waits_for = self.waits_for
         before, self.phase, self._since_us = self.phase, phase, now_us
         self.said.append(f"{phase}: {self._orders.refused or why.value}")
-        if self._newest is not None and before is CompanionPhase.CHECKING:
+        if before is CompanionPhase.CHECKING:
+            self.said += failing(self._check_facts(now_us), required=False)
+        if phase is CompanionPhase.CHECKING:
+            self._pace.begin(now_us)
+        if self._newest is not None and before is CompanionPhase.CHECKING and phase is not CompanionPhase.ENDED:
             x, y, z = self._newest.state.position_enu_m
             self._orders.set_ground(z)
             here = (x, y, z) if phase is CompanionPhase.TAKING_OVER else (x, y, self._orders.height_enu_m)
@@ -238,7 +274,12 @@ class Companion:
             self._pilot.hold()
             self._brakes = why is PhaseCondition.FINISHED
         elif phase is CompanionPhase.ENDED:
-            self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self.failing)
+            fault = self._orders.refused or self._fault
+            if why is PhaseCondition.PILOT and self.peer.report.system_status in CRITICAL:
+                fault = fault or f"the vehicle reports an emergency (system status {self.peer.report.system_status})"
+            elif self._settings.dry_run and before in (CompanionPhase.CONNECTING, CompanionPhase.CHECKING):
+                fault = fault or "; ".join(waits_for)
+            self.ended = how_it_ended(before, why, self.limit, fault, waits_for)
 
     def _may_hand_over(self, now_us: int) -> bool:
         """At the end of a track wait until the vehicle is slow."""
@@ -265,7 +306,7 @@ class Companion:
         if self.phase is CompanionPhase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
             self._on_way = True
             if not self._settings.identifies:
-                self._pilot.fly_track()
+                self._pilot.fly_track(self._settings.stay)
         y = self._predictor.at(acts_us)
         try:
             asked = self._pilot.step(y)
@@ -309,6 +350,8 @@ class Companion:
             thrust=self._thrust,
             parameters=peer.parameter_values,
             clock_known=peer.clock.known,
+            clock_rate=peer.clock.rate,
+            ages=ages_s(peer.report, peer.clock.answered_us, now_us),
             round_trip_s=peer.clock.round_trip_us * 1e-6,
             state_age_s=self._age_s(now_us),
             state_rate_hz=peer.state_rate_hz(now_us),
@@ -316,9 +359,18 @@ class Companion:
             mode_rate_hz=peer.report.mode_rate_hz(now_us),
             report=peer.report,
             may_arm=self._settings.may_arm,
+            approach_m=self._approach_m(),
+            contradiction=self._consistency.contradiction,
             box=self._box,
             limits=self._settings.limits,
         )
+
+    def _approach_m(self) -> float:
+        """Return the way to the track's first point, m; nan before the first state."""
+        if self._newest is None:
+            return nan
+        here, stay = self._newest.state.position_enu_m, self._settings.stay
+        return dist(here, self._pilot.start_enu_m if stay is None else stay.place(here))
 
     def _flight_facts(self, now_us: int) -> FlightFacts:
         newest, flies = self._newest, self.phase is CompanionPhase.FLYING
@@ -336,4 +388,6 @@ class Companion:
             law_error=self._law_error,
             pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
             gap_s=self._pace.gap_s(now_us) if flies else 0.0,
+            ages=ages_s(self.peer.report, self.peer.clock.answered_us, now_us),
+            contradiction=self._consistency.contradiction,
         )

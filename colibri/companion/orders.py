@@ -100,6 +100,7 @@ class Orders:
             name = f"mode {wanted.name}"
             if results.get(name) not in (None, RESULT_ACCEPTED):
                 self._asked_hold += 1
+                self._peer.forget(name)
             self._mode(wanted)
 
     def _arm(self, stack: Stack) -> None:

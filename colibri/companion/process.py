@@ -1,7 +1,9 @@
 """Process of a companion: its link and its clock. All decisions are in `guide`."""
 
 import csv
+import signal
 from argparse import Namespace
+from collections.abc import Iterator
 from math import inf
 from pathlib import Path
 from time import perf_counter, time
@@ -13,7 +15,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track, track_th
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
 from colibri.common.files import regular
-from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen, handle_endings
 from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
@@ -25,10 +27,12 @@ from colibri.companion.report import report
 from colibri.companion.response_file import read_response
 from colibri.companion.settings import CompanionSettings, SetpointKind
 from colibri.companion.stacks.recognition import STACKS
+from colibri.companion.steering.stay import stay_of
 from colibri.companion.supervision.limits import FlightLimits
+from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.flights.folder import occupied
-from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.links.link import GroundLink, LinkError
 from colibri.mavlink.links.open import check_reach, open_ground_link
 from colibri.mavlink.wire.signing import Signing, SigningError, read_key, tick_at
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -37,6 +41,10 @@ LOG, REPORT, RESPONSE, FIGURE = "companion.csv", "report.json", "companion.toml"
 _POLL_S = 0.002
 _IDENTIFIES_AT_M = 3.0
 _SAY_FAILING_EVERY_S = 5.0
+_MAX_IGNORED = 5
+"""Of more strangers nothing is said."""
+_SILENT_S = 3.0
+"""Silence of the vehicle after which another address may be its."""
 
 
 class CompanionFlight(NamedTuple):
@@ -86,6 +94,7 @@ def plan_of(args: Namespace) -> CompanionFlight:
         stack=STACKS[args.stack] if args.stack else None,
         response=response,
         identifies=args.identify,
+        stay=stay_of(name),
         thrust_scale=thrust_scale,
     )
     return CompanionFlight(settings, profile, vehicle, track, note, mission)
@@ -129,6 +138,8 @@ def fly(args: Namespace) -> int:
                 serve(companion, wire, status, stop, _Log(file, summary))
         except Error as error:
             fail(str(error), EXIT_FAILED)
+        except OSError as error:
+            fail(f"{args.out / LOG}: {error.strerror}", EXIT_FAILED)
         finally:
             wire.link.close()
         given = _given(args, plan)
@@ -136,26 +147,45 @@ def fly(args: Namespace) -> int:
         write_report(figures, args.out / REPORT)
         if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
             _identify(companion, status, args.out)
+    if stop.code and not companion.has_flown and not plan.settings.dry_run:
+        fail("ended by a signal before it flew", stop.code)
     return _end(companion, figures, status, args.out)
 
 
 class _Wire:
-    """The link to one vehicle, at the address of its newest datagram."""
+    """The link to one vehicle. Once that is known, other senders are ignored until it has been silent."""
 
     def __init__(self, link: GroundLink) -> None:
         self.link = link
         self._address: Address | None = link.target
+        self._heard_s: float | None = None
+        self._ignored: set[Address] = set()
+        self._told: set[Address] = set()
 
-    def receive(self) -> list[bytes]:
-        received = []
+    def receive(self, peer: VehiclePeer, now_s: float) -> Iterator[bytes]:
+        """Yield datagrams; who sends the vehicle's HEARTBEAT is the vehicle."""
         for datagram, sender in self.link.receive_now():
-            received.append(datagram)
-            self._address = sender
+            known = self._heard_s is not None and now_s - self._heard_s < _SILENT_S
+            if known and sender != self._address:
+                if len(self._ignored) < _MAX_IGNORED:
+                    self._ignored.add(sender)
+                continue
+            before_us = peer.report.reported_us.get("heartbeat")
+            yield datagram
+            if self._heard_s is None:
+                self._address = sender
+            if (sender == self._address and peer.system) or peer.report.reported_us.get("heartbeat") != before_us:
+                self._address, self._heard_s = sender, now_s
         for opened in self.link.take_opened():
             self._address = self._address or opened
         if self._address in self.link.take_closed():
-            self._address = None
-        return received
+            self._address = self._heard_s = None
+
+    def take_ignored(self) -> list[Address]:
+        """Return each new sender once."""
+        new = sorted(self._ignored - self._told)
+        self._told |= self._ignored
+        return new
 
     def send(self, frames: list[bytes]) -> None:
         for frame in frames:
@@ -169,9 +199,11 @@ def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) 
     seeker, began_s = HomeSeeker(peer), perf_counter()
     while seeker.home is None:
         now_s = perf_counter() - began_s
-        if stop or now_s > wait_s:
+        if stop:
+            fail("ended by a signal before it flew", stop.code)
+        if now_s > wait_s:
             raise CompanionError("a mission is flown from the vehicle's home, and it has not said where that is")
-        for datagram in wire.receive():
+        for datagram in wire.receive(peer, now_s):
             peer.receive(datagram, round(now_s * 1e6))
         wire.send(seeker.poll(round(now_s * 1e6)))
         wire.link.wait(_POLL_S)
@@ -184,16 +216,23 @@ def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_
     while companion.ended is None:
         now_us = round((perf_counter() - began_s) * 1e6)
         if stop:
-            companion.stop("interrupted: the vehicle is handed over")
-        for datagram in wire.receive():
+            companion.stop(
+                f"{signal.Signals(stop.code - 128).name}: it ends, and a vehicle that it flies is handed over"
+            )
+        for datagram in wire.receive(companion.peer, now_us * 1e-6):
             companion.receive(datagram, now_us)
-        wire.send(companion.poll(now_us))
+        try:
+            wire.send(companion.poll(now_us))
+        except LinkError as error:
+            if companion.phase is CompanionPhase.CONNECTING:
+                raise
+            companion.stop(str(error), fault=True)
         log.write(companion)
+        for sender in wire.take_ignored():
+            status.say("link", f"{sender[0]}:{sender[1]} sends too, and is ignored: one vehicle is flown")
         for line in companion.said:
             status.say("phase", line)
         companion.said.clear()
-        for note in wire.link.take_notes():
-            status.say("link", note)
         for line in companion.peer.report.take_new_texts():
             status.say("vehicle", f"vehicle says: {line}")
         if now_us * 1e-6 > tell_s and companion.waits_for != told:
@@ -207,14 +246,19 @@ class _Log:
     """Writes rows to a file, numbers with nine digits."""
 
     def __init__(self, file: TextIO, summary: FlightSummary) -> None:
-        self._file, self._summary = file, summary
+        self._file, self._summary, self._broken = file, summary, False
         self._writer = csv.writer(file)
         self._writer.writerow(LogRow._fields)
 
     def write(self, companion: Companion) -> None:
         for row in companion.rows:
             self._summary.add(row)
-            self._writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+        try:
+            for row in companion.rows if not self._broken else ():
+                self._writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+        except OSError as error:
+            self._broken = True
+            companion.stop(f"{LOG} cannot be written: {error.strerror}", fault=True)
         companion.rows.clear()
 
 
@@ -260,6 +304,7 @@ def _given(args: Namespace, plan: CompanionFlight) -> dict[str, Any]:
 def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Path) -> int:
     ended = companion.ended
     assert ended is not None, "it was served until then"
+    handle_endings(signal.SIG_IGN)  # a second signal while Python ends would be its exit code
     if figures["control_rmse_m"] is not None:
         status.say(
             "report",

@@ -5,6 +5,7 @@ from enum import StrEnum
 from math import inf
 
 from colibri.companion.stacks.stack import Response, Stack
+from colibri.companion.steering.stay import Stay
 from colibri.companion.supervision.limits import FlightLimits
 
 
@@ -24,6 +25,7 @@ class CompanionSettings:
     Attributes:
         takeoff_height_m: Above the ground; `None` for the height of the track's first point.
         gives_up_s: Timeout of connection and checks.
+        stay: The track is a hover; it begins where the vehicle is.
     """
 
     may_arm: bool = False
@@ -37,3 +39,4 @@ class CompanionSettings:
     response: Response | None = None
     identifies: bool = False
     thrust_scale: float = 1.0
+    stay: Stay | None = None

@@ -75,6 +75,9 @@ class VehiclePeer:
         if under_way is None or under_way.result is not None:
             self._orders[name] = self.client.begin(Command(self.target, number, *params, repeat=_COMMANDS))
 
+    def forget(self, name: str) -> None:
+        self._orders.pop(name, None)
+
     def clear(self) -> None:
         for name in [name for name, order in self._orders.items() if order.result is None]:
             self.client.cancel(self._orders.pop(name))

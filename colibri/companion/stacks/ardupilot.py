@@ -4,7 +4,15 @@ Sources: ArduPilot, Copter Commands in Guided Mode (SET_ATTITUDE_TARGET, GUID_OP
 AP_Motors_Thrust_Linearization.cpp.
 """
 
-from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOffOrder
+from colibri.companion.stacks.stack import (
+    MAX_STALE_S,
+    ROUNDING,
+    ParameterRule,
+    Parameters,
+    Response,
+    Stack,
+    TakeOffOrder,
+)
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.mavlink.client.modes import COPTER_MODES
 from colibri.mavlink.wire.dialect import mav
@@ -14,7 +22,6 @@ _THRUST_AS_THRUST = 8
 """Bit 3 of GUID_OPTIONS; without it a thrust is a climb rate."""
 _HOVER, _EXPO, _SPIN_MIN, _SPIN_MAX = 0.35, 0.65, 0.15, 0.95
 """ArduPilot's defaults."""
-_MAX_TIMEOUT_S = 3.0
 
 
 def _thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
@@ -56,6 +63,7 @@ ARDUPILOT = Stack(
         "FENCE_RADIUS",
         "FENCE_ALT_MAX",
     ),
+    needed=("MOT_THST_HOVER", "MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "GUID_OPTIONS", "GUID_TIMEOUT"),
     rules=(
         ParameterRule(
             "GUID_OPTIONS",
@@ -64,8 +72,8 @@ ARDUPILOT = Stack(
         ),
         ParameterRule(
             "GUID_TIMEOUT",
-            lambda value: value <= _MAX_TIMEOUT_S,
-            "set GUID_TIMEOUT to 1: ArduPilot is to act on silence",
+            lambda value: value <= MAX_STALE_S + ROUNDING,
+            f"set GUID_TIMEOUT to {MAX_STALE_S:g}: ArduPilot follows the last body rates for as long",
         ),
     ),
     fence=("FENCE_RADIUS", "FENCE_ALT_MAX"),

@@ -30,6 +30,7 @@ COLIBRI = replace(
         "GLOBAL_POSITION_INT": 5.0,
     },
     parameters=("COM_OF_LOSS_T", *PX4.fence),
+    needed=(),
     rules=(),
     thrust=_thrust,
     response=_IDENTIFIED,

@@ -3,7 +3,15 @@
 Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference (Multicopter Position Control, Motor Control, Geofence).
 """
 
-from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOffOrder
+from colibri.companion.stacks.stack import (
+    MAX_STALE_S,
+    ROUNDING,
+    ParameterRule,
+    Parameters,
+    Response,
+    Stack,
+    TakeOffOrder,
+)
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.mavlink.client.modes import PX4_MODES
 from colibri.mavlink.wire.dialect import mav
@@ -11,7 +19,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 OFFBOARD, HOLD, LAND = PX4_MODES["Offboard"], PX4_MODES["Hold"], PX4_MODES["Land"]
 _HOVER = 0.5
-_RATES_REACHED_S = 2.0
 
 
 def _thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
@@ -48,9 +55,12 @@ PX4 = Stack(
         "GF_MAX_HOR_DIST",
         "GF_MAX_VER_DIST",
     ),
+    needed=("MPC_THR_HOVER", "THR_MDL_FAC", "COM_OF_LOSS_T"),
     rules=(
         ParameterRule(
-            "COM_OF_LOSS_T", lambda value: value <= _RATES_REACHED_S, "set COM_OF_LOSS_T to 1: PX4 is to act on silence"
+            "COM_OF_LOSS_T",
+            lambda value: value <= MAX_STALE_S + ROUNDING,
+            f"set COM_OF_LOSS_T to {MAX_STALE_S:g}: PX4 follows the last body rates for as long",
         ),
     ),
     fence=("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),

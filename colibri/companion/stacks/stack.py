@@ -13,6 +13,11 @@ from colibri.plant.vehicle.description import Vehicle
 Parameters: TypeAlias = Mapping[str, float]
 """Parameters of the vehicle, by name."""
 
+MAX_STALE_S = 0.3
+"""So long a stack may follow the last body rates of a silent companion."""
+ROUNDING = 1e-6
+"""Of single precision on the wire."""
+
 
 class TakeOffOrder(Enum):
     """Order of the take-off commands."""
@@ -56,6 +61,7 @@ class Stack:
     Attributes:
         steady: `custom_mode` of modes that permit a take-over: the vehicle keeps its place.
         streams: Rates of requested messages, Hz.
+        needed: Parameters without which nothing is flown; others may not exist.
         fence: Parameters of the fence's radius and height, m; 0 disables it.
         response: Assumed without identification.
         integers_by_bits: Integer parameters travel bytewise.
@@ -69,6 +75,7 @@ class Stack:
     steady: frozenset[int]
     streams: Mapping[str, float]
     parameters: tuple[str, ...]
+    needed: tuple[str, ...]
     rules: tuple[ParameterRule, ...]
     fence: tuple[str, str]
     thrust: Callable[[Parameters, Vehicle], Thrust]

@@ -31,6 +31,7 @@ from colibri.common.types import Array, Vector
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
 from colibri.companion.steering.slowness import slowed
+from colibri.companion.steering.stay import Stay
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
@@ -117,8 +118,12 @@ class LawPilot:
         self._generator.follow(self._loop.observe(frame))
         self._task = HoldTask()
 
-    def fly_track(self) -> None:
-        """Go to the track from the present reference, and along it."""
+    def fly_track(self, stay: Stay | None = None) -> None:
+        """Go to the track from the present reference, and along it, or stay there."""
+        reference = self._generator.reference
+        if stay is not None and reference is not None:
+            self._track = stay.track(first(reference.motion), float(reference.heading[0]))
+            self._planner = Planner(self._track, self._profile.references, self._instants.preview)
         start, yaw_rad = self.start_enu_m, float(self._planner.horizon(0).yaw_rad[0])
         self._task = TaskSequence(
             lambda context: TakeoffTask(start[2], None, context),

@@ -6,13 +6,16 @@ from typing import NamedTuple
 
 from colibri.companion.stacks.stack import Stack
 from colibri.companion.stacks.thrust_curve import Thrust
+from colibri.companion.supervision.ages import missing, too_old
 from colibri.companion.supervision.limits import FlightLimits, FlightRegion
+from colibri.mavlink.client.clock import MAX_DRIFT
 from colibri.mavlink.client.report import VehicleReport
 
 MIN_STATE_RATE_HZ = 40.0
 MAX_DELAY_S = 0.08
 MIN_MODE_RATE_HZ = 8.0
 START_BATTERY = 0.3
+MAX_APPROACH_M = 50.0
 _MIN_HOVER, _MAX_HOVER = 0.05, 0.8
 
 
@@ -23,6 +26,8 @@ class CheckFacts(NamedTuple):
     thrust: Thrust | None
     parameters: Mapping[str, float] | None
     clock_known: bool
+    clock_rate: float
+    ages: Mapping[str, float]
     round_trip_s: float
     state_age_s: float
     state_rate_hz: float
@@ -30,6 +35,8 @@ class CheckFacts(NamedTuple):
     mode_rate_hz: float
     report: VehicleReport
     may_arm: bool
+    approach_m: float
+    contradiction: str
     box: FlightRegion
     limits: FlightLimits
 
@@ -44,8 +51,28 @@ class Check(NamedTuple):
 
 
 def _wrong_parameters(now: CheckFacts) -> list[str]:
-    values = now.parameters or {}
-    return [rule.action for rule in now.stack.rules if rule.name in values and not rule.right(values[rule.name])]
+    """Say which parameters are wrong, and which needed ones were not answered: their defaults are not assumed."""
+    values = now.parameters
+    if values is None:
+        return []
+    unread = [f"{name} was not answered: look at the link" for name in now.stack.needed if name not in values]
+    rules = now.stack.rules
+    return unread + [rule.action for rule in rules if rule.name in values and not rule.right(values[rule.name])]
+
+
+def _clock_advice(now: CheckFacts) -> str:
+    if "clock" not in now.ages:
+        return "the vehicle answers no TIMESYNC: look at the link"
+    if not _in_time(now):
+        return (
+            f"the vehicle's clock goes at {100 * now.clock_rate:.0f} % of this computer's: let a simulator fly at "
+            "real time (colibri sitl --speed 1)"
+        )
+    return "too few of its answers to TIMESYNC have arrived: wait, or look at the link"
+
+
+def _in_time(now: CheckFacts) -> bool:
+    return abs(now.clock_rate - 1.0) <= MAX_DRIFT
 
 
 def _inside_fence(now: CheckFacts) -> bool:
@@ -60,14 +87,31 @@ def _inside_fence(now: CheckFacts) -> bool:
 
 
 CHECKS: tuple[Check, ...] = (
-    Check("clock", lambda now: now.clock_known, lambda _: "the vehicle answers no TIMESYNC: look at the link"),
+    Check("clock", lambda now: now.clock_known and _in_time(now), _clock_advice),
+    Check(
+        "ages",
+        lambda now: not too_old(now.ages, in_flight=False),
+        lambda now: "; ".join(too_old(now.ages, in_flight=False)),
+    ),
+    Check(
+        "reports",
+        lambda now: not missing(now.ages),
+        lambda now: f"the vehicle does not report {', '.join(missing(now.ages))}: nothing is concluded from it",
+        required=False,
+    ),
     Check(
         "states",
         lambda now: now.state_rate_hz >= MIN_STATE_RATE_HZ and now.state_age_s <= now.limits.max_state_age_s,
         lambda now: (
-            f"{now.state_rate_hz:.0f} states a second, {MIN_STATE_RATE_HZ:.0f} are needed: raise the link's rate, or "
-            "end other streams"
+            f"{now.state_rate_hz:.0f} states a second, {MIN_STATE_RATE_HZ:.0f} are needed, and the newest is "
+            f"{1e3 * now.state_age_s:.0f} ms old, of at most {1e3 * now.limits.max_state_age_s:.0f}: raise the link's "
+            "rate, or end other streams"
         ),
+    ),
+    Check(
+        "consistency",
+        lambda now: not now.contradiction,
+        lambda now: f"the vehicle's {now.contradiction}: look at its estimator",
     ),
     Check(
         "delay",
@@ -111,6 +155,14 @@ CHECKS: tuple[Check, ...] = (
         "fence",
         lambda now: not now.report.fence_breached and _inside_fence(now),
         lambda _: "the track, with its margin, leads beyond the vehicle's fence: choose another, or move the fence",
+    ),
+    Check(
+        "start",
+        lambda now: not now.approach_m > MAX_APPROACH_M,
+        lambda now: (
+            f"the track begins {now.approach_m:.0f} m from the vehicle, at most {MAX_APPROACH_M:.0f} are flown to it: "
+            "choose another, or take over nearer to it"
+        ),
     ),
 )
 

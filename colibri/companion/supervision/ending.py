@@ -15,16 +15,17 @@ class CompanionEnd(NamedTuple):
 
 
 def how_it_ended(
-    before: CompanionPhase, why: PhaseCondition, limit: Limit | None, refused: str, failing: Sequence[str]
+    before: CompanionPhase, why: PhaseCondition, limit: Limit | None, fault: str, waits_for: Sequence[str]
 ) -> CompanionEnd:
-    if why is PhaseCondition.PILOT:
-        return CompanionEnd(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
+    """Judge an ending; `fault` is a refusal, an emergency or an error, `waits_for` what was missing on the ground."""
     if limit is not None:
         return CompanionEnd(False, f"ended by its limit: {limit.name}")
-    if refused:
-        return CompanionEnd(False, refused)
+    if fault:
+        return CompanionEnd(False, fault)
+    if why is PhaseCondition.PILOT:
+        return CompanionEnd(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
     if why is PhaseCondition.TOO_LATE:
         return CompanionEnd(
-            False, "; ".join(failing) if before is CompanionPhase.CHECKING else f"nothing came of {before} in time"
+            False, ": ".join((f"nothing came of {before} in time", *filter(None, ["; ".join(waits_for)])))
         )
     return CompanionEnd(why is not PhaseCondition.DISARMED or before is CompanionPhase.HANDING_OVER, why.value)

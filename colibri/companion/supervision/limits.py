@@ -1,14 +1,16 @@
 """Limits that end a flight, as one table over the facts of a flight."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import dist
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common.types import Vector
+from colibri.companion.supervision.ages import too_old
 from colibri.mavlink.client.report import VehicleReport
 
 MAX_STATE_AGE_S = 0.1
@@ -18,7 +20,7 @@ MAX_GAP_S = 0.2
 _TRACK_POINTS = 400
 _ENDLESS_S = 100.0
 """Part of an endless track used for its box."""
-_CRITICAL = frozenset({5, 6, 7, 8})
+CRITICAL = frozenset({5, 6, 7, 8})
 """MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
 
 
@@ -30,6 +32,10 @@ class FlightRegion(NamedTuple):
 
     def has(self, place: Vector) -> bool:
         return all(low <= x <= high for low, x, high in zip(self.lower, place, self.upper, strict=True))
+
+    @classmethod
+    def at(cls, place: Vector, margin_m: float) -> "FlightRegion":
+        return cls(place, place).around(place, margin_m)
 
     def around(self, place: Vector, margin_m: float) -> "FlightRegion":
         """Extend the box to a place and its margin."""
@@ -75,6 +81,8 @@ class FlightFacts(NamedTuple):
     law_error: str = ""
     pace: float = 1.0
     gap_s: float = 0.0
+    ages: Mapping[str, float] = MappingProxyType({})
+    contradiction: str = ""
 
 
 class Limit(NamedTuple):
@@ -98,6 +106,12 @@ LIMITS: tuple[Limit, ...] = (
         blind=True,
     ),
     Limit(
+        "contradiction",
+        lambda now, _limits, _box: bool(now.contradiction),
+        lambda now, _limits: f"the vehicle's {now.contradiction}",
+        blind=True,
+    ),
+    Limit(
         "estimate lost",
         lambda now, _limits, _box: now.report.estimator_ok is False,
         lambda _now, _limits: "the vehicle does not know its attitude, velocity or position any more",
@@ -114,6 +128,11 @@ LIMITS: tuple[Limit, ...] = (
         lambda now, _limits, _box: bool(now.law_error),
         lambda now, _limits: now.law_error,
         blind=True,
+    ),
+    Limit(
+        "stale reports",
+        lambda now, _limits, _box: bool(too_old(now.ages, in_flight=True)),
+        lambda now, _limits: "; ".join(too_old(now.ages, in_flight=True)),
     ),
     Limit(
         "overloaded",
@@ -162,7 +181,7 @@ LIMITS: tuple[Limit, ...] = (
     ),
     Limit(
         "failsafe",
-        lambda now, _limits, _box: now.report.system_status in _CRITICAL,
+        lambda now, _limits, _box: now.report.system_status in CRITICAL,
         lambda now, _limits: f"the vehicle reports an emergency (system status {now.report.system_status})",
     ),
 )

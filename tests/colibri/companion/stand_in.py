@@ -62,6 +62,7 @@ class StandIn:
     params: dict[str, float]
     numbers: Numbers = field(default_factory=Numbers)
     armed: bool = False
+    charge: int = 80
     streams: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -240,7 +241,7 @@ class StandIn:
 
     def _sys_status(self) -> tuple[Any, ...]:
         parts = mav.MAV_SYS_STATUS_AHRS | mav.MAV_SYS_STATUS_PREARM_CHECK
-        return (parts, parts, parts, 0, 12_000, -1, 80, 0, 0, 0, 0, 0, 0)
+        return (parts, parts, parts, 0, 12_000, -1, self.charge, 0, 0, 0, 0, 0, 0)
 
     def _estimator_status(self) -> tuple[Any, ...]:
         return (self.own_us, 0x33F, *(0.0,) * 8)
@@ -262,12 +263,12 @@ class StandIn:
 class Px4(StandIn):
     """As PX4's interface has it.
 
-    OFFBOARD is refused without a stream of setpoints, and left for HOLD a second after the last; the interval of
+    OFFBOARD is refused without a stream of setpoints, and left for HOLD COM_OF_LOSS_T after the last; the interval of
     HEARTBEAT cannot be changed; velocities of ODOMETRY are NED; integers of parameters travel bytewise.
     """
 
     def __init__(self, **more: Any) -> None:
-        params = {"MPC_THR_HOVER": 0.45, "THR_MDL_FAC": 0.3, "COM_OF_LOSS_T": 1.0, "COM_RC_OVERRIDE": 1}
+        params = {"MPC_THR_HOVER": 0.45, "THR_MDL_FAC": 0.3, "COM_OF_LOSS_T": 0.3, "COM_RC_OVERRIDE": 1}
         modes: dict[str, Any] = {"mode": PX4_HOLD, "hold": PX4_HOLD, "offboard": PX4_OFFBOARD}
         streamed = ("ODOMETRY", "CURRENT_MODE", "ESTIMATOR_STATUS", *STREAMED)
         super().__init__(autopilot=mav.MAV_AUTOPILOT_PX4, streamed=streamed, params=params, **modes, **more)
@@ -290,7 +291,7 @@ class Px4(StandIn):
         self.choose(PX4_HOLD)
 
     def _rules(self) -> None:
-        if self.mode == PX4_OFFBOARD and self.setpoints[-1][0] < self.time_us - 1_000_000:
+        if self.mode == PX4_OFFBOARD and self.setpoints[-1][0] < self.time_us - self.params["COM_OF_LOSS_T"] * 1e6:
             self.choose(PX4_HOLD)
 
     def _answer_parameter(self, name: str) -> None:
@@ -319,7 +320,7 @@ class ArduPilot(StandIn):
             "MOT_SPIN_MIN": 0.15,
             "MOT_SPIN_MAX": 0.95,
             "GUID_OPTIONS": 8,
-            "GUID_TIMEOUT": 1.0,
+            "GUID_TIMEOUT": 0.3,
             "FENCE_ENABLE": 0,
         }
         modes: dict[str, Any] = {"mode": STABILIZE, "hold": LOITER, "offboard": GUIDED}

@@ -81,7 +81,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
     "above the sea": (waypoints(frame=0), "item 1 is not at a height above home"),
     "below home": (waypoints(up=-1), "item 1 is -1 m above home"),
     "no number": (waypoints(up="high"), "item 1 has 'high' where a number belongs"),
-    "not finite": (waypoints(up=nan), "item 1 has nan where a number belongs"),
+    "not finite": (waypoints(up=nan), "item 1 has 'nan' where a number belongs"),
     "some headings": ([*waypoints(), item(WAYPOINT, (0.0, 0.0, 3.0), yaw=0)], "some waypoints have a heading"),
     "one waypoint": (waypoints()[:1], "needs two waypoints"),
     "no params": ([{"type": "SimpleItem", "command": WAYPOINT}], "item 1 has no command with seven parameters"),

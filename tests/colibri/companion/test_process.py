@@ -2,6 +2,7 @@
 
 import csv
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -34,14 +35,35 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
     with vehicle(tmp_path) as flown:
-        ended = companion(tmp_path / "out", flown.port, str(mission), "--dry-run", "--duration", "1")
+        ended = companion(tmp_path / "out", flown.port, str(mission), "--dry-run", "--duration", "1", "--min-pace", "1")
         assert not any(sight.armed for sight in flown.seen.sights)
+        late = companion(tmp_path / "late", flown.port, "hover", "--dry-run", "--wait", "0.3")
     assert ended.returncode == 0, ended.stderr
+    assert (late.returncode, "nothing came of" in late.stderr) == (1, True)
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert (report["stack"], report["setpoints"], report["in_order"]) == ("colibri", 0, True)
     rows = list(csv.DictReader((tmp_path / "out" / "companion.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) > 20
     assert {row["sent"] for row in rows} == {"0"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_hands_over_and_a_second_one_too(tmp_path: Path, number: signal.Signals) -> None:
+    with vehicle(tmp_path) as flown:
+        options = ["hover:height=2", "--arm", "--max-age", "20000", "--max-gap", "20000", "--min-pace", "1"]
+        command = [sys.executable, "-m", "colibri", "companion", *options, "--out", str(tmp_path / "out")]
+        command += ["--vehicle", f"udpout:127.0.0.1:{flown.port}"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            assert any("flying:" in line for line in process.stderr)
+            process.send_signal(number)
+            process.send_signal(number)
+            said = process.stderr.read()
+        assert process.returncode == 0, said
+        assert f"{number.name}: it ends" in said
+        assert flown.seen.sights[-1].mode == "hold"
+    assert json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))["in_order"]
 
 
 @pytest.mark.long

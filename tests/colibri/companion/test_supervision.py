@@ -9,6 +9,7 @@ import pytest
 from colibri.companion.stacks.ardupilot import ARDUPILOT
 from colibri.companion.stacks.px4 import PX4
 from colibri.companion.stacks.thrust_curve import ThrustCurve
+from colibri.companion.supervision.ages import AGES
 from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
 from colibri.companion.supervision.limits import LIMITS, FlightFacts, FlightLimits, FlightRegion, exceeded
 from colibri.companion.supervision.pace import SetpointRate
@@ -17,11 +18,15 @@ from colibri.mavlink.client.report import VehicleReport
 
 BOX = FlightRegion((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
 QUIET = VehicleReport()
+PX4_VALUES = dict.fromkeys(PX4.needed, 0.3)
+ARDUPILOT_VALUES = {**dict.fromkeys(ARDUPILOT.needed, 0.3), "GUID_OPTIONS": 8.0}
 GOOD = CheckFacts(
     stack=PX4,
     thrust=ThrustCurve(hover=0.4),
-    parameters={},
+    parameters=PX4_VALUES,
     clock_known=True,
+    clock_rate=1.0,
+    ages={row.name: 0.1 for row in AGES},
     round_trip_s=0.02,
     state_age_s=0.01,
     state_rate_hz=100.0,
@@ -29,6 +34,8 @@ GOOD = CheckFacts(
     mode_rate_hz=25.0,
     report=VehicleReport(estimator_ok=True, prearm_ok=True, battery=0.8),
     may_arm=True,
+    approach_m=2.0,
+    contradiction="",
     box=BOX,
     limits=FlightLimits(),
 )
@@ -40,29 +47,37 @@ def reporting(**changed: Any) -> CheckFacts:
 
 FAILS: list[tuple[str, CheckFacts]] = [
     ("clock", GOOD._replace(clock_known=False)),
+    ("clock", GOOD._replace(clock_rate=0.5)),
+    *(("ages", GOOD._replace(ages={**GOOD.ages, row.name: row.start_s + 0.1})) for row in AGES),
+    ("reports", GOOD._replace(ages={})),
+    ("consistency", GOOD._replace(contradiction="attitude and body rates contradict each other")),
+    ("start", GOOD._replace(approach_m=50.1)),
     ("states", GOOD._replace(state_rate_hz=10.0)),
     ("states", GOOD._replace(state_age_s=inf)),
     ("delay", GOOD._replace(round_trip_s=0.3)),
     ("delay", GOOD._replace(state_delay_s=0.09)),
     ("modes", GOOD._replace(mode_rate_hz=1.0)),
     ("parameters", GOOD._replace(parameters=None)),
-    ("settings", GOOD._replace(parameters={"COM_OF_LOSS_T": 30.0})),
-    ("settings", GOOD._replace(stack=ARDUPILOT, parameters={"GUID_OPTIONS": 4.0})),
+    ("settings", GOOD._replace(parameters={})),
+    ("settings", GOOD._replace(parameters=PX4_VALUES | {"COM_OF_LOSS_T": 0.31})),
+    ("settings", GOOD._replace(stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_OPTIONS": 4.0})),
+    ("settings", GOOD._replace(stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_TIMEOUT": 0.5})),
     ("hover thrust", GOOD._replace(thrust=ThrustCurve(hover=0.95))),
     ("hover thrust", GOOD._replace(thrust=None)),
     ("estimator", reporting(estimator_ok=False)),
     ("pre-arm", reporting(prearm_ok=False)),
     ("battery", reporting(battery=0.2)),
     ("fence", reporting(fence_breached=True)),
-    ("fence", GOOD._replace(parameters={"GF_MAX_VER_DIST": 4.0})),
-    ("fence", GOOD._replace(parameters={"GF_MAX_HOR_DIST": 4.0})),
+    ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_VER_DIST": 4.0})),
+    ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_HOR_DIST": 4.0})),
 ]
 
 
 def test_a_vehicle_that_is_ready_passes_every_check() -> None:
     assert failing(GOOD) == failing(GOOD, required=False) == []
     assert failing(reporting(battery=nan, estimator_ok=None, prearm_ok=None)) == []
-    assert failing(GOOD._replace(stack=ARDUPILOT, parameters={"FENCE_ENABLE": 0.0, "FENCE_RADIUS": 1.0})) == []
+    fenceless = ARDUPILOT_VALUES | {"FENCE_ENABLE": 0.0, "FENCE_RADIUS": 1.0}
+    assert failing(GOOD._replace(stack=ARDUPILOT, parameters=fenceless)) == []
 
 
 @pytest.mark.parametrize(("name", "facts"), FAILS)
@@ -79,6 +94,12 @@ def test_every_check_was_seen_to_fail() -> None:
 
 EXCEEDS = [
     ("late states", FlightFacts(QUIET, state_age_s=0.11), ""),
+    ("contradiction", FlightFacts(QUIET, contradiction="position and velocity contradict each other"), "position"),
+    *(
+        ("stale reports", FlightFacts(QUIET, ages={row.name: row.flight_s + 0.1}), row.messages)
+        for row in AGES
+        if row.flight_s < inf
+    ),
     ("estimate lost", FlightFacts(VehicleReport(estimator_ok=False)), ""),
     ("estimate jumped", FlightFacts(QUIET, jumped_m=2.0), ""),
     ("control law", FlightFacts(QUIET, law_error="it raised"), ""),
