@@ -1,4 +1,4 @@
-"""The snippets of docs/connect.md for ground stations, as they stand there; only their ports are other ones."""
+"""Run the snippets of docs/ground-stations.md on other ports."""
 
 import re
 import socket
@@ -15,7 +15,7 @@ from tests.clients.support.geometry import closest_m, place
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.sitl_process import SitlProcess, vehicle
 
-PAGE = Path(__file__).parents[2] / "docs" / "connect.md"
+PAGE = Path(__file__).parents[2] / "docs" / "ground-stations.md"
 GIVE_UP_AFTER_S = 120.0
 SPEED = 4.0
 

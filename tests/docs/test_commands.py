@@ -13,7 +13,7 @@ from tests.support.pages import PAGES, ROOT, blocks, prose
 from tools.pages.reference.command_line import arguments_of, parsers
 
 FOREIGN = {
-    *("dask", "git", "head", "java", "mavproxy.py", "sim_vehicle.py", "export"),
+    *("dask", "git", "head", "java", "mavproxy.py", "sim_vehicle.py", "export", "umask"),
     *("long", "param"),  # at MAVProxy's prompt
 }
 """What begins lines that are no commands of ours."""
