@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.control.registry import factory_of
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
@@ -28,7 +29,9 @@ class LawSpec:
     """The control law, and the vehicle it is made for."""
 
     profile: Annotated[str | Profile, Option("control profile name or .toml", "NAME")] = "flight"
-    controller: Annotated[Any, Option("control law, also of another package (default: the profile's)", "NAME")] = None
+    controller: Annotated[
+        Any, Option("control law: a name, FILE.py or MODULE:NAME (default: the profile's)", "NAME")
+    ] = None
     solver: Annotated[str | None, Option("QP solver of qpsolvers (default: the profile's)", "NAME")] = None
     delay: Annotated[
         float | None,
@@ -55,7 +58,7 @@ class LawSpec:
     @property
     def law(self) -> Any:
         """What makes the control law, where that is an object; None where it goes by a name."""
-        return None if isinstance(self.controller, str | None) else self.controller
+        return None if isinstance(self.controller, str | None) else factory_of(self.controller)
 
     @property
     def law_name(self) -> str | None:

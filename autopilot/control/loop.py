@@ -19,6 +19,7 @@ from colibri.autopilot.control.interface import (
     PlanController,
     VehicleState,
 )
+from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.profile import Profile, ProfileError
 from colibri.autopilot.control.registry import (
     BuildError,
@@ -228,11 +229,11 @@ def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Fact
     try:
         controller = factory(profile.table(profile.controller), vehicle, clock)
     except SettingsError as error:
-        if profile.controller not in profile.controllers:
+        if table_of(profile.controller) not in profile.controllers:
             known = ", ".join(profile.controllers)
             raise ProfileError(
                 f"{profile.where} has no numbers for controller {profile.controller}, only for {known}: "
-                f"choose another profile, or add a table controllers.{profile.controller} to a copy of it"
+                f"choose another profile, or add a table controllers.{table_of(profile.controller)} to a copy of it"
             ) from error
         raise ProfileError(f"{profile.where}: controllers.{profile.controller}: {error}") from error
     except Error:

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
+from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.settings import ControlInterval, current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, named_text, plain, read_named, replaced, toml_names
@@ -63,7 +64,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     def table(self, controller: str) -> dict[str, Any]:
         """Return the settings of a control law; empty for an unknown one."""
-        return self.controllers.get(controller, {})
+        return self.controllers.get(table_of(controller), {})
 
     def replace(self, key: str, value: Any) -> "Profile":
         """Return the profile with another value at a dotted key; a star marks its name.
@@ -96,7 +97,9 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if "qp" not in table:
             raise ProfileError(f"controller {chosen.controller} solves no QP: leave --solver out")
         with_solver = {**table, "qp": {**table["qp"], "solver": solver}}
-        return msgspec.structs.replace(chosen, controllers={**chosen.controllers, chosen.controller: with_solver})
+        return msgspec.structs.replace(
+            chosen, controllers={**chosen.controllers, table_of(chosen.controller): with_solver}
+        )
 
 
 def load_profile(given: str | Profile) -> Profile:

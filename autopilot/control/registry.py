@@ -8,11 +8,12 @@ from importlib.util import find_spec
 from numbers import Integral
 from pathlib import Path
 from sys import modules
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller, Decision, Preview
+from colibri.autopilot.control.law_files import full_name, is_place, law_at
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError, checked, unknown
@@ -56,11 +57,14 @@ def registered() -> EntryPoints:
 
 
 def load_controller(name: str) -> Factory:
-    """Return the factory registered as `name`.
+    """Return the factory registered as `name`, or at a place such as `my_law.py` or `my_law:PID`.
 
     Raises:
         ControllerError: The name is unknown, or its package cannot be loaded.
     """
+    checked("controller", name, str, "a name", ControllerError)
+    if is_place(name):
+        return factory_of(law_at(full_name(name)))
     entry = _entry(name)
     try:
         factory: Factory = entry.load()
@@ -70,7 +74,6 @@ def load_controller(name: str) -> Factory:
 
 
 def _entry(name: str) -> EntryPoint:
-    checked("controller", name, str, "a name", ControllerError)
     name = current_name(name)
     for entry in registered().select(name=name):
         return entry
@@ -85,8 +88,35 @@ class Origin(NamedTuple):
     sha256: str  # of the module's file; empty if there is none
 
 
-@cache
+def factory_of(law: Any) -> Factory:
+    """Return what makes a control law: itself, or for a law that is already made, what returns it."""
+    if isinstance(law, Controller) and not isinstance(law, type):
+        return cast(Factory, Made(law))
+    factory: Factory = law
+    return factory
+
+
+class Made(NamedTuple):
+    """Returns a control law that was made before."""
+
+    law: Controller[Any]
+
+    def __call__(self, *_: object) -> Controller[Any]:
+        return self.law
+
+    @property
+    def __name__(self) -> str:
+        return type(self.law).__name__
+
+
 def origin_of(name: str) -> Origin:
+    if is_place(name):
+        return origin_of_factory(load_controller(name))
+    return registered_origin(name)
+
+
+@cache
+def registered_origin(name: str) -> Origin:
     entry = _entry(name)
     package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
     spec = find_spec(entry.module)
@@ -94,6 +124,7 @@ def origin_of(name: str) -> Origin:
 
 
 def origin_of_factory(law: Factory) -> Origin:
+    law = type(law.law) if isinstance(law, Made) else law
     module = getattr(law, "__module__", "")
     file = getattr(modules.get(module), "__file__", None)
     return Origin(f"{module}:{getattr(law, '__qualname__', type(law).__qualname__)}", "", _sha256(file))

@@ -6,6 +6,7 @@ from warnings import warn
 
 import msgspec
 
+from colibri.autopilot.control.law_files import full_name, is_place
 from colibri.autopilot.control.qp import QpSolver
 from colibri.common.config import Positive, SettingsError, Table
 
@@ -28,11 +29,16 @@ RENAMED = {"whole-lpv-mpc": "lpv-mpc"}
 """Names of 0.1, accepted until 0.3."""
 
 
-@cache
 def current_name(name: str) -> str:
-    """Return the present name of a control law, with a warning if it was renamed."""
+    """Return the present name of a control law; of a file, with the name of its law."""
+    return full_name(name) if is_place(name) else present_name(name)
+
+
+@cache
+def present_name(name: str) -> str:
+    """Return the name of a law, with a warning if it was renamed."""
     if name in RENAMED:
-        warn(f'controller "{name}" is now called "{RENAMED[name]}"', FutureWarning, stacklevel=2)
+        warn(f'controller "{name}" is now called "{RENAMED[name]}"', FutureWarning, stacklevel=3)
     return RENAMED.get(name, name)
 
 

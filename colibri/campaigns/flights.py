@@ -5,11 +5,18 @@ from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
 from enum import StrEnum
+from pathlib import Path
+from sys import modules
 from typing import Any, NamedTuple
 
+import cloudpickle
+
 from colibri.analysis.outcome import files_of, fly_to_its_end
+from colibri.autopilot.control.law_files import is_place, provide
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.control.registry import load_controller
+from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.campaigns.definition import Campaign, Logs, Point
 from colibri.campaigns.engines.engine import Engine, Killed
@@ -60,6 +67,7 @@ class Common(NamedTuple):
     vehicles: dict[str, Vehicle]
     winds: dict[str, Any]
     track_files: dict[str, str]
+    laws: Mapping[str, tuple[str, Any]] = {}
 
 
 class FlightResult(NamedTuple):
@@ -81,7 +89,8 @@ class FlightResult(NamedTuple):
     files: Mapping[str, bytes] = {}
 
 
-def common_of(campaign: Campaign) -> Common:
+def common_of(campaign: Campaign, *, remote: bool = False) -> Common:
+    """Read what all flights share; `remote` workers are also given the control laws of files."""
     profiles = {name: load_profile(name) for name in _names(campaign, "profile", "flight")}
     objects = [value for value in campaign.values("profile") if isinstance(value, Profile)]
     usual = {profile.simulation.vehicle for profile in (*profiles.values(), *objects)}
@@ -95,7 +104,27 @@ def common_of(campaign: Campaign) -> Common:
         vehicles={name: load_vehicle(name) for name in sorted(vehicles)},
         winds={name: wind(name) for name in _names(campaign, "wind") if name.endswith(".csv")},
         track_files={track: text for track, text in files.items() if text is not None},
+        laws=_travelling(campaign) if remote else {},
     )
+
+
+def _travelling(campaign: Campaign) -> dict[str, tuple[str, Any]]:
+    """Return the laws of files by their places; pickle modules by value, if they belong to no installed package."""
+    places = filter(is_place, _names(campaign, "controller"))
+    laws = {place: (current_name(place), load_controller(place)) for place in places}
+    functions = [metric.of for metric in campaign.metrics]
+    objects = [
+        *functions,
+        *campaign.values("controller"),
+        *campaign.values("track"),
+        *(law for _, law in laws.values()),
+    ]
+    for each in objects:
+        module = modules.get(getattr(each, "__module__", None) or "")
+        file = getattr(module, "__file__", None)
+        if module is not None and file and not {"site-packages", "colibri"} & {*Path(file).parts}:
+            cloudpickle.register_pickle_by_value(module)
+    return laws
 
 
 def check(points: Iterable[Point], common: Common, *, ignored: Collection[str] = ()) -> list[str]:
@@ -139,6 +168,7 @@ def fly_point(common: Common, point: Point) -> FlightResult:
 
 
 def plan_point(common: Common, point: Point) -> FlightPlan:
+    provide(common.laws)
     factors = common.fly | point.settings
     options = {name: value for name, value in factors.items() if key_of(name) is None} | {"seed": point.seed}
     if options.get("wind") in common.winds:

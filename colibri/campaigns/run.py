@@ -90,7 +90,7 @@ def fly_campaign(
         raise CampaignError(f"{planned.flights} flights are many: say --yes if you mean it")
     if parquet:
         parquet_writer()
-    common = common_of(planned)
+    common = common_of(planned, remote=engine.is_remote)
     notes = check(planned.samples(), common, ignored=("seed",) if planned.draw else ())
     if out is None:
         return _fly(planned, common, engine, None, progress, notes)

@@ -8,9 +8,10 @@ from time import perf_counter
 from typing import Any
 
 from colibri.autopilot.control.interface import Controller
+from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile, profile_names
-from colibri.autopilot.control.registry import Factory, load_controller
+from colibri.autopilot.control.registry import Factory, factory_of, load_controller
 from colibri.autopilot.spec import LawSpec
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
@@ -37,7 +38,7 @@ class Subject:
     def of(cls, controller: Any, profile: Any, vehicle: Any, seed: int, duration_s: float = 30.0) -> "Subject":
         """Resolve a law as `colibri.fly` does; profile and vehicle default to the law's."""
         named = isinstance(controller, str)
-        law = load_controller(controller) if named else controller
+        law = load_controller(controller) if named else factory_of(controller)
         profile = profile or profile_for(LawSpec(controller=controller).law_name or "")
         given = {"controller": controller, "profile": profile} | ({"vehicle": vehicle} if vehicle else {})
         plan = FlightPlan.of(FlightSpec.of("hover", **given, link="direct"))
@@ -98,7 +99,7 @@ def built(*, controller: Any, profile: Any = None, vehicle: Any = None) -> Contr
 
 def profile_for(controller: str) -> str:
     """Return the law's own profile, else one with its numbers, else the default."""
-    profiles = {name: load_profile(name) for name in profile_names()}
+    profiles, controller = {name: load_profile(name) for name in profile_names()}, table_of(controller)
     own = [name for name, profile in profiles.items() if profile.controller == controller]
     known = [name for name, profile in profiles.items() if controller in profile.controllers]
     return next(iter([*own, *known, _DEFAULT_PROFILE]))

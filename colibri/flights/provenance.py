@@ -81,7 +81,7 @@ def _named(plan: FlightPlan) -> FlightSpec:
     return replace(
         plan.spec,
         profile=name_of(plan.spec.profile),
-        controller=plan.spec.law_name,
+        controller=plan.profile.controller if plan.spec.controller else None,
         vehicle=plan.vehicle_name,
         plant_vehicle=plan.plant_vehicle_name,
         integrator=plan.integrator,

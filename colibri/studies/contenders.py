@@ -27,7 +27,8 @@ def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = N
     """
     given: dict[tuple[str, str | None], None] = {}
     for text in profiles:
-        profile, _, controller = (text, "", "") if text.endswith(".toml") else text.rpartition(":")
+        head, toml, tail = text.partition(".toml")
+        profile, _, controller = (head + toml, "", tail[1:]) if toml else text.partition(":")
         choices: Sequence[str | None] = [controller] if controller and profile else controllers or [None]
         given |= dict.fromkeys((profile or text, choice) for choice in choices)
     names = [load_profile(profile).name for profile, _ in given]

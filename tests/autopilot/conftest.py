@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from colibri.autopilot.control.registry import origin_of, registered
+from colibri.autopilot.control.registry import registered, registered_origin
 from colibri.cli.main import main
 from tests.support.foreign import LAW, TRACK, Ended, FlyTheirs, Package
 
@@ -20,7 +20,7 @@ def fly_theirs(
     def forget() -> None:
         sys.modules.pop(package.module, None)
         registered.cache_clear()
-        origin_of.cache_clear()
+        registered_origin.cache_clear()
 
     def fly(source: str, *words: str) -> Ended:
         monkeypatch.setenv("PYTHONPATH", package.install(tmp_path, source))

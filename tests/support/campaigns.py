@@ -22,6 +22,8 @@ DRAWN = {MASS: {"uniform": [0.68, 0.74]}}
 
 
 class Here:
+    is_remote = False
+
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
     ) -> Generator[tuple[Job, Result | Killed], None, None]:

@@ -23,6 +23,8 @@ _MAX_BATCH = 500
 class Cluster:
     """A Dask cluster. A job that was lost with several workers is repeated alone at the end."""
 
+    is_remote = True
+
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
         """Connect to a scheduler, or use a `distributed.Client`; without `batch`, the jobs per task adapt."""
         try:
@@ -79,6 +81,8 @@ class Cluster:
                     else:
                         suspects += batch
                     continue
+                if isinstance(error, ModuleNotFoundError):
+                    raise CampaignError(f"--dask: {error} on the workers: install it there, or client.upload_file")
                 took_s, results = future.result()
                 if self._batch is None:
                     size = max(1, min(_MAX_BATCH, round(_BATCH_S * len(batch) / max(took_s, 1e-6))))

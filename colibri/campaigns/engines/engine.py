@@ -12,7 +12,9 @@ class Killed:
 
 
 class Engine(Protocol):
-    """Runs many jobs at once."""
+    """Runs many jobs at once; a remote one on other computers."""
+
+    is_remote: bool
 
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]

@@ -23,6 +23,8 @@ _NO_GUARD = 'worker processes cannot load the script: flights must begin under `
 class Pool:
     """A pool of processes. A killed worker breaks it; submitted jobs are then repeated one by one."""
 
+    is_remote = False
+
     def __init__(self, workers: int | None = None) -> None:
         if getattr(current_process(), "_inheriting", False):  # a worker of a script without the guard loads it
             sys.exit(1)

@@ -16,7 +16,7 @@ from colibri.autopilot.control.registry import (
     check_rotor_speeds,
     load_controller,
 )
-from colibri.autopilot.control.settings import current_name
+from colibri.autopilot.control.settings import present_name
 from colibri.common.config import SettingsError
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.foreign import LAW, FlyTheirs, example, fly_as_a_user
@@ -168,7 +168,7 @@ def test_what_a_foreign_law_prints_is_shown(fly_theirs: FlyTheirs) -> None:
 def test_a_former_name_is_accepted_with_a_warning(tmp_path: Path) -> None:
     old = tmp_path / "old.toml"
     old.write_text(profile_text("flight").replace("lpv-mpc", "whole-lpv-mpc"), encoding="utf-8")
-    current_name.cache_clear()
+    present_name.cache_clear()
     with pytest.warns(FutureWarning, match='"whole-lpv-mpc" is now called "lpv-mpc"'):
         profile = load_profile(str(old)).with_choices("whole-lpv-mpc", None)
     assert (profile.controller, profile.controllers) == ("lpv-mpc", load_profile("flight").controllers)
