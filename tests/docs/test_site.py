@@ -43,7 +43,7 @@ def test_the_site_is_built_and_asks_nobody(project: Path) -> None:
 
 @pytest.mark.long
 def test_a_broken_link_fails(project: Path) -> None:
-    with (project / "docs" / "path.md").open("a", encoding="utf-8") as page:
+    with (project / "docs" / "rotor-loss.md").open("a", encoding="utf-8") as page:
         page.write("\n[nowhere](nowhere.md) and [no heading](flight.md#no-heading)\n")
     done = build(project)
     assert done.returncode != 0
