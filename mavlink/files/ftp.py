@@ -246,10 +246,11 @@ class Ftp:
         own = of_channels[request.peer.channel]
         if len(taken) < MAX_SESSIONS or own >= MAX_SESSIONS_OF_A_CHANNEL:
             return own < MAX_SESSIONS_OF_A_CHANNEL
-        channel, most = of_channels.most_common(1)[0]
+        most = max(of_channels.values())
         if own >= most:
             return False
-        victim = min((key for key in taken if key[0].channel == channel), key=lambda key: taken[key].used_us)
+        crowd = (key for key in taken if of_channels[key[0].channel] == most)
+        victim = min(crowd, key=lambda key: taken[key].used_us)
         self._close(victim)
         self._checksums.pop(victim, None)
         return True

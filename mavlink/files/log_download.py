@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from colibri.mavlink.files.tree import ENTRY_US, Entry, FileRefusal, Files, Names, OpenFile
 from colibri.mavlink.node.budget import Budget
-from colibri.mavlink.node.service import IDLE, Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, first_to_go, to
 from colibri.mavlink.wire.dialect import Message
 
 BLOCK_BYTES = 90
@@ -121,14 +121,15 @@ class Logs:
         logs = [entry for entry in logs if not entry.is_folder and entry.name not in self._erasing]
         self._shown.pop(peer, None)
         if len(self._shown) >= MAX_PEERS:
-            forgotten = next(iter(self._shown))
+            forgotten = first_to_go(self._shown)
             del self._shown[forgotten]
             self._stop(forgotten)
         self._shown[peer] = logs[-LAST_ID:]
         return self._shown[peer]
 
     def _transfer(self, peer: Peer, number: int, offset: int, count: int) -> Iterable[Send]:
-        logs = self._shown[peer] if peer in self._shown else self._look(peer)
+        logs = self._shown.pop(peer) if peer in self._shown else self._look(peer)
+        self._shown[peer] = logs  # last in line to be forgotten
         reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else FileRefusal.NOT_FOUND
         if isinstance(reading, FileRefusal) or offset >= reading.size or count == 0:
             return (_block(peer, number, offset, b""),)  # "zero for end of log"

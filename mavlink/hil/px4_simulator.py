@@ -26,6 +26,8 @@ from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu
 RESEND_AFTER_S = 1.0
 """Wall-clock silence before a frame is repeated: PX4 may have restarted, or a datagram been lost."""
 CALL_EVERY_S = 0.5
+GIVEN_UP_AFTER_S = 30.0
+"""Wall-clock time without an answer after which another caller takes over: PX4 needs some seconds to start."""
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _STOPPED: FourRotors = (0.0, 0.0, 0.0, 0.0)
@@ -73,7 +75,8 @@ class SimulatorEnd:
         self._truth_every_us: int | None = None
         self._truth_at_us = 0
         self._frames: tuple[bytes, ...] = ()
-        self._resend_at_s = 0.0
+        self._now_s = self._resend_at_s = 0.0
+        self._answered_s: float | None = None  # or begun
         self._call_at_s = 0.0
         self._outbox: list[tuple[tuple[bytes, ...], Address]] = []
 
@@ -97,7 +100,7 @@ class SimulatorEnd:
                 self.received.append(datagram)
                 return
         for message in self._codec.decode(datagram):
-            if message.name in _BEGINNING and self.peer is None:
+            if message.name in _BEGINNING and (self.peer is None or (sender != self.peer and self._is_given_up())):
                 self._begin(sender, message)
             if sender != self.peer:
                 self.dropped["second autopilot" if self.peer else "not begun"] += 1
@@ -130,7 +133,13 @@ class SimulatorEnd:
         outbox, self._outbox = self._outbox, []
         return outbox
 
+    def _is_given_up(self) -> bool:
+        return self._answered_s is not None and self._now_s - self._answered_s >= GIVEN_UP_AFTER_S
+
     def _send(self, now_s: float) -> None:
+        self._now_s = now_s
+        if self._answered_s is None:
+            self._answered_s = now_s
         self._resend_at_s = now_s + RESEND_AFTER_S
         if self.peer is not None:
             self._outbox.append((self._frames, self.peer))
@@ -140,14 +149,14 @@ class SimulatorEnd:
         self.calls += 1
         self.lockstep, self.answered = False, True
         self.motors = Motors(_STOPPED, armed=False)
-        self._answer_us = self._truth_every_us = None
+        self._answer_us = self._truth_every_us = self._answered_s = None
 
     def _obey(self, numbers: Sequence[Any]) -> None:
         time_us, flags, a, b, c, d, mode = numbers
         if time_us == self._answer_us:
             self.dropped["repeated"] += 1
             return
-        self._answer_us = time_us
+        self._answer_us, self._answered_s = time_us, self._now_s
         self.lockstep = bool(flags & LOCKSTEP_FLAG)
         self.answered = True
         if not (0.0 <= a <= 1.0 and 0.0 <= b <= 1.0 and 0.0 <= c <= 1.0 and 0.0 <= d <= 1.0):

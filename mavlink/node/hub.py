@@ -13,7 +13,9 @@ from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
 from colibri.mavlink.wire.signing import TOO_EARLY, Signing
 
 CHANNELS = 32
-"""Limit of open channels; the longest silent one that is not fixed is replaced."""
+"""Limit of open channels; of those that are not fixed, the longest silent or else the newest one is replaced."""
+SILENT_AFTER_US = 3_500_000
+"""Stations send a HEARTBEAT every second: a flood of new senders does not replace them."""
 FORGET_AFTER_US = 300_000_000
 """Silence before an unfixed channel is closed: sending to it costs time in every frame."""
 _TIDY_EVERY_US = 1_000_000
@@ -287,7 +289,9 @@ class Hub:
             passing = [channel for channel in self._channels.values() if not channel.fixed]
             if not passing:
                 return None
-            self._forget(min(passing, key=lambda channel: channel.active_us).number)
+            silent = min(passing, key=lambda channel: channel.active_us)
+            is_silent = self._now_us - silent.active_us >= SILENT_AFTER_US
+            self._forget(silent.number if is_silent else passing[-1].number)
         return self._open(link, address)
 
     def _open(self, link: int, address: Address | None) -> Channel:

@@ -4,6 +4,7 @@ A service receives only messages of other components to this component or to all
 infinities, unknown enumerations and wrong counts must be refused, and never raise.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
@@ -19,6 +20,13 @@ class Peer(NamedTuple):
     channel: int
     system: int
     component: int
+
+
+def first_to_go(peers: Iterable[Peer]) -> Peer:
+    """Return the first peer of the channel that has most, so that no channel pushes out the others."""
+    waiting = list(peers)
+    ((channel, _),) = Counter(peer.channel for peer in waiting).most_common(1)
+    return next(peer for peer in waiting if peer.channel == channel)
 
 
 class Send(NamedTuple):

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from colibri.mavlink.node.budget import Budget
-from colibri.mavlink.node.service import IDLE, Peer, Send, to
+from colibri.mavlink.node.service import IDLE, Peer, Send, first_to_go, to
 from colibri.mavlink.wire.dialect import Message, mav
 
 DATA_BYTES = 70
@@ -40,7 +40,7 @@ class Shell:
         if fields.device != _SHELL or fields.flags & _REPLY:
             return ()
         if peer not in self._lines and len(self._lines) >= MAX_PEERS:
-            forgotten = next(iter(self._lines))
+            forgotten = first_to_go(self._lines)
             del self._lines[forgotten]
             self._answers.pop(forgotten, None)
         typed = bytes(fields.data)[: fields.count]

@@ -63,7 +63,7 @@ def read_key(path: Path) -> tuple[bytes, str]:
 
 
 def tick_at(unix_s: float) -> int:
-    return min(max(round((unix_s - EPOCH_S) * 1e6 / TICK_US), 0), LAST_TICK)
+    return min(int((unix_s - EPOCH_S) * 1e6 / TICK_US), LAST_TICK) if unix_s > EPOCH_S else 0
 
 
 class Signing:
@@ -91,7 +91,11 @@ class Signing:
 
     def sign(self, frame: bytes, link_id: int) -> bytes:
         """Return the signature of `frame`, which already has the flag."""
-        self.timestamp = min(max(self.timestamp, self._clock()) + 1, LAST_TICK)
+        now = self._clock()
+        if now > self.timestamp:
+            self.timestamp = now
+        elif self.timestamp < LAST_TICK:
+            self.timestamp += 1
         head = bytes([link_id & 0xFF]) + self.timestamp.to_bytes(_TIMESTAMP_BYTES, "little")
         return head + self._digest(frame + head)
 

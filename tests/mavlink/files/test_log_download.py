@@ -167,6 +167,14 @@ def test_logs_are_erased_but_for_the_one_being_written(memory: MemoryFiles) -> N
     assert [entry.name for entry in memory.list(("logs",))] == ["00003.ulg", "no log"]  # type: ignore[union-attr]
 
 
+def test_many_ids_of_one_channel_end_nobody_elses_download(logs: Logs) -> None:
+    sends = ask(logs, "LOG_REQUEST_DATA", 0, 0, ALL)
+    for system in range(1, 2 * log_download.MAX_PEERS):
+        ask(logs, "LOG_REQUEST_LIST", 0, 0, peer=Peer(9, system, 1))
+    sends = [send for send in drain(logs, sends) if send.channel == GROUND.channel]
+    assert b"".join(data for _, _, data in blocks(sends)) == BIG
+
+
 def test_memory_is_bounded(logs: Logs) -> None:
     for number in range(50):
         for offset in range(40):

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common
 
 from colibri.mavlink.node import hub
 from colibri.mavlink.node.channel import DATAGRAM_BYTES
-from colibri.mavlink.node.hub import CHANNELS, FORGET_AFTER_US, Hub
+from colibri.mavlink.node.hub import CHANNELS, FORGET_AFTER_US, SILENT_AFTER_US, Hub
 from colibri.mavlink.node.service import Peer, Send, to_all
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.signing import Signing
@@ -218,9 +218,9 @@ def test_of_too_many_channels_the_one_silent_longest_goes(service: Recorder) -> 
     fixed = ours.open(0, GCS)
     for i in range(1, CHANNELS):
         ours.receive(Station(i + 1).says(), 1, ("127.0.0.1", i), i)
-    ours.receive(Station(2).says(), 1, ("127.0.0.1", 1), 1000)
+    ours.receive(Station(2).says(), 1, ("127.0.0.1", 1), SILENT_AFTER_US)
     for i in range(CHANNELS, CHANNELS + 5):
-        ours.receive(Station(i + 1).says(), 1, ("127.0.0.1", i), 1000 + i)
+        ours.receive(Station(i + 1).says(), 1, ("127.0.0.1", i), SILENT_AFTER_US + i)
     addresses = [channel.address for channel in ours.channels]
     assert len(addresses) == CHANNELS
     assert addresses[:2] == [GCS, ("127.0.0.1", 1)]
@@ -309,5 +309,5 @@ def test_a_flood_of_senders_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatc
     for i in range(500):
         ours.receive(Station(2 + i % 200).says(), 0, ("127.0.0.1", i), i)
         ours.take_outbox()
-    assert [channel.number for channel in ours.channels] == [497, 498, 499]
+    assert [channel.number for channel in ours.channels] == [0, 1, 499]  # who speaks is not pushed out
     assert len(ours._numbers) == len(ours._router._sources) == 3  # noqa: SLF001

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
-from colibri.mavlink.hil.px4_simulator import RESEND_AFTER_S, Motors, SimulatorEnd, Truth
+from colibri.mavlink.hil.px4_simulator import GIVEN_UP_AFTER_S, RESEND_AFTER_S, Motors, SimulatorEnd, Truth
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
@@ -141,6 +141,18 @@ def test_a_second_autopilot_waits_for_the_first_to_end() -> None:
     end.close(PX4)
     end.receive(heartbeat, OTHER)
     assert (end.peer, end.calls, end.motors) == (OTHER, 2, STOPPED)
+
+
+def test_a_caller_that_answers_nothing_gives_way_to_another() -> None:
+    end, px4 = connected()
+    heartbeat = px4.hello()[1]
+    for now_s, peer in ((100.0, PX4), (100.0 + 0.9 * GIVEN_UP_AFTER_S, PX4), (100.0 + GIVEN_UP_AFTER_S, OTHER)):
+        end.offer(frame(round(now_s * 1e6)), None, now_s)
+        end.receive(heartbeat, OTHER)
+        assert end.peer == peer
+    end.offer(frame(10**9), None, 1000.0)
+    end.receive(heartbeat, PX4)
+    assert end.peer == OTHER
 
 
 def test_the_truth_is_told_as_often_as_it_is_wanted() -> None:
