@@ -7,6 +7,7 @@ import pytest
 from colibri.autopilot.ground.stations import Stations
 from colibri.autopilot.process.ground_links import MAX_SAVED_S, SHARE, GroundLinks
 from colibri.common.types import Address
+from colibri.mavlink.node.hub import KEY_REFUSED
 from colibri.mavlink.wire.dialect import Codec
 from colibri.sitl.vehicle import Sitl
 
@@ -167,6 +168,17 @@ def test_who_is_called_first_on_this_computer_is_the_owner(stations: Stations, u
     links[0].url, links[1].url = url, "udpout:127.0.0.1:14540"
     received = GroundLinks(links, Clock(), Clock()).receive(stations)
     assert [each.owner for each in received] == [owner, False]
+
+
+def test_a_refused_key_is_reported_with_where_it_is_allowed(stations: Stations) -> None:
+    link = FakeLink(0, 0)
+    key = Codec(255, 190).encode("SETUP_SIGNING", 1, 1, list(range(32)), 0)
+    link.receive_now = lambda: [(key, HERE)]  # type: ignore[method-assign]
+    for datagram, number, address, owner in GroundLinks([link], Clock(), Clock()).receive(stations):
+        stations.hub.receive(datagram, number, address, 0, owner=owner)
+        break
+    stations.poll(0)
+    assert [line.text for line in stations.take_texts()] == [KEY_REFUSED]
 
 
 def test_notes_of_links_are_handed_on() -> None:
