@@ -1,6 +1,7 @@
-"""Writes `docs/scenarios-flown.md` from the scenarios themselves: `python -m tests.scenarios.page docs`."""
+"""`python -m tests.scenarios.page docs`: write `scenarios-flown.md`."""
 
 import sys
+from itertools import groupby
 from pathlib import Path
 
 from tests.scenarios.groups import GROUPS
@@ -14,23 +15,29 @@ def page() -> str:
     flights = sum(len(each.seeds) if isinstance(each, Scenario) else 1 for group in GROUPS.values() for each in group)
     calm = [each for group in GROUPS.values() for each in group if isinstance(each, Scenario) and each.calm]
     lines = [
-        "# The scenarios",
+        "# Flown scenarios",
         "",
-        f"{count} scenarios, {flights} tests with their seeds, in `tests/scenarios/`: `make scenarios` flies them over",
-        "UDP, `make soak` again and again. This page is written from them by `python -m tests.scenarios.page docs`; a",
-        "test holds that they agree.",
+        f"The {count} scenarios in `tests/scenarios/` ({flights} flights with their seeds): each requirement",
+        "beside its reference in PX4's, ArduPilot's or MAVSDK's tests. Write yours: [scenarios.md](scenarios.md).",
         "",
-        "`make scenarios-rough` flies them over ground links that lose 30 % each way, with 50 ms of jitter: all but",
+        "- `make scenarios` flies them over UDP, `make soak` repeatedly.",
+        "- `make scenarios-rough` flies them over ground links with 30 % loss each way and 50 ms of jitter, except:",
+        *(f"    - {each.name}: {each.calm}" for each in calm),
         "",
-        *(f"- {each.name}: {each.calm}" for each in calm),
-        "",
-        "AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system tests: the numbers of trusted suites, and",
-        "beside each what is asked for here. Times are simulated, places are true.",
+        "AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system tests. Others are our own.",
+        "Times are simulated; positions are the plant's. Written by `python -m tests.scenarios.page docs`.",
     ]
     for name, group in GROUPS.items():
-        lines += ["", f"## {name.capitalize()}", "", "| scenario | a peer asks for | here |", "|---|---|---|"]
-        lines += [f"| {each.name} | {each.peer} | {each.holds}{_seeds(each)} |" for each in group]
+        lines += ["", f"## {name.capitalize()}", "", "| scenario | reference | required here |", "|---|---|---|"]
+        for text, alike in groupby(group, key=_requirements):
+            lines.append(f"| {', '.join(each.name for each in alike)} | {text} |")
     return "\n".join(lines) + "\n"
+
+
+def _requirements(each: Scenario | FleetScenario) -> str:
+    """Return the last two cells of a row."""
+    reference = "-" if each.peer == "ours" else each.peer.removeprefix("ours: ").removeprefix("ours ")
+    return f"{reference} | {each.holds}{_seeds(each)}".replace("at most", "≤")
 
 
 def _seeds(each: Scenario | FleetScenario) -> str:

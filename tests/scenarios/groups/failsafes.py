@@ -23,7 +23,7 @@ def charge_is(state: int) -> Step:
 SCENARIOS = (
     Scenario(
         name="ground-station-lost",
-        peer="AP: nothing at 1.5 times the old timeout after doubling it, then RTL, then “Cleared”",
+        peer="AP: after doubling the timeout, stays in the mode at 1.5 times the old one, then RTL, then “Cleared”",
         holds="the same; return at the timeout, ± 0.2 s",
         steps=(
             *(
@@ -81,7 +81,7 @@ SCENARIOS = (
     Scenario(
         name="a-critical-landing-goes-on",
         peer="AP: not overridden by a later failsafe",
-        holds="lands, though the ground station is lost meanwhile and would have it return",
+        holds="lands, although a ground station loss (return) follows",
         steps=(
             *(
                 do.put("COM_LOW_BAT_ACT", 1),
@@ -100,7 +100,7 @@ SCENARIOS = (
     Scenario(
         name="battery-too-empty-to-arm",
         peer="AP BatteryMissing: refused",
-        holds="refused, and says how full it is",
+        holds="refused, with the charge in the reason",
         steps=(
             do.inject("system_battery", "wrong", 0, 0.02),
             do.run(2.0),
@@ -143,8 +143,8 @@ SCENARIOS = (
         setting=IN_THE_AIR,
     ),
     Scenario(
-        name="too-high-is-a-breach",
-        peer="AP: a fence of height",
+        name="height-fence",
+        peer="AP: height fence",
         holds="20 m: return within 0.5 s",
         steps=(
             *(do.put("GF_ACTION", 3), do.put("GF_MAX_VER_DIST", 20.0)),
@@ -157,7 +157,7 @@ SCENARIOS = (
     Scenario(
         name="a-target-outside-the-fence",
         peer="AP: FAILED",
-        holds="refused, and it stays",
+        holds="refused; holds position",
         steps=(
             do.upload_fence(mission_items.circle(10.0)),
             do.run(0.3),
@@ -167,9 +167,9 @@ SCENARIOS = (
         setting=IN_THE_AIR,
     ),
     Scenario(
-        name="deadline-missed-is-said",
+        name="deadline-missed",
         peer="ours",
-        holds="12 ms of 8: says so, and still hovers within 0.2 m",
+        holds="solve time 12 ms, sample 8 ms: reported, hovers within 0.2 m",
         steps=(
             do.put("SIM_SOLVE_MS", 12.0),
             do.until(see.says("control deadline missed"), within=2.0),
@@ -178,11 +178,11 @@ SCENARIOS = (
         setting=IN_THE_AIR,
     ),
     Scenario(
-        name="tilted-too-far-is-the-end",
-        peer="PX4: FD_FAIL_R, where CBRK_FLIGHTTERM lets it",
-        holds="on its back for 0.3 s: the rotors stop, and it says why",
+        name="tilted-too-far",
+        peer="PX4: FD_FAIL_R, if CBRK_FLIGHTTERM permits",
+        holds="0.3 s on its back: rotors stop, with the reason",
         steps=(do.until(see.DISARMED, within=0.5), do.run(0.2), do.check(see.says("tilted too far"))),
-        calm="what it says is over before a ground station on a rough link is known to it",
+        calm="its reports end before a ground station connects over a rough link",
         setting={
             "airborne": 20.0,
             "start": {"phi": 180.0, "p": 0.0},

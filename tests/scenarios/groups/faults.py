@@ -69,7 +69,7 @@ SCENARIOS = (
     Scenario(
         name="gps-lost-in-hover",
         peer="ours: 20 s without, at most 20 m",
-        holds="at most 3 m, says so, and is back within 1 m 10 s after GPS is",
+        holds="at most 3 m, reported; within 1 m 10 s after GPS returns",
         steps=(
             do.takeoff(5.0),
             do.inject("sensor_gps", "off"),
@@ -117,8 +117,8 @@ SCENARIOS = (
     ),
     Scenario(
         name="gyroscope-bias",
-        peer="ours: a bias is learned in flight",
-        holds="0.1 rad/s: at most 1 m in 30 s, and says so",
+        peer="ours: bias estimated in flight",
+        holds="0.1 rad/s: at most 1 m in 30 s, reported",
         steps=(
             do.takeoff(10.0),
             do.inject("sensor_gyro", "wrong", 0, 0.1, 0.0, 0.0),
@@ -130,7 +130,7 @@ SCENARIOS = (
     Scenario(
         name="stuck-barometer-on-a-mission",
         peer="PX4: a stuck sensor, the mission ends within 90 s",
-        holds="ends, and lands within 3 m",
+        holds="ends; lands within 3 m",
         steps=(
             do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
             do.start_mission,
@@ -157,8 +157,8 @@ SCENARIOS = (
     ),
     Scenario(
         name="gyroscope-off",
-        peer="ours: the model of the rotors replaces it",
-        holds="lands, at most 2 m/s at the ground, tilted by at most 30°, and says so",
+        peer="ours: the rotor model replaces it",
+        holds="lands at most 2 m/s fast, tilt at most 30°, reported",
         steps=(
             do.takeoff(5.0),
             do.inject("sensor_gyro", "off"),
@@ -183,8 +183,8 @@ SCENARIOS = (
     *(
         Scenario(
             name=f"rotor-{number}-lost",
-            peer="PX4: terminated within 2 + √(2h/10) s; ours: upright to within 20°, lands within 5 m at 2 m/s",
-            holds="lands on three, says so; at most 2 m/s at the ground, 5 m away, 20° from 2 s on",
+            peer="PX4: terminated within 2 + √(2h/10) s; ours: tilt at most 20°, lands within 5 m at 2 m/s",
+            holds="lands on three rotors, reported; touchdown at most 2 m/s, 5 m away; tilt at most 20° after 2 s",
             steps=(
                 do.run(1.0),
                 lands_on_three(number, tilt=20.0, within_s=2.0),
@@ -197,7 +197,7 @@ SCENARIOS = (
     ),
     Scenario(
         name="rotor-lost-on-sensors",
-        peer="ours: upright to within 20°, lands within 5 m at 2 m/s",
+        peer="ours: tilt at most 20°, lands within 5 m at 2 m/s",
         holds="the same",
         steps=(
             do.takeoff(10.0),
@@ -211,9 +211,9 @@ SCENARIOS = (
         seeds=(1, 2),
     ),
     Scenario(
-        name="injection-needs-leave",
-        peer="PX4: refused where it is disabled",
-        holds="DENIED while SYS_FAILURE_EN is 0, done when it is 1, UNSUPPORTED where nothing would fail",
+        name="injection-needs-permission",
+        peer="PX4: refused while disabled",
+        holds="DENIED while SYS_FAILURE_EN is 0, injected at 1, UNSUPPORTED without effect",
         steps=(
             do.command(INJECT, *MOTOR_OFF, result=mav.MAV_RESULT_DENIED),
             do.hold(see.near(PLACE, 0.01), for_=1.0),

@@ -35,16 +35,16 @@ def each_hears_its_own(sitls: Sequence[Sitl]) -> None:
 
 SCENARIOS = (
     FleetScenario(
-        name="together-as-alone",
+        name="fleet-equals-solo",
         peer="ours: each trajectory equals its solo run",
-        holds="three side by side, one alone: one hash",
+        holds="three in a fleet, one alone: the same hash",
         count=4,
         fly=alone_and_together,
     ),
     FleetScenario(
-        name="each-hears-its-own-orders",
-        peer="ours: disjoint ports",
-        holds="three take off to heights of their own",
+        name="fleet-commands-are-separate",
+        peer="ours: separate ports",
+        holds="three take off to different heights",
         count=3,
         fly=each_hears_its_own,
     ),

@@ -37,7 +37,7 @@ SCENARIOS = (
     Scenario(
         name="steady-wind",
         peer="ours: 5 m/s, at most 0.5 m",
-        holds="at most 0.3 m while it is found, 0.01 m then",
+        holds="at most 0.3 m until estimated, then 0.01 m",
         steps=(do.hold(see.near(PLACE, 0.3), for_=10.0), do.hold(see.near(PLACE, 0.01), for_=5.0)),
         setting={"airborne": 5.0, "wind": "5@270"},
     ),
@@ -63,7 +63,7 @@ SCENARIOS = (
     ),
     Scenario(
         name="a-kick",
-        peer="AP AirMode: roll at most 20°, more than 1° to prove that it was kicked",
+        peer="AP AirMode: roll 1° to 20°",
         holds="400°/s: roll between 1° and 20°, level within 1.5 s",
         steps=(
             do.run(1.5),
@@ -73,7 +73,7 @@ SCENARIOS = (
         setting=KICKED,
     ),
     Scenario(
-        name="a-tilt-that-is-asked-for",
+        name="attitude-step",
         peer="PX4: -20° pitch, error below 5° after 3 s",
         holds="error below 0.5° after 1 s",
         steps=(
@@ -86,15 +86,15 @@ SCENARIOS = (
     ),
     Scenario(
         name="a-payload",
-        peer="ours: 15 % more mass than it believes",
-        holds="within 0.5 m from the first second on, 0.02 m after 4 s",
+        peer="ours: 15 % above the assumed mass",
+        holds="within 0.5 m after 1 s, 0.02 m after 4 s",
         steps=(do.hold(see.near(PLACE, 0.5), for_=4.0), do.hold(see.near(PLACE, 0.02), for_=3.0)),
         setting={"airborne": 5.0, "params": {"VEH_MASS": 0.607}},
     ),
     Scenario(
         name="position-mode-brakes",
         peer="ours",
-        holds="5 m/s by sticks, then stands within 4 s, and stays within 0.05 m",
+        holds="from 5 m/s by sticks: stops within 4 s, then stays within 0.05 m",
         steps=(
             do.by_hand(do.then(do.run(0.3), do.select(Mode.POSITION))),
             do.by_hand(do.run(4.0), pitch=1.0),
@@ -108,7 +108,7 @@ SCENARIOS = (
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="goes-where-it-is-told",
+        name="goto",
         peer="PX4: 5 m to 0.3 m within 10 s",
         holds="5 m to 0.05 m within 8 s",
         steps=(

@@ -23,10 +23,10 @@ COMMANDED = {
 OVER_A_ROUGH_LINK = (
     "lands-where-it-took-off",
     "returns-and-lands-at-home",
-    "goes-where-it-is-told",
-    "pauses-and-goes-on",
-    "outside-the-fence-it-does-not-begin",
-    "mode-changes-while-it-uploads",
+    "goto",
+    "pause-and-resume",
+    "mission-outside-the-fence",
+    "mode-change-during-upload",
 )
 
 
@@ -74,16 +74,16 @@ def lands_after(kills: int, every_s: float) -> Step:
 SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
     FleetScenario(
         name="the-plant-link-cannot-change-a-flight",
-        peer="ours: reordered and duplicated, the same trajectory in lockstep",
-        holds="20 % lost, 10 % twice, 10 % late, 5 % spoiled: the same hash",
+        peer="ours: the same trajectory in lockstep",
+        holds="20 % lost, 10 % duplicated, 10 % late, 5 % corrupt: the same hash",
         count=2,
         fly=unlike,
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="spoiled-bits-are-dropped-and-counted",
-        peer="ours: dropped by their checksum, counters rise",
-        holds="10 % of the ground link: none is believed, the vehicle is where it was",
+        name="corrupted-frames",
+        peer="ours: dropped by checksum, counted",
+        holds="10 % of the ground link: all dropped, the vehicle stays",
         steps=(do.trouble("ground", corrupt=0.1), do.run(10.0), hears_spoiled, do.check(see.near(PLACE, 0.01))),
         setting={"airborne": 5.0},
     ),
@@ -100,7 +100,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
     Scenario(
         name="autopilot-killed-in-hover",
         peer="ours: at most 2 m lost, at most 45° more tilt than the limit",
-        holds="at most 0.05 m, 5°, and it holds on",
+        holds="at most 0.05 m and 5°, holds",
         steps=(
             do.run(2.0),
             *(do.kill_autopilot, do.run(2.0)) * 2,
@@ -112,7 +112,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
     Scenario(
         name="autopilot-killed-on-a-mission",
         peer="ours: the mission ends",
-        holds="killed five times on the way: ends over its last item",
+        holds="killed five times: ends at its last item",
         steps=(
             do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
             do.start_mission,
@@ -124,7 +124,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
     Scenario(
         name="autopilot-killed-on-a-mission-on-sensors",
         peer="ours: the mission ends",
-        holds="killed three times on the way: lands within 3 m of its last item",
+        holds="killed three times: lands within 3 m of its last item",
         steps=(
             do.upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
             do.start_mission,
@@ -141,7 +141,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         calm="counts heartbeats",
     ),
     Scenario(
-        name="what-is-meant-for-another-moves-nothing",
+        name="messages-for-other-systems",
         peer="ours",
         holds="stays within 0.01 m",
         steps=(is_not_moved, do.hold(see.every(see.near(PLACE, 0.01), see.mode(Mode.HOLD)), for_=1.0)),
@@ -149,8 +149,8 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
     ),
     Scenario(
         name="a-slow-solver",
-        peer="ours: a declared time to solve delays the rotors",
-        holds="7 ms of 8: a step of 3 m ends within 0.05 m after 8 s",
+        peer="ours: the declared solve time delays the rotors",
+        holds="solve time 7 ms, sample 8 ms: within 0.05 m of a 3 m step after 8 s",
         steps=(
             do.put("SIM_SOLVE_MS", 7.0),
             do.goto((3.0, 0.0, 5.0), wait=False),
@@ -160,9 +160,9 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="a-ground-link-that-is-late",
+        name="late-ground-link",
         peer="ours",
-        holds="half a second each way: goes there and back",
+        holds="0.5 s each way: flies there and back",
         steps=(
             do.trouble("ground", delay_s=0.5),
             do.goto((3.0, 0.0, 5.0)),

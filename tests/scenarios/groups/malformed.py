@@ -80,20 +80,20 @@ SCENARIOS = (
     Scenario(
         name="noise",
         peer="ours: dropped",
-        holds="1200 datagrams of bytes: it stays where it is, and answers",
+        holds="1200 random datagrams: holds position, answers",
         steps=(send_noise, STAYS, still_answers),
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="right-checksums-and-any-meaning",
+        name="random-valid-frames",
         peer="ours: 10⁶ frames, no exception (`make fuzz`); one out-of-range value once ended ArduPilot's SITL",
-        holds="2000 of them here: it still answers",
+        holds="2000 frames: answers",
         steps=(fire(2000), still_answers),
     ),
     Scenario(
-        name="places-that-are-none",
+        name="invalid-positions",
         peer="AP: ignored",
-        holds="not a number, infinite, beyond the poles: refused, and it stays",
+        holds="NaN, infinite, beyond the poles: refused; holds position",
         steps=(
             *(
                 do.command(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, *place, result=mav.MAV_RESULT_DENIED)
@@ -104,9 +104,9 @@ SCENARIOS = (
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="parameters-that-cannot-be",
+        name="invalid-parameters",
         peer="PX4: refused",
-        holds="not a number, infinite, out of range, unknown: refused, the value stays",
+        holds="NaN, infinite, out of range, unknown: refused; the value stays",
         steps=(
             parameter_refused("MPC_XY_CRUISE", nan),
             parameter_refused("MPC_XY_CRUISE", inf),
@@ -116,9 +116,9 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        name="missions-that-cannot-be",
+        name="invalid-missions",
         peer="PX4: INVALID_PARAMn",
-        holds="refused item by item, and no mission is left",
+        holds="each item refused; the mission stays empty",
         steps=(
             *(
                 do.refused(do.upload([on_wire(**wrong)]), "mission")
@@ -136,9 +136,9 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        name="fences-that-cannot-be",
+        name="invalid-fences",
         peer="AP: refused",
-        holds="two corners, a negative and an infinite radius: refused, and it arms by the fence before: none",
+        holds="two corners, negative and infinite radius: refused; arming succeeds, without a fence",
         steps=(
             do.refused(do.upload_fence(mission_items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
             do.refused(do.upload_fence(mission_items.circle(-1.0)), "fence"),
@@ -148,9 +148,9 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        name="setpoints-beyond-reason",
+        name="extreme-setpoints",
         peer="AP SetpointBadVel",
-        holds="a place 10¹² m away and a velocity of 10⁹ m/s: never faster than the limit, never lower",
+        holds="10¹² m and 10⁹ m/s: speed within its limit, height kept",
         steps=(
             lambda sitl: sitl.run(0.2, lambda: sitl.setpoint(position=PLACE)),
             lambda sitl: sitl.select(Mode.OFFBOARD),

@@ -51,7 +51,7 @@ def changes_mode_while_it_uploads(sitl: Sitl) -> None:
 SCENARIOS = (
     Scenario(
         name="keeps-to-its-corridor",
-        peer="PX4: 5 m to either side, 500 simulated seconds at most",
+        peer="PX4: 5 m to either side, at most 500 s",
         holds="1.1 m to either side, 80 s",
         steps=(
             do.upload([mission_items.takeoff(10.0), *CORRIDOR, mission_items.land(0.0, 0.0)]),
@@ -76,15 +76,15 @@ SCENARIOS = (
         setting={"params": {"RTL_RETURN_ALT": 6.0}},
     ),
     Scenario(
-        name="nothing-is-lost-on-the-way-up",
+        name="upload-over-a-lossy-link",
         peer="MAVSDK: 5 % loss, 20 items, up = down",
-        holds="20 % loss each way, 20 items, the count is right",
+        holds="20 % loss each way, 20 items, correct count",
         steps=(do.trouble("ground", loss=0.2), do.upload(LONG), do.trouble("ground", loss=0.0), reads_back(20)),
     ),
     Scenario(
-        name="pauses-and-goes-on",
+        name="pause-and-resume",
         peer="ours",
-        holds="stands within 4 s of the pause, then ends the mission",
+        holds="stops within 4 s of the pause, then ends the mission",
         steps=(
             do.upload(
                 [
@@ -104,16 +104,16 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        name="mode-changes-while-it-uploads",
+        name="mode-change-during-upload",
         peer="ours",
-        holds="the upload ends well, and the mode is the one chosen",
+        holds="the upload completes in the selected mode",
         steps=(changes_mode_while_it_uploads, do.until(see.DISARMED, within=20.0), reads_back(20)),
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="outside-the-fence-it-does-not-begin",
+        name="mission-outside-the-fence",
         peer="AP: refused",
-        holds="refused, and says which item",
+        holds="refused, with the item",
         steps=(
             do.upload_fence(FIELD),
             do.upload([mission_items.takeoff(5.0), mission_items.waypoint(50.0, 0.0, 5.0)]),
@@ -123,15 +123,15 @@ SCENARIOS = (
         ),
     ),
     Scenario(
-        name="without-a-mission-there-is-none-to-fly",
+        name="empty-mission",
         peer="ours",
-        holds="refused, and says why",
+        holds="refused with the reason",
         steps=(do.refused(do.start_mission, "there is no mission"), do.check(see.DISARMED)),
     ),
     Scenario(
-        name="jumps-back-so-often",
+        name="mission-jump",
         peer="ours",
-        holds="two rounds of two items, then the last",
+        holds="items 1 and 2 twice, then the last",
         steps=(
             do.upload(
                 [
@@ -164,9 +164,9 @@ SCENARIOS = (
         setting={"feedback": "sensors", "wind": "5@270", "turbulence": "light", "seed": 4},
     ),
     Scenario(
-        name="goes-faster-where-it-is-told",
+        name="mission-speed-change",
         peer="ours",
-        holds="8 m/s on the leg after the item that says so, 5 m/s before",
+        holds="5 m/s, then 8 m/s on the leg after the speed item",
         steps=(
             do.upload(
                 [

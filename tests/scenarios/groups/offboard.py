@@ -73,15 +73,15 @@ SCENARIOS = (
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="no-setpoints-no-mode",
+        name="offboard-without-setpoints",
         peer="PX4: refused",
-        holds="refused, and says what to do",
+        holds="refused, with advice",
         steps=(do.refused(do.select(Mode.OFFBOARD), "send them before the mode"), do.check(see.mode(Mode.HOLD))),
         setting={"airborne": 5.0},
     ),
     Scenario(
         name="bad-velocities-are-ignored",
-        peer="AP SetpointBadVel: not a number, infinite: ignored",
+        peer="AP SetpointBadVel: NaN, infinite: ignored",
         holds="stays within 0.05 m",
         steps=(
             begin_offboard,
@@ -95,7 +95,7 @@ SCENARIOS = (
     Scenario(
         name="setpoints-lost",
         peer="ours: hold at the timeout, ± one step",
-        holds="hold, ± a control sample and the interval of setpoints; says so; stays within 0.1 m",
+        holds="hold, ± a control sample and a setpoint interval, reported; within 0.1 m",
         steps=(
             begin_offboard,
             lost_at_its_time,
@@ -107,7 +107,7 @@ SCENARIOS = (
     Scenario(
         name="stale-body-rates",
         peer="PX4: followed until COM_OF_LOSS_T",
-        holds="followed for 0.3 s: leans by less than 35 degrees, stays within 1 m",
+        holds="followed for 0.3 s: tilt below 35°, stays within 1 m",
         steps=(silent_in_a_turn,),
         setting={"airborne": 5.0},
     ),
@@ -125,9 +125,9 @@ SCENARIOS = (
         setting={"feedback": "sensors", "wind": "4@90", "turbulence": "light", "seed": 2},
     ),
     Scenario(
-        name="what-is-not-supported-is-said",
-        peer="PX4: unsupported parameters are INVALID_PARAM or DENIED",
-        holds="an unknown command is UNSUPPORTED, at once, and nothing else happens",
+        name="unsupported-command",
+        peer="PX4: INVALID_PARAM or DENIED",
+        holds="an unknown command is UNSUPPORTED at once, without effect",
         steps=(
             do.command(CAMERA_TRIGGER, 5.0, result=mav.MAV_RESULT_UNSUPPORTED),
             do.hold(see.near(PLACE, 0.02), for_=1.0),
@@ -135,9 +135,9 @@ SCENARIOS = (
         setting={"airborne": 5.0},
     ),
     Scenario(
-        name="another-steers",
+        name="mode-overrides-setpoints",
         peer="ours",
-        holds="the mode that is chosen wins over setpoints that still come",
+        holds="the selected mode wins over continuing setpoints",
         steps=(
             begin_offboard,
             do.select(Mode.HOLD),

@@ -49,7 +49,7 @@ SCENARIOS = (
     Scenario(
         name="keeps-level-when-it-yaws",
         peer="AP FlyEachFrame: tilt at most 2° after yaw steps",
-        holds="at most 2° during them, too",
+        holds="at most 2° during yaw steps, too",
         steps=(
             do.goto((0.0, 0.0, 5.0), yaw_deg=0.0, wait=False),
             do.hold(see.tilted_less(2.0), for_=4.0),
@@ -102,8 +102,8 @@ SCENARIOS = (
     ),
     Scenario(
         name="no-landing-is-detected-in-an-updraft",
-        peer="AP AirModeLanding: none within 2 s",
-        holds="none while air that rises with 3 m/s carries it, and it lands",
+        peer="AP AirModeLanding: not detected within 2 s",
+        holds="not detected in a 3 m/s updraft; then lands",
         steps=(
             do.land(wait=False),
             do.hold(see.every(see.ARMED, see.mode(Mode.LAND)), for_=4.0),
@@ -113,9 +113,9 @@ SCENARIOS = (
         setting={"airborne": 5.0, "wind": str(UPDRAFT)},
     ),
     Scenario(
-        name="taking-off-without-arming-stays",
+        name="takeoff-needs-arming",
         peer="ours",
-        holds="a mode that is chosen on the ground turns no rotor",
+        holds="selecting the mode on the ground keeps the rotors stopped",
         steps=(
             do.select(Mode.TAKEOFF),
             do.hold(see.every(see.DISARMED, see.height(0.0, 0.01)), for_=2.0),

@@ -76,7 +76,7 @@ SCENARIOS = (
     *(
         Scenario(
             name=f"{name}-of-the-thesis",
-            peer=f"ours: the thesis's own RMS is {thesis_m:g} m",
+            peer=f"ours: the thesis has RMS {thesis_m:g} m",
             holds=f"RMS at most {1000.0 * rms_m:g} mm from 20 s on",
             steps=on_track(name, rms_m=rms_m, seconds=25.0, since_s=20.0),
             setting=begins(name),
@@ -98,7 +98,7 @@ SCENARIOS = (
     ),
     Scenario(
         name="lemniscate",
-        peer="ours: PX4's figures of eight have no number",
+        peer="ours (PX4 gives no number)",
         holds="RMS at most 2 mm from 10 s on, 4 m in 6 s",
         steps=on_track("lemniscate", rms_m=0.002, seconds=20.0, since_s=10.0),
         setting=begins("lemniscate"),
@@ -106,14 +106,14 @@ SCENARIOS = (
     Scenario(
         name="yaw-goes-round",
         peer="ours: no jump at ±180°",
-        holds="three turns and no yaw rate above 4 rad/s, RMS at most 5 mm",
+        holds="three turns, yaw rate at most 4 rad/s, RMS at most 5 mm",
         steps=(*on_track("circle", rms_m=0.005, seconds=20.0, since_s=10.0), yaw_turns_through(3.0 * 360.0)),
         setting=begins("circle"),
     ),
     Scenario(
         name="infeasible-speed-saturates",
         peer="ours: saturates, never diverges",
-        holds="a figure of eight at 20 m/s: never more than 6 m off, never below 1 m, tilt at most 75°",
+        holds="figure of eight at 20 m/s: error at most 6 m, height at least 1 m, tilt at most 75°",
         steps=(
             do.hold(see.every(see.ARMED, see.above(1.0), see.tilted_less(75.0)), for_=20.0),
             do.measured("the RMS error", off_track(FAST, 5.0), 6.0),
@@ -121,9 +121,9 @@ SCENARIOS = (
         setting=begins(FAST),
     ),
     Scenario(
-        name="steeper-than-gimbal-lock-lets",
+        name="near-gimbal-lock",
         peer="ours: bounded near 90°",
-        holds="pitched up by 89°: upright again within 2 s, at most 3 m lost",
+        holds="from 89° pitch: upright within 2 s, at most 3 m lost",
         steps=(
             do.hold(see.above(17.0), for_=2.0),
             do.hold(see.every(see.above(17.0), see.tilted_less(20.0)), for_=3.0),

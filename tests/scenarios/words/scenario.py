@@ -1,7 +1,6 @@
-"""A scenario as data: what the flight begins with, what is done, and what must hold; beside the number of a peer.
+"""Scenarios as data: initial conditions, steps and requirements, beside the requirement of a reference suite.
 
-The numbers of peers are those of their own suites: AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system
-tests. Where none has one, it is ours.
+AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system tests, "ours" our own requirement.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,22 +10,22 @@ from typing import Any, TypeAlias
 from colibri.sitl.vehicle import Sitl
 
 Step: TypeAlias = Callable[[Sitl], object]
-"""Something that is done, or must hold; it raises where it cannot, or does not."""
+"""An action or a check; raises on failure."""
 FleetStep: TypeAlias = Callable[[Sequence[Sitl]], object]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """A scenario.
+    """A scenario for one vehicle.
 
     Attributes:
-        name: What it shows, in words joined by hyphens.
-        peer: What a peer's suite requires, and whose; or "ours".
-        holds: What is required here.
-        steps: What is done, in order.
-        setting: What the flight begins with, as mark `sitl` has it.
-        seeds: One flight for each; none: seed 0.
-        calm: Why it needs ground links that lose nothing; empty where it ends as well on rough ones.
+        name: Words joined by hyphens.
+        peer: Requirement of a reference suite, or "ours".
+        holds: Requirement here.
+        steps: Actions and checks, in order.
+        setting: Initial conditions: arguments of mark `sitl`.
+        seeds: One flight for each seed.
+        calm: Reason to exclude it from rough ground links, if any.
     """
 
     name: str
