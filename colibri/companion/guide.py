@@ -1,12 +1,14 @@
 """The companion without socket or clock: bytes and time in, bytes out."""
 
-from math import dist, inf, nan
+from math import dist, hypot, inf, nan
 
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
 from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.earth.geodesy import enu_of
 from colibri.common.rotations import tilt_deg
+from colibri.companion.home import local_origin
 from colibri.companion.identification import steps
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
@@ -27,6 +29,7 @@ from colibri.companion.supervision.limits import CRITICAL, FlightFacts, FlightRe
 from colibri.companion.supervision.pace import SetpointRate
 from colibri.companion.supervision.phases import CompanionPhase, PhaseCondition, next_phase
 from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
+from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
 _GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
@@ -55,7 +58,7 @@ class Companion:
     ) -> None:
         self._settings, self._vehicle = settings, vehicle
         self._duration_s = min(settings.duration_s, track.duration_s)
-        self.peer = VehiclePeer(settings.stack)
+        self.peer = VehiclePeer(settings.stack, settings.system)
         self._response = settings.response or (settings.stack.response if settings.stack else _GUESSED)
         track = smoothly_started(track)
         self._pilot = LawPilot(profile, vehicle, track, self._response, clock, law)
@@ -108,6 +111,19 @@ class Companion:
     @property
     def has_flown(self) -> bool:
         return self._has_flown
+
+    @property
+    def completed(self) -> bool:
+        """Whether the track, or all steps of an identification, were flown."""
+        return self._brakes
+
+    def last_order(self) -> list[bytes]:
+        """Return the order to hold, for a process that ends by an error."""
+        stack = self.peer.stack
+        if stack is None or not self._has_flown:
+            return []
+        fields = (*self.peer.target, mav.MAV_CMD_DO_SET_MODE, 0, *stack.hold.command, 0.0, 0.0, 0.0, 0.0)
+        return [self.peer.client.encode("COMMAND_LONG", *fields)]
 
     def stop(self, why: str, *, fault: bool = False) -> None:
         """End the flight: hand over, or never begin. After a `fault` it has not ended in order."""
@@ -347,6 +363,8 @@ class Companion:
         assert peer.stack is not None, "it is connected"
         return CheckFacts(
             stack=peer.stack,
+            systems=tuple(peer.client.vehicles),
+            home_moved_m=self._home_moved_m(),
             thrust=self._thrust,
             parameters=peer.parameter_values,
             clock_known=peer.clock.known,
@@ -371,6 +389,13 @@ class Companion:
             return nan
         here, stay = self._newest.state.position_enu_m, self._settings.stay
         return dist(here, self._pilot.start_enu_m if stay is None else stay.place(here))
+
+    def _home_moved_m(self) -> float:
+        """Return by how much the vehicle's home, or its local frame, has moved since a mission was placed."""
+        planned, now = self._settings.home, local_origin(self.peer.report)
+        if planned is None or now is None:
+            return 0.0
+        return max(abs(now.up_m - planned.up_m), hypot(*enu_of(now.origin, planned.origin)))
 
     def _flight_facts(self, now_us: int) -> FlightFacts:
         newest, flies = self._newest, self.phase is CompanionPhase.FLYING

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.companion.vehicle_peer import VehiclePeer
+from colibri.mavlink.client.report import VehicleReport
 from colibri.mavlink.wire.dialect import mav
 
 _AGAIN_US = 500_000
@@ -16,6 +17,13 @@ class LocalOrigin(NamedTuple):
     up_m: float
 
 
+def local_origin(report: VehicleReport) -> LocalOrigin | None:
+    home, origin = report.home, report.origin
+    if home is None or origin is None:
+        return None
+    return LocalOrigin(origin, home.altitude_m - origin.altitude_m)
+
+
 class HomeSeeker:
     """Requests HOME_POSITION and GPS_GLOBAL_ORIGIN until both are known."""
 
@@ -25,10 +33,7 @@ class HomeSeeker:
 
     @property
     def home(self) -> LocalOrigin | None:
-        home, origin = self._peer.report.home, self._peer.report.origin
-        if home is None or origin is None:
-            return None
-        return LocalOrigin(origin, home.altitude_m - origin.altitude_m)
+        return local_origin(self._peer.report)
 
     def poll(self, now_us: int) -> list[bytes]:
         if self._peer.system and now_us >= self._again_us:

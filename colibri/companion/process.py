@@ -4,6 +4,7 @@ import csv
 import signal
 from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from time import perf_counter, time
@@ -61,7 +62,8 @@ class CompanionFlight(NamedTuple):
         if self.mission is None:
             return self
         loaded = track_through(self.mission.waypoints(home), self.vehicle, self.profile, home.up_m)
-        return self._replace(track=loaded.track, note=loaded.note or self.mission.note)
+        settings = replace(self.settings, home=home)
+        return self._replace(settings=settings, track=loaded.track, note=loaded.note or self.mission.note)
 
 
 def plan_of(args: Namespace) -> CompanionFlight:
@@ -95,6 +97,7 @@ def plan_of(args: Namespace) -> CompanionFlight:
         response=response,
         identifies=args.identify,
         stay=stay_of(name),
+        system=args.system,
         thrust_scale=thrust_scale,
     )
     return CompanionFlight(settings, profile, vehicle, track, note, mission)
@@ -121,7 +124,9 @@ def fly(args: Namespace) -> int:
     stop = Stop()
     try:
         if plan.mission is not None:
-            plan = plan.from_home(_seek_home(wire, signing, args.wait, stop))
+            peer = VehiclePeer(system=args.system)
+            peer.client.sign_with(signing)
+            plan = plan.from_home(_seek_home(wire, peer, args.wait, stop))
         companion = Companion(plan.settings, plan.profile, plan.vehicle, plan.track, perf_counter)
     except Error as error:
         wire.link.close()
@@ -135,7 +140,12 @@ def fly(args: Namespace) -> int:
         summary = FlightSummary()
         try:
             with open(args.out / LOG, "w", newline="", encoding="utf-8", opener=regular) as file, gc_frozen():
-                serve(companion, wire, status, stop, _Log(file, summary))
+                log = _Log(file, summary)
+                try:
+                    serve(companion, wire, status, stop, log)
+                finally:
+                    if companion.ended is None:
+                        wire.send(companion.last_order())
         except Error as error:
             fail(str(error), EXIT_FAILED)
         except OSError as error:
@@ -146,6 +156,11 @@ def fly(args: Namespace) -> int:
         figures = report(companion, summary, given)
         write_report(figures, args.out / REPORT)
         if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
+            if not companion.completed:
+                fail(
+                    f"the steps were not flown to their end: nothing is fitted; what was logged is in {args.out}",
+                    EXIT_FAILED,
+                )
             _identify(companion, status, args.out)
     if stop.code and not companion.has_flown and not plan.settings.dry_run:
         fail("ended by a signal before it flew", stop.code)
@@ -193,9 +208,7 @@ class _Wire:
                 self.link.send(frame, None if self.link.target == self._address else self._address)
 
 
-def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> LocalOrigin:
-    peer = VehiclePeer()
-    peer.client.sign_with(signing)
+def _seek_home(wire: _Wire, peer: VehiclePeer, wait_s: float, stop: Stop) -> LocalOrigin:
     seeker, began_s = HomeSeeker(peer), perf_counter()
     while seeker.home is None:
         now_s = perf_counter() - began_s

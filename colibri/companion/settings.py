@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
 
+from colibri.companion.home import LocalOrigin
 from colibri.companion.stacks.stack import Response, Stack
 from colibri.companion.steering.stay import Stay
 from colibri.companion.supervision.limits import FlightLimits
@@ -25,6 +26,8 @@ class CompanionSettings:
     Attributes:
         takeoff_height_m: Above the ground; `None` for the height of the track's first point.
         gives_up_s: Timeout of connection and checks.
+        system: MAVLink system id of the vehicle; 0 for the only one on the link.
+        home: Where a mission was placed.
         stay: The track is a hover; it begins where the vehicle is.
     """
 
@@ -40,3 +43,5 @@ class CompanionSettings:
     identifies: bool = False
     thrust_scale: float = 1.0
     stay: Stay | None = None
+    system: int = 0
+    home: LocalOrigin | None = None

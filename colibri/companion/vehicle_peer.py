@@ -36,9 +36,10 @@ class ReceivedState(NamedTuple):
 class VehiclePeer:
     """One vehicle; `system` is 0 and `stack` is `None` until they are known."""
 
-    def __init__(self, stack: Stack | None = None) -> None:
+    def __init__(self, stack: Stack | None = None, system: int = 0) -> None:
         own = mav.MAV_TYPE_ONBOARD_CONTROLLER
-        self.client = Client(OWN_SYSTEM, OWN_COMPONENT, kind=own, heartbeat_every_us=_HEARTBEAT_EVERY_US)
+        beats_us = _HEARTBEAT_EVERY_US
+        self.client = Client(OWN_SYSTEM, OWN_COMPONENT, kind=own, heartbeat_every_us=beats_us, only=system)
         self.report = VehicleReport()
         self.clock = VehicleClock()
         self.stack = stack

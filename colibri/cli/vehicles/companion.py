@@ -4,7 +4,7 @@ from argparse import Namespace
 from math import inf
 
 from colibri.cli.shared.options import add_out, add_signing
-from colibri.common.process.arguments import ArgumentParser, positive
+from colibri.common.process.arguments import ArgumentParser, natural, positive
 from colibri.common.process.lifecycle import loading
 from colibri.flights.spec import TRACK_HELP
 
@@ -12,13 +12,15 @@ from colibri.flights.spec import TRACK_HELP
 def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
     mission = "or FILE.plan, a mission of QGroundControl: its waypoints, from the vehicle's home"
-    add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; {mission}")
+    hover = "what hover leaves out is as the vehicle has it"
+    add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; {mission}; {hover}")
     add(
         "--vehicle",
         required=True,
         metavar="URL",
         help="how the vehicle is reached: udpin:, udpout:, tcp: or tcpin:HOST:PORT",
     )
+    add("--system", type=natural, default=0, metavar="ID", help="MAVLink system id, where several are on the link")
     add("--model", metavar="NAME", help="vehicle name or .toml that describes it (default: the profile's)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")

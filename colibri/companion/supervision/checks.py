@@ -1,7 +1,7 @@
 """Checks before a companion arms or takes over, each with advice for a failure."""
 
 from collections.abc import Callable, Mapping
-from math import hypot
+from math import hypot, inf
 from typing import NamedTuple
 
 from colibri.companion.stacks.stack import Stack
@@ -16,6 +16,7 @@ MAX_DELAY_S = 0.08
 MIN_MODE_RATE_HZ = 8.0
 START_BATTERY = 0.3
 MAX_APPROACH_M = 50.0
+MAX_HOME_M = 1.0
 _MIN_HOVER, _MAX_HOVER = 0.05, 0.8
 
 
@@ -23,6 +24,8 @@ class CheckFacts(NamedTuple):
     """Facts before a flight."""
 
     stack: Stack
+    systems: tuple[int, ...]
+    home_moved_m: float
     thrust: Thrust | None
     parameters: Mapping[str, float] | None
     clock_known: bool
@@ -87,6 +90,11 @@ def _inside_fence(now: CheckFacts) -> bool:
 
 
 CHECKS: tuple[Check, ...] = (
+    Check(
+        "vehicle",
+        lambda now: len(now.systems) == 1,
+        lambda now: f"systems {', '.join(map(str, now.systems))} are on the link: choose one by --system",
+    ),
     Check("clock", lambda now: now.clock_known and _in_time(now), _clock_advice),
     Check(
         "ages",
@@ -106,6 +114,8 @@ CHECKS: tuple[Check, ...] = (
             f"{now.state_rate_hz:.0f} states a second, {MIN_STATE_RATE_HZ:.0f} are needed, and the newest is "
             f"{1e3 * now.state_age_s:.0f} ms old, of at most {1e3 * now.limits.max_state_age_s:.0f}: raise the link's "
             "rate, or end other streams"
+            if now.state_age_s < inf
+            else "none has a known time yet: see the clock"
         ),
     ),
     Check(
@@ -163,6 +173,11 @@ CHECKS: tuple[Check, ...] = (
             f"the track begins {now.approach_m:.0f} m from the vehicle, at most {MAX_APPROACH_M:.0f} are flown to it: "
             "choose another, or take over nearer to it"
         ),
+    ),
+    Check(
+        "home",
+        lambda now: now.home_moved_m <= MAX_HOME_M,
+        lambda now: f"home has moved by {now.home_moved_m:.1f} m since the mission was placed: start again",
     ),
 )
 

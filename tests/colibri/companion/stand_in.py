@@ -63,6 +63,8 @@ class StandIn:
     numbers: Numbers = field(default_factory=Numbers)
     armed: bool = False
     charge: int = 80
+    answers_timesync: bool = True
+    frozen_rate: tuple[float, float, float] | None = None
     streams: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -120,7 +122,7 @@ class StandIn:
     def _receive(self, message: Message) -> None:
         fields = message.fields
         match message.name:
-            case "TIMESYNC" if fields.tc1 == 0:
+            case "TIMESYNC" if fields.tc1 == 0 and self.answers_timesync:
                 self._outbox.append(self._codec.encode("TIMESYNC", self.own_us * 1000, fields.ts1))
             case "COMMAND_LONG":
                 result = self._command(fields.command, [getattr(fields, f"param{i}") for i in range(1, 8)])
@@ -256,7 +258,8 @@ class StandIn:
     def _odometry(self) -> tuple[Any, ...]:
         place, velocity = ned_from_enu(_vector(self.position)), ned_from_enu(_vector(self.velocity))
         frames = (mav.MAV_FRAME_LOCAL_NED, mav.MAV_FRAME_LOCAL_NED)
-        pose = (*place, ned_frd_from_enu_flu(self.attitude), *velocity, *frd_from_flu(_vector(self.rate)))
+        rate = self.frozen_rate or _vector(self.rate)
+        pose = (*place, ned_frd_from_enu_flu(self.attitude), *velocity, *frd_from_flu(rate))
         return (self.own_us, *frames, *pose, _NO_COVARIANCE, _NO_COVARIANCE, 0, 8, 100)
 
 

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import pytest
 
+from colibri.common.rotations import tilt_deg
 from colibri.common.types import Address
 from colibri.companion.log import FlightSummary
 from colibri.companion.process import _Log, _Wire
@@ -198,3 +199,47 @@ def test_another_sender_does_not_take_the_link() -> None:
     assert hear(9.0, (b"noise", stranger)) == vehicle
     moved = ("10.0.0.2", 14581)
     assert hear(9.1, (beat, moved)) == moved
+
+
+@pytest.mark.parametrize(
+    ("message", "limit", "within_s"),
+    [
+        ("HEARTBEAT", "stale reports", 4.2),
+        ("ESTIMATOR_STATUS", "stale reports", 3.5),
+        ("SYS_STATUS", "stale reports", 5.5),
+        ("TIMESYNC", "stale reports", 3.5),
+        ("ODOMETRY", "late states", 0.2),
+    ],
+)
+def test_a_report_that_stops_ends_the_flight_at_its_age(message: str, limit: str, within_s: float) -> None:
+    ride = hovering()
+    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride.sitl.streams.pop(message, None)
+    ride.sitl.answers_timesync = message != "TIMESYNC"
+    ride.until(lambda: ride.companion.phase is not CompanionPhase.FLYING, within_s)
+    assert ride.companion.limit is not None
+    assert ride.companion.limit.name == limit
+    assert message in ride.companion.said[-2] or limit == "late states"
+
+
+def test_body_rates_that_stand_still_end_the_flight_before_it_leans() -> None:
+    ride = hovering()
+    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    ride.sitl.frozen_rate = (0.0, 1.5, 0.0)
+    leaned = 0.0
+    while ride.companion.ended is None:
+        ride.step()
+        leaned = max(leaned, tilt_deg(ride.sitl.attitude))
+    assert ride.companion.limit is not None
+    assert leaned < 35.0
+    assert hypot(*(ride.sitl.position - HERE)) < 2.0
+
+
+def test_an_identification_that_is_stopped_is_not_complete() -> None:
+    ride = hovering(CompanionSettings(identifies=True))
+    ride.until(lambda: ride.companion.phase is CompanionPhase.FLYING, 8.0)
+    (order,) = Codec(0, 0).decode(ride.companion.last_order()[0])
+    assert (order.name, order.fields.command) == ("COMMAND_LONG", mav.MAV_CMD_DO_SET_MODE)
+    ride.companion.stop("SIGINT")
+    assert ride.to_the_end(5.0).in_order
+    assert not ride.companion.completed

@@ -22,6 +22,8 @@ PX4_VALUES = dict.fromkeys(PX4.needed, 0.3)
 ARDUPILOT_VALUES = {**dict.fromkeys(ARDUPILOT.needed, 0.3), "GUID_OPTIONS": 8.0}
 GOOD = CheckFacts(
     stack=PX4,
+    systems=(1,),
+    home_moved_m=0.0,
     thrust=ThrustCurve(hover=0.4),
     parameters=PX4_VALUES,
     clock_known=True,
@@ -46,6 +48,8 @@ def reporting(**changed: Any) -> CheckFacts:
 
 
 FAILS: list[tuple[str, CheckFacts]] = [
+    ("vehicle", GOOD._replace(systems=(1, 2))),
+    ("home", GOOD._replace(home_moved_m=1.1)),
     ("clock", GOOD._replace(clock_known=False)),
     ("clock", GOOD._replace(clock_rate=0.5)),
     *(("ages", GOOD._replace(ages={**GOOD.ages, row.name: row.start_s + 0.1})) for row in AGES),
