@@ -44,33 +44,31 @@ class FailsafeNumber(NamedTuple):
 
 NUMBERS = (
     FailsafeNumber("COM_ATT_LOSS_T", 0.5, 0.0, 60.0, "s", "Attitude loss delay"),
-    FailsafeNumber("FD_FAIL_R", 80.0, 30.0, 180.0, "deg", "Largest roll", "Beyond it the vehicle is tilted too far."),
-    FailsafeNumber("FD_FAIL_P", 80.0, 30.0, 180.0, "deg", "Largest pitch", "Beyond it the vehicle is tilted too far."),
-    FailsafeNumber("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "Tilt delay", "Of roll and of pitch."),
+    FailsafeNumber("FD_FAIL_R", 80.0, 30.0, 180.0, "deg", "Largest roll", "Beyond: tilted too far."),
+    FailsafeNumber("FD_FAIL_P", 80.0, 30.0, 180.0, "deg", "Largest pitch", "Beyond: tilted too far."),
+    FailsafeNumber("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "Tilt delay", "Roll and pitch."),
     FailsafeNumber("COM_POS_FS_EPH", 5.0, 0.1, 400.0, "m", "Position loss limit", "Horizontal standard deviation."),
     FailsafeNumber("COM_VEL_FS_EVH", 1.0, 0.1, 30.0, "m/s", "Velocity loss limit", "Horizontal standard deviation."),
     FailsafeNumber("COM_POS_FS_DELAY", 1.0, 0.0, 100.0, "s", "Position loss delay"),
     FailsafeNumber("COM_EST_LOSS_T", 1.0, 0.0, 60.0, "s", "Estimate loss delay"),
-    FailsafeNumber("BAT_LOW_THR", 0.15, 0.0, 1.0, "norm", "Low battery", "Part of its charge."),
-    FailsafeNumber("BAT_CRIT_THR", 0.07, 0.0, 1.0, "norm", "Critical battery", "Part of its charge."),
-    FailsafeNumber("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "norm", "Nearly empty battery", "Part of its charge."),
-    FailsafeNumber("BAT_LOW_VOLT", 0.0, 0.0, 100.0, "V", "Low battery voltage", "At its terminals; 0: not looked at."),
-    FailsafeNumber(
-        "BAT_CRIT_VOLT", 0.0, 0.0, 100.0, "V", "Critical battery voltage", "At its terminals; 0: not looked at."
-    ),
-    FailsafeNumber(
-        "BAT_EMERGEN_VOLT", 0.0, 0.0, 100.0, "V", "Nearly empty voltage", "At its terminals; 0: not looked at."
-    ),
-    FailsafeNumber("BAT_LOW_T", 1.0, 0.0, 120.0, "s", "Battery delay", "Voltage sags while it climbs."),
+    FailsafeNumber("BAT_LOW_THR", 0.15, 0.0, 1.0, "norm", "Low battery", "Fraction of full charge."),
+    FailsafeNumber("BAT_CRIT_THR", 0.07, 0.0, 1.0, "norm", "Critical battery", "Fraction of full charge."),
+    FailsafeNumber("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "norm", "Nearly empty battery", "Fraction of full charge."),
+    FailsafeNumber("BAT_LOW_VOLT", 0.0, 0.0, 100.0, "V", "Low battery voltage", "At the terminals; 0: off."),
+    FailsafeNumber("BAT_CRIT_VOLT", 0.0, 0.0, 100.0, "V", "Critical battery voltage", "At the terminals; 0: off."),
+    FailsafeNumber("BAT_EMERGEN_VOLT", 0.0, 0.0, 100.0, "V", "Nearly empty voltage", "At the terminals; 0: off."),
+    FailsafeNumber("BAT_LOW_T", 1.0, 0.0, 120.0, "s", "Battery delay", "Covers voltage sag in climbs."),
     FailsafeNumber("COM_QP_LOSS_T", 0.5, 0.0, 60.0, "s", "Plan loss delay"),
     FailsafeNumber("COM_LATE_T", 1.0, 0.0, 60.0, "s", "Deadline delay"),
-    FailsafeNumber("COM_TEL_LOSS_T", 0.5, 0.0, 60.0, "s", "Telemetry loss timeout", "The plant may be silent so long."),
-    FailsafeNumber("COM_DL_LOSS_T", 10.0, 0.5, 300.0, "s", "Ground station loss timeout", "All may be silent so long."),
-    FailsafeNumber("GF_MARGIN", 0.0, 0.0, 1000.0, "m", "Fence margin", "So close to its edge counts as a breach."),
     FailsafeNumber(
-        "GF_PREDICT", 0, 0, 1, "", "Fence prediction", "Act where the vehicle would come to rest beyond the margin."
+        "COM_TEL_LOSS_T", 0.5, 0.0, 60.0, "s", "Telemetry loss timeout", "Longest gap in the plant's frames."
     ),
-    FailsafeNumber("COM_SENS_LOSS_T", 0.5, 0.0, 60.0, "s", "Sensor loss delay", "Of all but GPS."),
+    FailsafeNumber(
+        "COM_DL_LOSS_T", 10.0, 0.5, 300.0, "s", "Ground station loss timeout", "Longest silence of all stations."
+    ),
+    FailsafeNumber("GF_MARGIN", 0.0, 0.0, 1000.0, "m", "Fence margin", "Closer to the edge is a breach."),
+    FailsafeNumber("GF_PREDICT", 0, 0, 1, "", "Fence prediction", "Act if the stopping point is beyond the margin."),
+    FailsafeNumber("COM_SENS_LOSS_T", 0.5, 0.0, 60.0, "s", "Sensor loss delay", "All sensors but GPS."),
     FailsafeNumber("COM_GNSSLOSS_T", 1.0, 1.0, 300.0, "s", "GPS loss timeout"),
 )
 
@@ -93,7 +91,7 @@ _ACTIONS: Mapping[str, str] = {
     "COM_BAR_LOSS_ACT": "Barometer loss action",
     "COM_MAG_LOSS_ACT": "Magnetometer loss action",
     "COM_GNSSLOSS_ACT": "GPS loss action",
-    "NAV_RCL_ACT": "Pilot loss action",
+    "NAV_RCL_ACT": "Stick loss action",
     "COM_OBL_RC_ACT": "Offboard loss action",
 }
 _BATTERY_ACTIONS = (
@@ -140,7 +138,6 @@ def _actions() -> list[Parameter]:
             minimum=min(number for number, _ in row.choices),
             maximum=max(number for number, _ in row.choices),
             description=_ACTIONS[name],
-            details=f"See failsafes.md: {row.condition}.",
             group=GROUP,
             values=_BATTERY_ACTIONS if name == "COM_LOW_BAT_ACT" else _named(row.choices),
         )
