@@ -17,6 +17,9 @@ A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and
 continues from the newest frame. In lockstep a new flight begins at time 0 only.
 """
 
+from collections.abc import Callable
+
+from colibri.common.types import Address
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import OWN_MESSAGES
 from colibri.mavlink.wire import dialect
@@ -25,7 +28,9 @@ from colibri.mavlink.wire.dialect import Codec
 RESEND_AFTER_S = 0.02
 """Wall-clock silence before the plant repeats its frame."""
 PEER_LOST_AFTER_S = 0.5
-"""Wall-clock silence before another autopilot may take over."""
+"""Wall-clock silence before another autopilot may take over, if the address of the first is free again."""
+PEER_GIVEN_UP_AFTER_S = 10.0
+"""Wall-clock silence before another may take over in any case."""
 CALL_AFTER_S = 1.0
 """Wall-clock silence before the autopilot calls again, and a new flight may begin."""
 CALL_EVERY_S = 0.05
@@ -48,3 +53,10 @@ MADE_OF = {
 def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custom_mode: int = 0) -> bytes:
     mode = dialect.MODE_ARMED if armed else 0
     return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)
+
+
+def is_another(sender: Address, peer: Address | None, silence_s: float, is_there: Callable[[Address], bool]) -> bool:
+    """Whether to refuse a sender, as the peer that shook hands before it is still there."""
+    if peer is None or sender == peer or silence_s >= PEER_GIVEN_UP_AFTER_S:
+        return False
+    return silence_s < PEER_LOST_AFTER_S or is_there(peer)

@@ -1,7 +1,7 @@
 """The plant's end of the lockstep protocol."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 from colibri.common.types import Address
@@ -15,9 +15,10 @@ from colibri.mavlink.hil.lockstep import (
     HEARTBEAT_EVERY_US,
     MAX_FRAME_INTERVAL_US,
     MIN_FRAME_INTERVAL_US,
-    PEER_LOST_AFTER_S,
+    PEER_GIVEN_UP_AFTER_S,
     RESEND_AFTER_S,
     encode_heartbeat,
+    is_another,
 )
 from colibri.mavlink.hil.plant_status import (
     NOTHING,
@@ -64,13 +65,17 @@ class PlantEnd:
         frame_interval_us: int,
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
+        is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
+        """Begin without autopilot; `is_there` tells whether a program has the address of a silent one."""
         self.waits = waits  # or runs freely
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
         self._autopilot_bytes = bytes(self._autopilot)
         self.peer: Address | None = None
+        self.notes: list[str] = []  # for people; the owner clears it
+        self._is_there, self._note_at_s = is_there, 0.0
         self.frame_interval_us = frame_interval_us
         self.feedback = Feedback.STATE
         self._serves = frozenset(serves)
@@ -134,7 +139,7 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG" and message.fields.command in _WITH_THE_ANSWER:
                 asked.append(message)
             elif message.name == "COMMAND_LONG":
-                self._obey(message, sender)
+                self._obey(message, sender, now_s)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
                 command = self._accept(decode_actuators(message)) or command
             else:
@@ -175,8 +180,7 @@ class PlantEnd:
     def _receive_heartbeat(self, sender: Address, now_s: float) -> None:
         if sender == self.peer:
             return
-        if self.peer is not None and now_s - self._peer_received_s < PEER_LOST_AFTER_S:
-            self.dropped["second autopilot"] += 1
+        if self._is_another(sender, now_s):
             return
         self.peer = sender
         if self._awaited_us is not None:
@@ -185,6 +189,15 @@ class PlantEnd:
             if not self.waits:
                 self._frames += (self._heartbeat(),)
             self._send_frame(now_s)
+
+    def _is_another(self, sender: Address, now_s: float) -> bool:
+        if not is_another(sender, self.peer, now_s - self._peer_received_s, self._is_there):
+            return False
+        self.dropped["second autopilot"] += 1
+        if now_s >= self._note_at_s:
+            self._note_at_s = now_s + PEER_GIVEN_UP_AFTER_S
+            self.notes.append(f"a second autopilot calls from port {sender[1]}: refused, as the first is there")
+        return True
 
     def _heartbeat(self) -> bytes:
         mode = 0 if self.waits else FREE_RUNNING
@@ -203,10 +216,12 @@ class PlantEnd:
         else:
             self._faults.append(asked)
 
-    def _obey(self, message: Message, sender: Address) -> None:
+    def _obey(self, message: Message, sender: Address, now_s: float) -> None:
         fields = message.fields
         if (fields.target_system, fields.target_component) != self._codec.source:
             self.dropped["foreign"] += 1
+            return
+        if self._is_another(sender, now_s):
             return
         result: int = dialect.RESULT_UNSUPPORTED
         feedback = ASKS_FOR.get(fields.param1) if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL else None

@@ -1,6 +1,7 @@
 """A UDP endpoint with bounded blocking."""
 
 import socket
+from errno import EADDRINUSE
 from ipaddress import ip_address
 from select import select
 from time import perf_counter
@@ -103,3 +104,13 @@ def _connect(sock: socket.socket, target: Address) -> bool:
         return False
     sock.connect(target)
     return True
+
+
+def is_bound(address: Address) -> bool:
+    """Whether a program of this computer has the address: it lives, however long it is silent."""
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(address)
+    except OSError as error:
+        return error.errno == EADDRINUSE
+    return False

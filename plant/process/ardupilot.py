@@ -9,19 +9,18 @@ libraries/SITL/examples/JSON/readme.md and SIM_JSON.cpp.
 """
 
 from collections import Counter
+from collections.abc import Callable
 from struct import Struct
 
 import msgspec
 
 from colibri.common.types import Address
+from colibri.mavlink.hil.lockstep import is_another
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from colibri.plant.physics.world import Physics, World, state_frame
 from colibri.plant.vehicle.description import Rotors
 from colibri.plant.vehicle.rotor_numbering import Numbering
-
-PEER_LOST_AFTER_S = 0.5
-"""Wall-clock silence after which another ArduPilot may take over the plant."""
 
 _MAGIC = {Struct("<HHI16H"): 18458, Struct("<HHI32H"): 29569}
 _FORMATS = {form.size: form for form in _MAGIC}
@@ -34,7 +33,16 @@ _MIN_RATE_HZ = 10
 class ArduPilotEnd:
     """Steps a world at each request; `dropped` counts ignored datagrams."""
 
-    def __init__(self, physics: Physics, start: World, motors: Numbering, rotors: Rotors) -> None:
+    def __init__(
+        self,
+        physics: Physics,
+        start: World,
+        motors: Numbering,
+        rotors: Rotors,
+        is_there: Callable[[Address], bool] = lambda _: False,
+    ) -> None:
+        """Begin without peer; `is_there` tells whether a program has the address of a silent one."""
+        self._is_there = is_there
         self._physics = physics
         self._start = start
         self._motors = motors
@@ -59,7 +67,7 @@ class ArduPilotEnd:
         if rate_hz < _MIN_RATE_HZ:
             self.dropped["frame rate"] += 1
             return None
-        if sender != self.peer and self.peer is not None and now_s - self._received_s < PEER_LOST_AFTER_S:
+        if is_another(sender, self.peer, now_s - self._received_s, self._is_there):
             self.dropped["second autopilot"] += 1
             return None
         self.peer, self._received_s = sender, now_s

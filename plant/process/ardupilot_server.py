@@ -8,7 +8,7 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
-from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.links.udp import UdpLink, is_bound
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
@@ -33,7 +33,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
     text = f"{text}; {all_parameters_by(str(spec.vehicle), 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
-    end = ArduPilotEnd(Physics(vehicle, spec.integrator, weather), start, motors, vehicle.rotors)
+    end = ArduPilotEnd(Physics(vehicle, spec.integrator, weather), start, motors, vehicle.rotors, is_bound)
     logs = PlantLogs(spec.out, vehicle) if spec.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=spec.duration)

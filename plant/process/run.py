@@ -4,7 +4,7 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.links.udp import UdpLink, is_bound
 from colibri.plant.physics.start import default_starts
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import closing
@@ -33,7 +33,11 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     logs = PlantLogs(spec.out, builder.vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
     interval_us = round(1e3 / spec.rate) * 1000
     end = PlantEnd(
-        system_id=spec.system_id, frame_interval_us=interval_us, serves=tuple(builder.starts), waits=not spec.realtime
+        system_id=spec.system_id,
+        frame_interval_us=interval_us,
+        serves=tuple(builder.starts),
+        waits=not spec.realtime,
+        is_there=is_bound,
     )
     server = Server(link, end, status, stop, logs, streams_truth=spec.truth)
     if spec.realtime:

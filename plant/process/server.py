@@ -144,6 +144,8 @@ class Server:
         if received is None:
             return None
         command = self._end.receive(*received, perf_counter())
+        if self._end.notes:
+            self._status.say("said", self._end.notes.pop())
         self._send_and_log()
         return command
 

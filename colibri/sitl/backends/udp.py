@@ -1,6 +1,7 @@
 """Plant and autopilot as processes that this one connects over UDP."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, sleep
@@ -10,6 +11,7 @@ from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import Gathering, StepMessage, packets
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec
 from colibri.plant.spec import PlantSpec
 from colibri.sitl.backends.launcher import Launcher, LoggedChild
 from colibri.sitl.backends.link_clocks import QuickClock
@@ -103,11 +105,12 @@ class UdpAutopilot:
         self._time_us = 0
 
     def call(self) -> bytes:
-        _, address = received(self._stations, self._child)
-        self._stations.speak_with(address)
-        call, address = received(self._link, self._child)
-        self._link.speak_with(address)
-        return call
+        _meet(self._stations, self._child, lambda packet: packet == b"")
+        source = (self._spec.system_id, AUTOPILOT_COMPONENT)
+        codec = Codec(*source)
+        return _meet(
+            self._link, self._child, lambda packet: [each.source for each in codec.decode(packet)] == [source] * 2
+        )
 
     def expect(self, step_message: StepMessage) -> None:
         self._time_us = step_message.time_us
@@ -159,3 +162,12 @@ def received(link: UdpLink, child: LoggedChild) -> tuple[bytes, Address]:
         if perf_counter() > began_s + SILENCE_S:
             raise SessionError(f"the {child.name} has said nothing for {SILENCE_S:.0f} s, and lives")
     return datagram
+
+
+def _meet(link: UdpLink, child: LoggedChild, expected: Callable[[bytes], bool]) -> bytes:
+    """Bind a link to the first sender of what is expected, and return that; other senders are nobody's."""
+    while True:
+        datagram, address = received(link, child)
+        if expected(datagram):
+            link.speak_with(address)
+            return datagram

@@ -8,7 +8,14 @@ import pytest
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault, encode_fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import CALL_AFTER_S, FREE_RUNNING, PEER_LOST_AFTER_S, RESEND_AFTER_S, encode_heartbeat
+from colibri.mavlink.hil.lockstep import (
+    CALL_AFTER_S,
+    FREE_RUNNING,
+    PEER_GIVEN_UP_AFTER_S,
+    PEER_LOST_AFTER_S,
+    RESEND_AFTER_S,
+    encode_heartbeat,
+)
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantBattery, PlantStatus, ReceivedFrame
@@ -93,15 +100,25 @@ def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: Aut
     assert len(autopilot.take_outbox()) == 1
 
 
-def test_a_second_autopilot_is_refused_while_the_first_answers(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+@pytest.mark.parametrize(("silence_s", "is_there", "refused"), [
+    (0.9 * PEER_LOST_AFTER_S, False, True),
+    (1.1 * PEER_LOST_AFTER_S, False, False),
+    (1.1 * PEER_LOST_AFTER_S, True, True),
+    (0.9 * PEER_GIVEN_UP_AFTER_S, True, True),
+    (PEER_GIVEN_UP_AFTER_S, True, False),
+])  # fmt: skip
+def test_a_second_autopilot_is_refused_while_the_first_is_there(
+    autopilot: AutopilotEnd, silence_s: float, is_there: bool, refused: bool
+) -> None:
+    plant = PlantEnd(system_id=1, frame_interval_us=4_000, is_there=lambda address: is_there and address == ADDRESS)
     call(autopilot, plant)
-    second = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0)
+    second = AutopilotEnd(system_id=1, frame_interval_us=4_000, now_s=0.0)
     second.poll(0.0)
     (hello,) = second.take_outbox()
-    plant.receive(hello, STRANGER, 0.9 * PEER_LOST_AFTER_S)
-    assert plant.peer == ADDRESS
-    plant.receive(hello, STRANGER, 1.1 * PEER_LOST_AFTER_S)
-    assert plant.peer == STRANGER
+    plant.receive(hello, STRANGER, silence_s)
+    assert plant.peer == (ADDRESS if refused else STRANGER)
+    assert plant.frame_interval_us == (INTERVAL_US if refused else 4_000)
+    assert plant.notes == ["a second autopilot calls from port 2: refused, as the first is there"] * refused
 
 
 def test_a_restarted_autopilot_gets_the_frame_awaited_at_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import beyond_loopback, open_ground_link, open_link, unsigned_refusal
-from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.links.udp import UdpLink, is_bound
 
 TIMEOUT_S = 2.0
 
@@ -115,3 +115,13 @@ def test_a_malformed_url_of_a_ground_station_is_refused(url: str) -> None:
     for function in (open_ground_link, beyond_loopback):
         with pytest.raises(LinkError, match=r"port 0|expected udpin:HOST:PORT or .* or tcp:HOST:PORT|unknown host"):
             function(url)
+
+
+def test_an_address_is_bound_while_its_socket_is_open(server: UdpLink) -> None:
+    with closing(client_of(server)) as client:
+        client.send(b"hello")
+        received = server.receive(1.0)
+        assert received is not None
+        assert is_bound(received[1])
+    assert not is_bound(received[1])
+    assert not is_bound(("192.0.2.1", 14550))
