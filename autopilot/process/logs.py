@@ -34,6 +34,9 @@ from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
 from colibri.mavlink.ulog.status import VehicleStatus, status_message
 
+MAX_RECEIVED_BYTES = 64 << 20
+"""Limit of what stations send in the log of a flight: a flood must not fill the disk."""
+_FULL = f"stations have sent more than {MAX_RECEIVED_BYTES >> 20} MiB: no more is recorded, a replay ends here"
 _FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _STILL = (nan,) * 4
 _NO_REFERENCES = (nan,) * 11
@@ -45,7 +48,7 @@ class AutopilotLog:
     def __init__(self, topics: TopicLog, setup: Setup) -> None:
         self.topics, self._setup = topics, setup
         self._begins = True
-        self._time_us = 0
+        self._time_us = self._received_bytes = 0
         sensors = setup.vehicle_tables and setup.vehicle_tables.sensors
         self._kinds = kinds_of(sensors) if sensors else []
         self._recorder: Recorder | None = None
@@ -111,15 +114,24 @@ class AutopilotLog:
         """Record and yield datagrams; raise LogError after the last."""
         failed: LogError | None = None
         for received in datagrams:
-            datagram, link, address, owner = received
-            entry = ReceivedDatagram(link=link, address=address, loopback=owner, datagram=datagram)
             try:
-                self.topics.append(encode_input(self._time_us, RecordKind.DATAGRAM, encoded(entry)))
+                self._record(*received)
             except LogError as error:
                 failed = error
             yield received
         if failed:
             raise failed
+
+    def _record(self, datagram: bytes, link: int, address: tuple[str, int] | None, owner: bool) -> None:
+        if self._received_bytes > MAX_RECEIVED_BYTES:
+            return
+        entry = ReceivedDatagram(link=link, address=address, loopback=owner, datagram=datagram)
+        record = encode_input(self._time_us, RecordKind.DATAGRAM, encoded(entry))
+        self._received_bytes += len(record)
+        if self._received_bytes > MAX_RECEIVED_BYTES:
+            self.say(self._time_us, WARNING, _FULL)
+            raise LogError(_FULL)
+        self.topics.append(record)
 
     def flush(self) -> None:
         self.topics.flush()
@@ -130,6 +142,7 @@ class AutopilotLog:
     def _begin_anew(self) -> None:
         """Start a new flight, because the plant's time has restarted."""
         self.topics.close()
+        self._received_bytes = 0
         self._status_us, self._thinning = -1, Thinning()
         self._fallback = None
         self._begins = True

@@ -18,6 +18,8 @@ from colibri.mavlink.wire.dialect import Message, mav
 
 ASK_EVERY_US = 250_000
 PATIENCE_US = 5_000_000
+GIVES_WAY_AFTER_US = 20_000_000
+"""Time after which an upload gives way to another station's: one that repeats itself must not keep others out."""
 OLD_FORM_AFTER = 2
 """Unanswered requests before every other one is the old MISSION_REQUEST."""
 ANSWER_AGAIN_AFTER_US = 200_000
@@ -41,8 +43,9 @@ class _Answer(NamedTuple):
 
 
 class _Upload:
-    def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int) -> None:
+    def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int, began_us: int) -> None:
         self.peer = peer
+        self.began_us = began_us  # also of those that the channel began and replaced
         self.plan_type = plan_type
         self.count = count
         self.items: list[MissionItem] = []
@@ -90,17 +93,20 @@ class Uploads:
         self.due_us = NEVER_US
 
     def begin(self, peer: Peer, plan_type: int, count: int, now_us: int) -> Send:
-        """Handle a MISSION_COUNT: a repeated one restarts; another peer's upload is not disturbed."""
+        """Handle a MISSION_COUNT: a repeated one restarts; another station's upload is finished first."""
         other = self._under_way.get(plan_type)
+        began_us = other.began_us if other is not None and other.peer.channel == peer.channel else now_us
         if other is not None and other.peer != peer:
-            return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
+            if now_us - other.began_us < GIVES_WAY_AFTER_US:
+                return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
+            self.drop(other.peer, (plan_type,))
         self.drop(peer, PLAN_TYPES)
         self._answers.pop(plan_type, None)
         if count > self._rules[plan_type].maximum:
             return ack(peer, mav.MAV_MISSION_NO_SPACE, plan_type)
         if count == 0:  # "has the same effect as clearing the mission"
             return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)
-        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us)
+        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us, began_us)
         return self._asking(upload, now_us)
 
     def expects(self, peer: Peer, plan_type: int) -> bool:

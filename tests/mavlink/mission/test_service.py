@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RALLY, MissionItem
 from colibri.mavlink.mission.service import MissionProgress
-from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.mission.upload import GIVES_WAY_AFTER_US, Rules
 from colibri.mavlink.services.command import DENIED, NOT_GIVEN, ReceivedCommand
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -170,6 +170,16 @@ def test_a_second_station_is_denied_while_the_first_uploads() -> None:
     assert asked(give(ground, 0, ITEMS[0])) == [("MISSION_REQUEST_INT", 1)]
     assert results(give(ground, 1, ITEMS[1])) == [ACCEPTED]
     assert asked(count(ground, 2, SECOND)) == [("MISSION_REQUEST_INT", 0)]
+
+
+def test_an_upload_that_begins_again_and_again_gives_way() -> None:
+    ground = Ground()
+    for ground.now_us in range(0, GIVES_WAY_AFTER_US, 4_000_000):
+        count(ground, 2)
+        assert results(count(ground, 2, SECOND)) == [mav.MAV_MISSION_DENIED]
+    ground.now_us = GIVES_WAY_AFTER_US
+    assert asked(count(ground, 2, SECOND)) == [("MISSION_REQUEST_INT", 0)]
+    assert results(count(ground, 2)) == [mav.MAV_MISSION_DENIED]
 
 
 def test_no_space_and_nothing_at_all() -> None:
