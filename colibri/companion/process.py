@@ -246,6 +246,8 @@ def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_
         for line in companion.said:
             status.say("phase", line)
         companion.said.clear()
+        for note in wire.link.take_notes():
+            status.say("link", note)
         for line in companion.peer.report.take_new_texts():
             status.say("vehicle", f"vehicle says: {line}")
         if now_us * 1e-6 > tell_s and companion.waits_for != told:

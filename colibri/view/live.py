@@ -78,6 +78,8 @@ class LiveVehicle:
                     if address not in self._peers:
                         self._peers.append(address)
                     self._observer.receive(datagram, now_s)
+                for note in self._link.take_notes():
+                    self._observer.telemetry.say(note)
                 outbox = self._observer.poll(now_s)
             for datagram in outbox:
                 for address in self._peers:
