@@ -38,15 +38,15 @@ def _draw_sets(ax: Axes, certificate: Certificate, flown: FlownErrors, across: i
     plane = np.ix_([across, up], [across, up])
     at_rest = np.linalg.inv(certificate.invariant.proof.P[plane])
     for shape, color, style, label in (
-        (never_left[plane], "#0072B2", "-", "set that is never left: its shadow"),
+        (never_left[plane], "#0072B2", "-", "invariant set: its projection"),
         (at_rest, "#0072B2", "--", "its section: no other error"),
-        (tended_to[plane], "#D55E00", "-", "tended to"),
+        (tended_to[plane], "#D55E00", "-", "ultimate bound"),
     ):
         border = _border(shape) * units[:, None]
         ax.plot(*border, color=color, linestyle=style, linewidth=1.6, label=label, zorder=3)
     ax.plot(shown[:, 0, 0], shown[:, 0, 1], color="#999999", linewidth=0.7, label=f"{shown.shape[1]} of the flights")
     ax.plot(shown[:, 1:, 0], shown[:, 1:, 1], color="#999999", linewidth=0.4)
-    ax.plot(shown[0, :, 0], shown[0, :, 1], ".", color="#444444", markersize=3, label="where they begin: V = 1")
+    ax.plot(shown[0, :, 0], shown[0, :, 1], ".", color="#444444", markersize=3, label="their starts: V = 1")
     ax.grid(color="#DDDDDD", linewidth=0.6)
 
 

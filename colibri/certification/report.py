@@ -63,7 +63,7 @@ def certify_profile(args: Namespace) -> int:
         "not_proven": not_proven,
     }
     certificates.write(found, about, args.out / CERTIFICATE)
-    headings, rows = ("what", f"{', '.join(law.axes)} (deg)", "p, q, r (rad/s)", ""), table(found, law, flown)
+    headings, rows = ("result", f"{', '.join(law.axes)} (deg)", "p, q, r (rad/s)", ""), table(found, law, flown)
     write_table(args.out / TABLE, headings, rows, names=1)
     draw(found, flown, law.axes, args.out / FIGURE)
     largest = float(flown.values[1:].max())
@@ -95,16 +95,16 @@ def table(found: Certificate, law: AttitudeLaw, flown: FlownErrors) -> list[tupl
     at_rest = 1.0 / np.sqrt(np.diag(invariant.proof.P))
     return [
         _ranges("largest ranges with a Lyapunov function", found.largest, law),
-        _ranges("ranges of all that follows", invariant, law),
+        _ranges("ranges of all further proofs", invariant, law),
         ("thrust", "", "", f"{least:.2f} to {most:.2f} N"),
         ("decay without disturbance", "", "", f"exp(-{rate:.2f} t), t in s"),
-        _reach("set that is never left", invariant),
-        ("begun with no other error", *_triples(at_rest), ""),
-        ("attitude that may be held", f"{held[0]:.1f}, {held[1]:.1f}, any", "0", ""),
-        _reach("tended to, in proportion to the moment", attractor, f"{attractor.numbers.disturbance_n_m:g} N m"),
+        _reach("invariant set", invariant),
+        ("its section: no other error", *_triples(at_rest), ""),
+        ("held attitude", f"{held[0]:.1f}, {held[1]:.1f}, any", "0", ""),
+        _reach("ultimate bound, in proportion to the moment", attractor, f"{attractor.numbers.disturbance_n_m:g} N m"),
         ("terminal weight", "", "", f"{weights.min():.2f} to {weights.max():.3g} times the profile's"),
         ("flights: V after the start", "", "", f"at most {flown.values[1:].max():.3f}"),
-        ("flights: commanded beyond the gain", "", "", f"at most {flown.beyond_n_m.max():.2g} N m"),
+        ("flights: command beyond the gain", "", "", f"at most {flown.beyond_n_m.max():.2g} N m"),
         ("exact check", "", "", f"least margin {margin:.1g}"),
     ]
 
