@@ -73,8 +73,8 @@ class SweepPoint(NamedTuple):
 WAYS = {
     "not": "not compensated",
     "measured": "measured",
-    "- 5": "told 5 ms less",
-    "+ 5": "told 5 ms more",
+    "- 5": "set 5 ms too short",
+    "+ 5": "set 5 ms too long",
 }
 """Compensated or not, and by what delay."""
 
@@ -135,7 +135,7 @@ def tables(points: Sequence[SweepPoint]) -> Iterator[str]:
             those = [point for point in points if point.law == law and point.way == way]
             well = _until(those, [_is_well(point, points) for point in those])
             limits.append((name, well, _until(those, list(map(_is_kept, those)))))
-        yield markdown(("delay", "flown well up to", "kept up to"), limits, names=1)
+        yield markdown(("compensation", "good up to", "not lost up to"), limits, names=1)
 
 
 def _row(points: Sequence[SweepPoint], law: str, ms: float) -> tuple[str, ...]:

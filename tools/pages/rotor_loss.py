@@ -17,7 +17,7 @@ from tools.pages.tables import with_tables
 
 SEEDS = range(50)
 CASES = (
-    RotorLossCase("state told, calm; the blades fly off", Feedback.STATE),
+    RotorLossCase("state feedback, calm; the blades fly off", Feedback.STATE),
     RotorLossCase("sensors, calm; the blades fly off", Feedback.SENSORS),
     RotorLossCase("sensors, calm; the motor runs down", Feedback.SENSORS, runs_down=True),
     RotorLossCase(
@@ -30,7 +30,7 @@ CASES = (
 _DRAWN = CASES[3]
 _THICK_SEED = 5
 _MEASURES: tuple[tuple[str, Callable[[RotorLossFlight], float], str], ...] = (
-    ("noticed after (ms)", lambda flown: 1e3 * flown.noticed_s, ".0f"),
+    ("detected after (ms)", lambda flown: 1e3 * flown.noticed_s, ".0f"),
     ("largest tilt (°)", lambda flown: flown.peak_deg, ".1f"),
     ("below 20° for good after (s)", lambda flown: flown.upright_s, ".2f"),
     ("tilt from 1 s on (°)", lambda flown: flown.settled_deg, ".1f"),
@@ -45,7 +45,7 @@ _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
 
 
 def table(flown: Mapping[RotorLossCase, Sequence[RotorLossFlight]]) -> str:
-    headings = ("50 flights each", "well", *(name for name, _, _ in _MEASURES))
+    headings = ("50 flights each", "successful", *(name for name, _, _ in _MEASURES))
     rows = [(case.name, f"{sum(one.well for one in of)} of {len(of)}", *_cells(of)) for case, of in flown.items()]
     return markdown(headings, rows, names=1)
 
