@@ -90,19 +90,17 @@ def _vector(name: str, unit: str, axes: str, maximum: float, usual: tuple[float,
     )
 
 
-def _sensor(
-    unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value, what: str
-) -> tuple[FaultRow, ...]:
+def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value) -> tuple[FaultRow, ...]:
     late = _scalar("late by", "s", 0.001, 10.0, 0.2)
     part = Equipment.SENSORS
     return (
-        FaultRow(unit, OK, part, "is well again"),
-        FaultRow(unit, OFF, part, "measures nothing new"),
-        FaultRow(unit, STUCK, part, "reports its last value again and again, as if it were new"),
-        FaultRow(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
-        FaultRow(unit, WRONG, part, f"is off by {what}", wrong),
-        FaultRow(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
-        FaultRow(unit, DELAYED, part, "reports later", (late,)),
+        FaultRow(unit, OK, part, "normal again"),
+        FaultRow(unit, OFF, part, "no new measurements"),
+        FaultRow(unit, STUCK, part, "repeats its last value as new"),
+        FaultRow(unit, GARBAGE, part, "adds white Gaussian noise", (noise,)),
+        FaultRow(unit, WRONG, part, "adds a constant error", wrong),
+        FaultRow(unit, SLOW, part, "adds an error that grows from zero", drift),
+        FaultRow(unit, DELAYED, part, "delays measurements", (late,)),
     )
 
 
@@ -112,60 +110,52 @@ ROWS: tuple[FaultRow, ...] = (
         _vector("bias", "rad/s", "xyz", 20.0, (0.1, 0.0, 0.0)),
         _vector("drift", "rad/s²", "xyz", 1.0, (0.01, 0.0, 0.0)),
         _scalar("standard deviation", "rad/s", 1e-4, 20.0, 0.5),
-        "a bias, forward-left-up",
     ),
     *_sensor(
         ACCELEROMETER,
         _vector("bias", "m/s²", "xyz", 100.0, (0.0, 0.0, 2.0)),
         _vector("drift", "m/s³", "xyz", 10.0, (0.0, 0.0, 0.1)),
         _scalar("standard deviation", "m/s²", 1e-3, 100.0, 5.0),
-        "a bias, forward-left-up",
     ),
     *_sensor(
         MAGNETOMETER,
         _vector("bias", "gauss", "xyz", 10.0, (0.2, 0.0, 0.0)),
         _vector("drift", "gauss/s", "xyz", 1.0, (0.01, 0.0, 0.0)),
         _scalar("standard deviation", "gauss", 1e-4, 10.0, 0.3),
-        "a bias, forward-left-up",
     ),
     *_sensor(
         BAROMETER,
         (_scalar("bias", "Pa", -20000.0, 20000.0, 100.0),),
         (_scalar("drift", "Pa/s", -1000.0, 1000.0, 5.0),),
         _scalar("standard deviation", "Pa", 0.1, 20000.0, 200.0),
-        "a bias, of which 12 Pa are a metre",
     ),
     *_sensor(
         GPS,
         _vector("jump", "m", "xyz", 10000.0, (10.0, 0.0, 0.0)),
         _vector("drift", "m/s", "xyz", 100.0, (0.5, 0.0, 0.0)),
         _scalar("standard deviation", "m", 0.01, 1000.0, 10.0),
-        "a distance, east-north-up",
     ),
     *_sensor(
         RANGEFINDER,
         (_scalar("bias", "m", -100.0, 100.0, 1.0),),
         (_scalar("drift", "m/s", -10.0, 10.0, 0.05),),
         _scalar("standard deviation", "m", 0.001, 100.0, 0.5),
-        "a distance",
     ),
-    FaultRow(BATTERY, OK, Equipment.BATTERY, "is well again, and has back what a fault took"),
-    FaultRow(BATTERY, OFF, Equipment.BATTERY, "is empty: its voltage falls to that of no charge"),
+    FaultRow(BATTERY, OK, Equipment.BATTERY, "normal again, with the charge that the fault removed"),
+    FaultRow(BATTERY, OFF, Equipment.BATTERY, "empty: voltage at zero charge"),
     FaultRow(
-        *(BATTERY, WRONG, Equipment.BATTERY, "sags: less charge, and the voltage with it; a larger resistance"),
+        *(BATTERY, WRONG, Equipment.BATTERY, "sags: less charge and voltage, changed resistance"),
         values=(
-            Value("part of the full charge that is left", "1", 1e-3, 1.0, 0.2, 0.2),
-            Value("times its resistance", "1", 0.1, 10.0, 1.0, 1.0),
+            Value("remaining fraction of the full charge", "1", 1e-3, 1.0, 0.2, 0.2),
+            Value("factor of the resistance", "1", 0.1, 10.0, 1.0, 1.0),
         ),
     ),
-    FaultRow(MOTOR, OK, Equipment.ROTORS, "is well again", instances=MOTORS),
-    FaultRow(MOTOR, OFF, Equipment.ROTORS, "is lost: nothing drives it, it runs down", instances=MOTORS),
+    FaultRow(MOTOR, OK, Equipment.ROTORS, "normal again", instances=MOTORS),
+    FaultRow(MOTOR, OFF, Equipment.ROTORS, "lost: undriven, runs down", instances=MOTORS),
+    FaultRow(MOTOR, STUCK, Equipment.ROTORS, "keeps its present speed", instances=MOTORS),
     FaultRow(
-        MOTOR, STUCK, Equipment.ROTORS, "turns as fast as at this moment, whatever is commanded", instances=MOTORS
-    ),
-    FaultRow(
-        *(MOTOR, WRONG, Equipment.ROTORS, "is weak: has a part of its thrust and torque"),
-        values=(_scalar("part that is left", "1", 1e-3, 1.0, 0.65),),
+        *(MOTOR, WRONG, Equipment.ROTORS, "weak: a fraction of thrust and torque"),
+        values=(_scalar("remaining fraction", "1", 1e-3, 1.0, 0.65),),
         instances=MOTORS,
     ),
 )

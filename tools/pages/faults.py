@@ -1,17 +1,42 @@
 """Tables of `faults.md`: faults that can be injected."""
 
+from collections.abc import Iterator
+
 from colibri.analysis.tables import markdown
-from colibri.mavlink.hil.faults import ROWS, Equipment, FaultRow, Value, kind_name, unit_name
+from colibri.mavlink.hil.faults import (
+    GARBAGE,
+    ROWS,
+    SENSORS,
+    SLOW,
+    TABLE,
+    WRONG,
+    Equipment,
+    FaultRow,
+    Value,
+    kind_name,
+    unit_name,
+)
 from tools.pages.tables import with_tables
 
+_SIZED = (GARBAGE, WRONG, SLOW)
 
-def _table(part: Equipment) -> str:
-    rows = [
-        (f"{unit_name(row.unit)} {row.unit}", f"{kind_name(row.kind)} {row.kind}", row.meaning, _numbers(row))
-        for row in ROWS
-        if row.part is part
-    ]
-    return markdown(("unit", "type", "what it does", "numbers"), rows, names=4)
+
+def tables() -> Iterator[str]:
+    kinds = [(_kind(row.kind), row.meaning) for row in ROWS if row.unit == SENSORS[0]]
+    yield markdown(("type", "effect on a sensor"), kinds, names=2)
+    sizes = [(_unit(unit), *(_numbers(TABLE[unit, kind]) for kind in _SIZED)) for unit in SENSORS]
+    yield markdown(("unit", *map(_kind, _SIZED)), sizes, names=4)
+    others = [row for part in (Equipment.BATTERY, Equipment.ROTORS) for row in ROWS if row.part is part]
+    rows = [(_unit(row.unit), _kind(row.kind), row.meaning, _numbers(row)) for row in others]
+    yield markdown(("unit", "type", "effect", "numbers"), rows, names=4)
+
+
+def _unit(unit: int) -> str:
+    return f"{unit_name(unit)} {unit}"
+
+
+def _kind(kind: int) -> str:
+    return f"{kind_name(kind)} {kind}"
 
 
 def _numbers(row: FaultRow) -> str:
@@ -27,6 +52,4 @@ def _number(value: Value, name: str, usual: str) -> str:
     return f"{name}: {value.minimum:g} to {value.maximum:g}{unit} ({usual})"
 
 
-PAGES = {
-    "faults.md": lambda page: with_tables(page, map(_table, (Equipment.SENSORS, Equipment.BATTERY, Equipment.ROTORS)))
-}
+PAGES = {"faults.md": lambda page: with_tables(page, tables())}

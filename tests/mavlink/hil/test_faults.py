@@ -58,7 +58,7 @@ def test_a_number_that_is_not_given_is_none_beside_one_that_is() -> None:
 
 
 def test_what_cannot_be_is_denied_with_words() -> None:
-    assert refusal(Fault(MOTOR, WRONG, 1, (1.5, 0.0, 0.0, 0.0))) == Refusal("part that is left must be 0.001 to 1")
+    assert refusal(Fault(MOTOR, WRONG, 1, (1.5, 0.0, 0.0, 0.0))) == Refusal("remaining fraction must be 0.001 to 1")
     assert refusal(Fault(GYROSCOPE, WRONG, 0, (inf, 0.0, 0.0, 0.0))) == Refusal("bias x must be -20 to 20 rad/s")
     assert refusal(Fault(MOTOR, OFF, 5)) == Refusal("instance must be 0 to 4")
     assert refusal(Fault(GPS, OFF, 2)).result == RESULT_DENIED
