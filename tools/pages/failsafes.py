@@ -36,7 +36,7 @@ def tables() -> list[str]:
         for row in TABLE
     ]
     headings = ("condition", "holds when", "limits", "delay", "action", "over when")
-    return [markdown(("rank", "action", "what it is"), ranks, names=3), markdown(headings, conditions, names=6)]
+    return [markdown(("rank", "action", "effect"), ranks, names=3), markdown(headings, conditions, names=6)]
 
 
 def _shown(parameter: Parameter) -> str:
@@ -60,7 +60,7 @@ def draw(path: Path) -> None:
     axes.set_ylim(-0.9, 7.4)
     axes.axis("off")
     top = _STEP * (len(_LADDER) - 1)
-    for x, name in ((0.1, "what\nthe\npilot\nchose"), (11.9, "disarmed")):
+    for x, name in ((0.1, "the\npilot's\nmode"), (11.9, "disarmed")):
         axes.add_patch(FancyBboxPatch((x, -0.3), 1.0, top + 0.6, boxstyle="round,pad=0.05", facecolor="white"))
         axes.text(x + 0.5, 0.5 * top, name, ha="center", va="center", fontsize=11)
     for rung, action in enumerate(_LADDER):
@@ -78,7 +78,7 @@ def draw(path: Path) -> None:
     axes.text(
         4.4, -0.28, "the pilot chooses a mode, from any of them", fontsize=9, color="#338855", ha="center", va="top"
     )
-    note = "bold: by default    plain: where a parameter says so    what only warns is in the table"
+    note = "bold: by default    plain: by other parameter values    warnings are only in the table"
     axes.text(0.1, top + 1.0, note, fontsize=9, color="#445566", va="bottom")
     figure.savefig(path, dpi=110, bbox_inches="tight")
 

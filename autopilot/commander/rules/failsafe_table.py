@@ -18,7 +18,7 @@ class Action(IntEnum):
 
 
 NAMES: Mapping[Action, str] = {
-    Action.NONE: "nothing",
+    Action.NONE: "no action",
     Action.WARN: "warning",
     Action.HOLD: "hold",
     Action.RETURN: "return",
@@ -27,7 +27,7 @@ NAMES: Mapping[Action, str] = {
     Action.TERMINATE: "rotors stop",
 }
 MEANINGS: Mapping[Action, str] = {
-    Action.NONE: "no action, no report",
+    Action.NONE: "neither action nor report",
     Action.WARN: "report only",
     Action.HOLD: "mode hold: stop and hold position",
     Action.RETURN: "mode return: climb, fly home, land",
