@@ -1,6 +1,6 @@
 """Commands of each phase, and the modes that result from them."""
 
-from math import isfinite, nan
+from math import nan
 
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.stack import Stack, TakeOffOrder
@@ -97,6 +97,8 @@ class Orders:
         elif phase is CompanionPhase.HANDING_OVER and ready and self._peer.report.armed:
             last_try = self._asked_hold >= _HOLD_TRIES
             wanted = stack.last_resort if last_try else stack.hold
+            if last_try:
+                self.refused = f"{stack.hold.name} was refused {_HOLD_TRIES} times: {wanted.name} was requested"
             name = f"mode {wanted.name}"
             if results.get(name) not in (None, RESULT_ACCEPTED):
                 self._asked_hold += 1
@@ -106,8 +108,6 @@ class Orders:
     def _arm(self, stack: Stack) -> None:
         if stack.take_off is TakeOffOrder.COMMAND_THEN_ARM:
             above_sea_m = self._peer.report.altitude_amsl_m + self._climb_m
-            if not isfinite(above_sea_m):
-                return
             first = "take-off"
             self._once(first, mav.MAV_CMD_NAV_TAKEOFF, _ABOVE_SEA, 0.0, 0.0, nan, nan, nan, above_sea_m)
         else:

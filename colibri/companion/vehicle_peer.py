@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from colibri.companion.stacks.recognition import recognised
 from colibri.companion.stacks.stack import Stack
+from colibri.companion.supervision.ages import ages_s, too_old
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.clock import VehicleClock
 from colibri.mavlink.client.commands import Command, set_message_interval
@@ -169,14 +170,15 @@ class VehiclePeer:
         ]
 
     def _renew_streams(self, now_us: int) -> None:
-        """Request the streams, repeatedly while states arrive at less than half of their rate."""
+        """Request the streams, repeatedly while states arrive at less than half of their rate or a report is old."""
         under_way = any(stream.result is None for stream in self._streams)
         if self.stack is None or now_us < self._renew_at_us or under_way:
             return
         self._renew_at_us = now_us + _RENEW_EVERY_US
         streams = self.stack.streams
         wanted_hz = max(streams[name] for name in HANDLES & streams.keys())
-        if self.state_rate_hz(now_us) < _ENOUGH_OF_A_STREAM * wanted_hz:
+        ages = ages_s(self.report, None, now_us)
+        if self.state_rate_hz(now_us) < _ENOUGH_OF_A_STREAM * wanted_hz or too_old(ages, in_flight=False):
             self._streams = [
                 self.client.begin(set_message_interval(self.target, name, 1e6 / rate_hz, repeat=_COMMANDS))
                 for name, rate_hz in streams.items()

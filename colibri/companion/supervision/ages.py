@@ -8,12 +8,16 @@ from colibri.mavlink.client.report import VehicleReport
 
 
 class Age(NamedTuple):
-    """A row of the table: a report, its messages, and its largest age at the start and in flight, s."""
+    """A row of the table: a report, its messages, and its largest age at the start and in flight, s.
+
+    A vehicle that never sends a `needed` one is not flown.
+    """
 
     name: str
     messages: str
     start_s: float
     flight_s: float
+    needed: bool = False
 
 
 AGES: tuple[Age, ...] = (
@@ -23,7 +27,7 @@ AGES: tuple[Age, ...] = (
     Age("estimator", "ESTIMATOR_STATUS or SYS_STATUS", 2.0, 3.0),
     Age("status", "SYS_STATUS", 3.0, 5.0),
     Age("battery", "SYS_STATUS or BATTERY_STATUS", 5.0, 10.0),
-    Age("landed", "EXTENDED_SYS_STATE", 2.0, inf),
+    Age("landed", "EXTENDED_SYS_STATE", 2.0, inf, needed=True),
     Age("altitude", "GLOBAL_POSITION_INT", 2.0, inf),
 )
 """Age of states (attitude, body rates, position, velocity): `FlightLimits.max_state_age_s`."""
@@ -36,7 +40,7 @@ def ages_s(report: VehicleReport, answered_us: int | None, now_us: int) -> dict[
 
 
 def too_old(ages: Mapping[str, float], *, in_flight: bool) -> list[str]:
-    """Say which reports are too old. One that was never sent is not: see `missing`."""
+    """Say which reports are too old. One that was never sent is not: see `missing` and `needed`."""
     limits = ((row, row.flight_s if in_flight else row.start_s) for row in AGES)
     return [
         f"the last {row.name} report ({row.messages}) is {ages[row.name]:.1f} s old, more than {limit_s:g}"
@@ -45,5 +49,5 @@ def too_old(ages: Mapping[str, float], *, in_flight: bool) -> list[str]:
     ]
 
 
-def missing(ages: Mapping[str, float]) -> list[str]:
-    return [f"{row.name} ({row.messages})" for row in AGES if row.name not in ages]
+def missing(ages: Mapping[str, float], *, needed: bool = False) -> list[str]:
+    return [f"{row.name} ({row.messages})" for row in AGES if row.name not in ages and row.needed == needed]

@@ -1,10 +1,10 @@
 """Checks before a companion arms or takes over, each with advice for a failure."""
 
 from collections.abc import Callable, Mapping
-from math import hypot, inf
+from math import hypot, inf, isfinite
 from typing import NamedTuple
 
-from colibri.companion.stacks.stack import Stack
+from colibri.companion.stacks.stack import Stack, TakeOffOrder
 from colibri.companion.stacks.thrust_curve import Thrust
 from colibri.companion.supervision.ages import missing, too_old
 from colibri.companion.supervision.limits import FlightLimits, FlightRegion
@@ -78,6 +78,10 @@ def _in_time(now: CheckFacts) -> bool:
     return abs(now.clock_rate - 1.0) <= MAX_DRIFT
 
 
+def _climbs_above_sea(now: CheckFacts) -> bool:
+    return now.may_arm and now.stack.take_off is TakeOffOrder.COMMAND_THEN_ARM
+
+
 def _inside_fence(now: CheckFacts) -> bool:
     """Whether the box lies inside the vehicle's fence, measured from home: here the origin."""
     values = now.parameters or {}
@@ -98,8 +102,11 @@ CHECKS: tuple[Check, ...] = (
     Check("clock", lambda now: now.clock_known and _in_time(now), _clock_advice),
     Check(
         "ages",
-        lambda now: not too_old(now.ages, in_flight=False),
-        lambda now: "; ".join(too_old(now.ages, in_flight=False)),
+        lambda now: not too_old(now.ages, in_flight=False) and not missing(now.ages, needed=True),
+        lambda now: "; ".join(
+            too_old(now.ages, in_flight=False)
+            + [f"the vehicle does not report {report}" for report in missing(now.ages, needed=True)]
+        ),
     ),
     Check(
         "reports",
@@ -155,6 +162,11 @@ CHECKS: tuple[Check, ...] = (
         "pre-arm",
         lambda now: now.report.armed or not now.may_arm or now.report.prearm_ok is not False,
         lambda _: "the vehicle says that it cannot be armed: see its messages",
+    ),
+    Check(
+        "altitude",
+        lambda now: isfinite(now.report.altitude_amsl_m) or not _climbs_above_sea(now),
+        lambda _: "the take-off needs the height above the sea (GLOBAL_POSITION_INT): wait for GPS",
     ),
     Check(
         "battery",

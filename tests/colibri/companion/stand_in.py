@@ -63,7 +63,7 @@ class StandIn:
     numbers: Numbers = field(default_factory=Numbers)
     armed: bool = False
     charge: int = 80
-    answers_timesync: bool = True
+    silent: set[str] = field(default_factory=set)
     frozen_rate: tuple[float, float, float] | None = None
     streams: dict[str, int] = field(default_factory=dict)
 
@@ -105,7 +105,8 @@ class StandIn:
         for name, interval_us in self.streams.items():
             if self.time_us >= self._due.get(name, 0):
                 self._due[name] = self.time_us + interval_us
-                self._send(name)
+                if name not in self.silent:
+                    self._send(name)
 
     @property
     def own_us(self) -> int:
@@ -122,7 +123,7 @@ class StandIn:
     def _receive(self, message: Message) -> None:
         fields = message.fields
         match message.name:
-            case "TIMESYNC" if fields.tc1 == 0 and self.answers_timesync:
+            case "TIMESYNC" if fields.tc1 == 0 and "TIMESYNC" not in self.silent:
                 self._outbox.append(self._codec.encode("TIMESYNC", self.own_us * 1000, fields.ts1))
             case "COMMAND_LONG":
                 result = self._command(fields.command, [getattr(fields, f"param{i}") for i in range(1, 8)])
