@@ -58,11 +58,11 @@ class CompanionFlight(NamedTuple):
     note: str
     mission: MissionPlan | None = None
 
-    def from_home(self, home: LocalOrigin) -> "CompanionFlight":
+    def from_home(self, home: LocalOrigin, waited_s: float) -> "CompanionFlight":
         if self.mission is None:
             return self
         loaded = track_through(self.mission.waypoints(home), self.vehicle, self.profile, home.up_m)
-        settings = replace(self.settings, home=home)
+        settings = replace(self.settings, home=home, gives_up_s=self.settings.gives_up_s - waited_s)
         return self._replace(settings=settings, track=loaded.track, note=loaded.note or self.mission.note)
 
 
@@ -76,6 +76,8 @@ def plan_of(args: Namespace) -> CompanionFlight:
     else:
         track, note = load_track(name, vehicle, profile)
     response, thrust_scale = read_response(Path(args.response)) if args.response else (None, 1.0)
+    if args.height and not args.arm:
+        raise CompanionError("--height is that of the take-off: add --arm, or leave it out")
     if args.arm and args.dry_run:
         raise CompanionError("--dry-run arms nothing: leave --arm out")
     settings = CompanionSettings(
@@ -126,7 +128,9 @@ def fly(args: Namespace) -> int:
         if plan.mission is not None:
             peer = VehiclePeer(system=args.system)
             peer.client.sign_with(signing)
-            plan = plan.from_home(_seek_home(wire, peer, args.wait, stop))
+            began_s = perf_counter()
+            home = _seek_home(wire, peer, args.wait, stop)
+            plan = plan.from_home(home, perf_counter() - began_s)
         companion = Companion(plan.settings, plan.profile, plan.vehicle, plan.track, perf_counter)
     except Error as error:
         wire.link.close()

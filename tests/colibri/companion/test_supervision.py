@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import inf, nan
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -77,6 +78,13 @@ FAILS: list[tuple[str, CheckFacts]] = [
     ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_VER_DIST": 4.0})),
     ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_HOR_DIST": 4.0})),
 ]
+
+
+def test_the_page_lists_the_age_of_each_report() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "companion.md").read_text(encoding="utf-8")
+    for row in AGES:
+        flight = f"{row.flight_s:g} s" if row.flight_s < inf else "-"
+        assert f"| {row.name} | {row.messages} | {row.start_s:g} s | {flight} |" in page
 
 
 def test_a_vehicle_that_is_ready_passes_every_check() -> None:
