@@ -20,7 +20,7 @@ from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
 from colibri.companion.steering.smooth_start import smoothly_started
-from colibri.companion.supervision.ages import ages_s
+from colibri.companion.supervision.ages import ages_s, too_old
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
 from colibri.companion.supervision.consistency import Consistency
@@ -200,7 +200,8 @@ class Companion:
             if self._settings.stay is not None and self._newest is not None:
                 place = self._settings.stay.place(self._newest.state.position_enu_m)
                 self._box = FlightRegion.at(place, self._settings.limits.margin_m)
-            self.failing = failing(self._check_facts(now_us))
+            start = self._check_facts(now_us)
+            self.failing, self.peer.reports_are_old = failing(start), bool(too_old(start.ages, in_flight=False))
             if self._settings.dry_run:
                 self._rehearse(now_us)
         elif (

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 from colibri.companion.stacks.recognition import recognised
 from colibri.companion.stacks.stack import Stack
-from colibri.companion.supervision.ages import ages_s, too_old
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.clock import VehicleClock
 from colibri.mavlink.client.commands import Command, set_message_interval
@@ -45,6 +44,7 @@ class VehiclePeer:
         self.clock = VehicleClock()
         self.stack = stack
         self.system = 0
+        self.reports_are_old = False  # as judged by the owner
         self._orders: dict[str, Command] = {}
         self._streams: list[Command] = []
         self._parameters: list[ReadParameter] | None = None
@@ -177,8 +177,7 @@ class VehiclePeer:
         self._renew_at_us = now_us + _RENEW_EVERY_US
         streams = self.stack.streams
         wanted_hz = max(streams[name] for name in HANDLES & streams.keys())
-        ages = ages_s(self.report, None, now_us)
-        if self.state_rate_hz(now_us) < _ENOUGH_OF_A_STREAM * wanted_hz or too_old(ages, in_flight=False):
+        if self.reports_are_old or self.state_rate_hz(now_us) < _ENOUGH_OF_A_STREAM * wanted_hz:
             self._streams = [
                 self.client.begin(set_message_interval(self.target, name, 1e6 / rate_hz, repeat=_COMMANDS))
                 for name, rate_hz in streams.items()
