@@ -55,7 +55,9 @@ def encode_heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custo
     return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)
 
 
-def is_another(sender: Address, peer: Address | None, silence_s: float, is_there: Callable[[Address], bool]) -> bool:
+def is_another(
+    sender: Address | None, peer: Address | None, silence_s: float, is_there: Callable[[Address], bool]
+) -> bool:
     """Whether to refuse a sender, as the peer that shook hands before it is still there."""
     if peer is None or sender == peer or silence_s >= PEER_GIVEN_UP_AFTER_S:
         return False

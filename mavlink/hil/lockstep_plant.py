@@ -92,6 +92,10 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[PlantDatagram] = []
 
+    def accepts_another(self, now_s: float) -> bool:
+        """Whether the peer is lost, so that another autopilot may take over."""
+        return not is_another(None, self.peer, now_s - self._peer_received_s, self._is_there)
+
     def sends_battery(self, time_us: int) -> bool:
         return time_us % BATTERY_EVERY_US == 0
 

@@ -1,15 +1,22 @@
 """A UDP endpoint with bounded blocking."""
 
+import ctypes
 import socket
+import sys
+from contextlib import suppress
 from errno import EADDRINUSE
 from ipaddress import ip_address
 from select import select
+from struct import Struct
 from time import perf_counter
 
 from colibri.common.types import Address
 from colibri.mavlink.links.link import SPIN_S, Endpoint, LinkError, give_way
 
 _MAX_DATAGRAM_BYTES = 4096
+_ATTACH_FILTER, _DETACH_FILTER = 26, 27
+"""Options of Linux's sockets."""
+_INSTRUCTION, _PROGRAM = Struct("=HBBI"), Struct("@HP")
 _DATAGRAMS_AT_ONCE = 64
 """Limit per call, so that a continuous sender cannot stall the process."""
 
@@ -22,6 +29,7 @@ class UdpLink(Endpoint):
         sock.setblocking(False)
         self._socket = sock
         self._connected = False
+        self.kept: Address | None = None
         self.spin_s = SPIN_S
         self._waited_s = 0.0
         if target is not None:
@@ -31,6 +39,25 @@ class UdpLink(Endpoint):
         self.target = target
         self._connected = _connect(self._socket, target)
         self._opened = [target]
+
+    def keep_to(self, peer: Address) -> None:
+        """Have Linux drop what other ports send before it is queued, so that no flood delays the peer's answers."""
+        self.kept = peer
+        if sys.platform == "linux":
+            load_port, is_peers = (0x28, 0, 0, 0), (0x15, 0, 1, peer[1])
+            accept, drop = (0x06, 0, 0, 0xFFFFFFFF), (0x06, 0, 0, 0)
+            code = b"".join(_INSTRUCTION.pack(*each) for each in (load_port, is_peers, accept, drop))
+            memory = ctypes.create_string_buffer(code, len(code))
+            program = _PROGRAM.pack(4, ctypes.addressof(memory))
+            with suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, program)
+
+    def release(self) -> None:
+        """Receive from everybody again."""
+        self.kept = None
+        if sys.platform == "linux":
+            with suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, _DETACH_FILTER, 0)
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send or lose the datagram; raise `LinkError` if the target is unreachable."""

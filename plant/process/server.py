@@ -140,12 +140,17 @@ class Server:
             self._status.say("said", f"{error}; flying on")
 
     def _receive(self, timeout_s: float) -> ActuatorCommand | None:
-        received = self._link.receive(timeout_s)
+        end, link = self._end, self._link
+        received = link.receive(timeout_s)
         if received is None:
+            if link.kept is not None and end.accepts_another(perf_counter()):
+                link.release()
             return None
-        command = self._end.receive(*received, perf_counter())
-        if self._end.notes:
-            self._status.say("said", self._end.notes.pop())
+        command = end.receive(*received, perf_counter())
+        if link.kept is None and received[1] == end.peer:
+            link.keep_to(received[1])
+        if end.notes:
+            self._status.say("said", end.notes.pop())
         self._send_and_log()
         return command
 

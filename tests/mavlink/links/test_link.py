@@ -1,5 +1,6 @@
 """UDP endpoints by URL."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 
@@ -125,3 +126,20 @@ def test_an_address_is_bound_while_its_socket_is_open(server: UdpLink) -> None:
         assert is_bound(received[1])
     assert not is_bound(received[1])
     assert not is_bound(("192.0.2.1", 14550))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="filters of sockets are Linux's")
+def test_a_link_kept_to_a_peer_drops_what_others_send(server: UdpLink) -> None:
+    with closing(client_of(server)) as peer, closing(client_of(server)) as stranger:
+        peer.send(b"peer")
+        received = server.receive(1.0)
+        assert received is not None
+        for _ in range(2):
+            server.keep_to(received[1])
+            stranger.send(b"flood")
+            peer.send(b"again")
+            assert server.receive(1.0) == (b"again", received[1])
+            assert server.receive(0.0) is None
+            server.release()
+            stranger.send(b"call")
+            assert server.receive_now()[0][0] == b"call"
