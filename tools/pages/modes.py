@@ -40,7 +40,7 @@ def tables() -> list[str]:
         )
         for row in MODES
     ]
-    headings = ("mode", "custom mode", "standard mode", "what it does", "needs", "arms")
+    headings = ("mode", "custom mode", "standard mode", "effect", "needs", "arms")
     transitions = [(", ".join(row.sources) or "any mode", *_outcome(row)) for row in TRANSITIONS]
     return [markdown(headings, modes, names=6), markdown(("in", "when", "then", "rotors"), transitions, names=4)]
 
@@ -61,7 +61,7 @@ def draw(path: Path) -> None:
     axes.add_patch(
         FancyBboxPatch((-0.9, -0.6), 10.1, 4.1, boxstyle="round,pad=0.15", facecolor="#f4f7fa", edgecolor="#8899aa")
     )
-    axes.text(-0.9, -0.95, "armed: any mode can be selected whose needs are met", fontsize=10, color="#445566")
+    axes.text(-0.9, -0.95, "armed: select any mode whose needs are met", fontsize=10, color="#445566")
     style = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "#223344"}
     for mode, place in PLACES.items():
         needs = ROWS[mode].needs
@@ -69,7 +69,7 @@ def draw(path: Path) -> None:
     axes.text(*_DISARMED, "disarmed", ha="center", va="center", fontsize=11, bbox=style, zorder=3)
     dashed = {**style, "linestyle": "--", "facecolor": "#f4f7fa"}
     axes.text(*_ANY, "any mode", ha="center", va="center", fontsize=11, bbox=dashed, zorder=3)
-    axes.text(9.2, -0.95, "* needs something, see the table", fontsize=10, color="#445566", ha="right")
+    axes.text(9.2, -0.95, "* has needs, see the table", fontsize=10, color="#445566", ha="right")
     arrow = {"arrowstyle": "-|>", "color": "#225588", "shrinkA": 22, "shrinkB": 24, "linewidth": 1.2}
     for row in TRANSITIONS:
         for source, target in _edges(row):

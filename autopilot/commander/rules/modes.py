@@ -29,13 +29,13 @@ class Need(Enum):
     """A need; its value is the reason of a refusal."""
 
     ATTITUDE_CONTROL = "the control law takes no attitude setpoints"
-    STICKS = "no MANUAL_CONTROL is heard"
-    SETPOINTS = "no offboard setpoints are heard: send them before the mode"
+    STICKS = "no MANUAL_CONTROL received"
+    SETPOINTS = "no offboard setpoints received: send them before the mode"
     MISSION = "there is no mission"
     INSIDE_FENCE = "the mission leads outside the geofence"
     ABOVE_GROUND = "the mission leads below the ground"
     CHECKED = "the mission is being compared with the geofence: try again"
-    CIRCLE = "command DO_ORBIT says where"
+    CIRCLE = "send DO_ORBIT first"
     POSITION = "the position is not known"
     FLYING = "the vehicle is not flying"
 
@@ -48,7 +48,7 @@ class Event(StrEnum):
     DISARM = "disarmed"
     ARRIVED = "height reached"
     FINISHED = "finished"
-    RETURN_ITEM = "mission says return"
+    RETURN_ITEM = "return item reached"
     SAVED_BY_HOLD = "failsafe: hold"
     SAVED_BY_RETURN = "failsafe: return"
     SAVED_BY_LANDING = "failsafe: land"
@@ -79,7 +79,7 @@ MODES: tuple[ModeRow, ...] = (
         2,
         0,
         (Need.ATTITUDE_CONTROL, Need.STICKS),
-        "sticks to tilt, yaw rate and climb; height is held",
+        "sticks to tilt, yaw rate and climb rate; holds height",
         mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
     ),
     ModeRow(
@@ -87,17 +87,17 @@ MODES: tuple[ModeRow, ...] = (
         3,
         0,
         (Need.STICKS, Need.POSITION),
-        "sticks to velocity; place and height are held",
+        "sticks to velocity; holds position",
         mav.MAV_STANDARD_MODE_POSITION_HOLD,
     ),
-    ModeRow(Mode.HOLD, AUTO, 3, (Need.POSITION,), "stops and stays; flies where a reposition command says"),
+    ModeRow(Mode.HOLD, AUTO, 3, (Need.POSITION,), "stops and holds position; flies to reposition commands"),
     ModeRow(Mode.TAKEOFF, AUTO, 2, (Need.POSITION,), "climbs to the take-off height", mav.MAV_STANDARD_MODE_TAKEOFF),
     ModeRow(
         Mode.LAND,
         AUTO,
         6,
         (),
-        "sinks here, then disarms; level, where the position is not known",
+        "descends here, then disarms; level without position",
         mav.MAV_STANDARD_MODE_LAND,
         to_arm=False,
     ),
@@ -130,7 +130,7 @@ MODES: tuple[ModeRow, ...] = (
         selectable=False,
     ),
     ModeRow(Mode.FOLLOW, AUTO, 8, (Need.FLYING, Need.POSITION), "follows the target of FOLLOW_TARGET", to_arm=False),
-    ModeRow(Mode.TRACK, AUTO, 11, (Need.POSITION,), "flies the track that parameter TRACK picks"),
+    ModeRow(Mode.TRACK, AUTO, 11, (Need.POSITION,), "flies the track of parameter TRACK"),
 )
 ROWS = {row.mode: row for row in MODES}
 
@@ -178,7 +178,7 @@ def next_state(state: State, event: Event, selected: Mode | None, missing: Colle
         if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
             break
     else:
-        return Refusal(f"nothing follows from '{event}' in {state.mode}")
+        return Refusal(f"'{event}' has no effect in {state.mode}")
     mode = row.target or selected or state.mode
     if event is Event.SELECT and (state.armed or not ROWS[mode].selectable):
         need = first_missing(mode, missing)

@@ -49,7 +49,7 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     cockpit.pilot.select(Mode.MISSION, ())
     cockpit.fly_for(8.0)
     assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
-    assert cockpit.said("mission says return: return")
+    assert cockpit.said("return item reached: return")
     assert cockpit.missions.take_reached() == [0, 1]
     assert cockpit.missions.progress().state == COMPLETE
     cockpit.fly_for(60.0)

@@ -54,7 +54,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened(sitl_fleet: Callable[..., 
     assert len(restarts) > 15
     assert reached(sitl) == reached(wanted) == [0, 1, 2, 3, 4, 3, 4, 5, 6, 7, 8, 9, 10, 11]
     assert hypot(*wanted.position[:2]) < 0.15
-    assert wanted.said("mission says return: return")
+    assert wanted.said("return item reached: return")
     frames = min(len(sitl.path), len(wanted.path))
     off_m = np.linalg.norm(sitl.path[:frames] - wanted.path[:frames], axis=1)
     assert off_m.max() < 0.6  # the circle is joined where it is nearest, which the restart finds again

@@ -114,7 +114,7 @@ def test_attitude_without_thrust_lifts_nothing(sitl: Sitl) -> None:
 @pytest.mark.parametrize("mode", [Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED])
 def test_a_mode_needs_its_stream_and_begins_with_it(sitl: Sitl, mode: Mode) -> None:
     """Clients do not wait between the first message and the mode: both may come between two control samples."""
-    reason = "send them before the mode" if mode is Mode.OFFBOARD else "no MANUAL_CONTROL is heard"
+    reason = "send them before the mode" if mode is Mode.OFFBOARD else "no MANUAL_CONTROL received"
     refused(sitl, reason, sitl.select, mode)
     if mode is Mode.OFFBOARD:
         sitl.setpoint(position=HERE)
