@@ -20,7 +20,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.hil.state import STATE_BYTES, StateFrame
 from colibri.mavlink.parameters.store import Parameters, Value
-from colibri.mavlink.services.statustext import INFO, WARNING
+from colibri.mavlink.services.statustext import ERROR, INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.beginning import beginning
@@ -36,6 +36,8 @@ from colibri.mavlink.ulog.status import VehicleStatus, status_message
 
 MAX_RECEIVED_BYTES = 64 << 20
 """Limit of what stations send in the log of a flight: a flood must not fill the disk."""
+MAX_SAID_BYTES = 16 << 20
+"""Limit of status texts: stations cause them, too. Errors are recorded beyond it."""
 _FULL = f"stations have sent more than {MAX_RECEIVED_BYTES >> 20} MiB: no more is recorded, a replay ends here"
 _FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
 _STILL = (nan,) * 4
@@ -48,7 +50,7 @@ class AutopilotLog:
     def __init__(self, topics: TopicLog, setup: Setup) -> None:
         self.topics, self._setup = topics, setup
         self._begins = True
-        self._time_us = self._received_bytes = 0
+        self._time_us = self._received_bytes = self._said_bytes = 0
         sensors = setup.vehicle_tables and setup.vehicle_tables.sensors
         self._kinds = kinds_of(sensors) if sensors else []
         self._recorder: Recorder | None = None
@@ -104,7 +106,12 @@ class AutopilotLog:
             self._recorder.update(snapshot)
 
     def say(self, time_us: int, severity: int, text: str) -> None:
-        self.topics.append(messages.logged_string(time_us, severity, text))
+        line = messages.logged_string(time_us, severity, text)
+        said_bytes, self._said_bytes = self._said_bytes, self._said_bytes + len(line)
+        if said_bytes < MAX_SAID_BYTES or severity <= ERROR:
+            self.topics.append(line)
+            if said_bytes < MAX_SAID_BYTES <= self._said_bytes:
+                self.topics.append(messages.logged_string(time_us, WARNING, "too many texts: only errors from here"))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
@@ -142,7 +149,7 @@ class AutopilotLog:
     def _begin_anew(self) -> None:
         """Start a new flight, because the plant's time has restarted."""
         self.topics.close()
-        self._received_bytes = 0
+        self._received_bytes = self._said_bytes = 0
         self._status_us, self._thinning = -1, Thinning()
         self._fallback = None
         self._begins = True

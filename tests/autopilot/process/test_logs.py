@@ -9,6 +9,7 @@ from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.log_files import LogError
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.services.statustext import ERROR, WARNING
 from colibri.mavlink.ulog.log import TopicLog
 
 SETUP = Setup(
@@ -51,3 +52,15 @@ def test_a_flood_of_stations_is_recorded_up_to_a_limit(monkeypatch: pytest.Monke
     assert (handled, len(said)) == (1000, 1)
     assert topics.size < 51_000
     assert b"no more is recorded" in topics.last
+
+
+def test_a_flood_of_texts_leaves_errors_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(logs, "MAX_SAID_BYTES", 5_000)
+    topics = Sizes()
+    log = AutopilotLog(topics, SETUP)
+    for _ in range(1000):
+        log.say(0, WARNING, "denied: not armed")
+    assert topics.size < 5_200
+    assert b"only errors" in topics.last
+    log.say(0, ERROR, "the battery is empty")
+    assert b"the battery is empty" in topics.last
