@@ -100,7 +100,7 @@ ROWS = (
         0.1,
         60.0,
         "Offboard loss timeout",
-        "A companion may be silent so long.",
+        "A companion may be silent so long; its last body rates are followed for 0.3 s.",
     ),
     BehaviourRow(
         "COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."
