@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 
 from colibri.autopilot.commander.rules.failsafe_parameters import failsafe_parameters
+from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.behaviour import behaviour, behaviour_parameters
@@ -49,7 +50,7 @@ class Numbers:
         profile, vehicle = self._profile, self._vehicle
         table = changed(self._table, self._law, values, self.defaults)
         if table is not self._table:
-            controllers = {**profile.controllers, profile.controller: table}
+            controllers = {**profile.controllers, table_of(profile.controller): table}
             profile = msgspec.structs.replace(profile, controllers=controllers)
         tree = changed(self._tree, self._model, values, self.defaults)
         return profile, vehicle if tree is self._tree else _vehicle(tree)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colibri.autopilot.control.law_files import table_of
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
@@ -193,7 +194,7 @@ TABLES = st.recursive(
 @settings(max_examples=50)
 @given(st.text(max_size=12), st.dictionaries(st.text("ab_s1é", max_size=30), TABLES, max_size=8))
 def test_any_table_has_parameters(name: str, table: dict[str, Any]) -> None:
-    profile = msgspec.structs.replace(FLIGHT, controller=name + "?", controllers={name + "?": table})
+    profile = msgspec.structs.replace(FLIGHT, controller=name + "?", controllers={table_of(name + "?"): table})
     tuned = Numbers(profile, HUMMINGBIRD)
     parameters = Parameters(tuned.definitions)
     numbers = law_numbers(name + "?", table)
