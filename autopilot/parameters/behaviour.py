@@ -49,49 +49,45 @@ class BehaviourRow(NamedTuple):
 
 
 ROWS = (
+    BehaviourRow("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Take-off height", "Above the ground."),
+    BehaviourRow("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "In automatic modes."),
     BehaviourRow(
-        "MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Height of a takeoff", "Above where it stands."
+        "MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Maximum horizontal speed", "Limit of all commands."
     ),
-    BehaviourRow("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "Of what flies by itself."),
-    BehaviourRow(
-        "MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Largest horizontal speed", "No command may ask for more."
-    ),
-    BehaviourRow("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Speed of climbs"),
-    BehaviourRow("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Speed of descents"),
+    BehaviourRow("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Climb speed"),
+    BehaviourRow("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Descent speed"),
     BehaviourRow("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
-    BehaviourRow("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down alike."),
-    BehaviourRow("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Less is smoother."),
-    BehaviourRow("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Rate of turns", "", _DEG, 1),
+    BehaviourRow("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down."),
+    BehaviourRow("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Lower is smoother."),
+    BehaviourRow("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Yaw rate", "", _DEG, 1),
     BehaviourRow(
-        "MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Acceleration of turns", "", _DEG, 1
+        "MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Yaw acceleration", "", _DEG, 1
     ),
-    BehaviourRow("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Speed of a takeoff"),
-    BehaviourRow("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Speed of a landing", "Close to the ground."),
-    BehaviourRow("MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
-    BehaviourRow("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Turn rate of full sticks", "", _DEG, 1),
+    BehaviourRow("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Take-off speed"),
+    BehaviourRow("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Landing speed", "Near the ground."),
     BehaviourRow(
-        "MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed of full sticks", "Position mode."
+        "MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt at full stick", "Mode stabilized.", 1.0, 1
     ),
+    BehaviourRow("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Yaw rate at full stick", "", _DEG, 1),
     BehaviourRow(
-        "RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Height of a return", "Above home, on the way there."
+        "MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed at full stick", "Mode position."
     ),
+    BehaviourRow("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Return height", "Above home."),
     BehaviourRow(
         "RTL_MIN_DIST",
         "return_radius_m",
         "m",
         0.0,
         1000.0,
-        "Radius without a climb",
-        "Closer to home it does not climb.",
+        "Return radius without climb",
+        "Closer to home, the return skips its climb.",
     ),
     BehaviourRow(
-        "NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Closer to a place than this: arrived."
+        "NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Distance that counts as arrival."
     ),
+    BehaviourRow("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm delay after landing", "0: off."),
     BehaviourRow(
-        "COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing", "0: never."
-    ),
-    BehaviourRow(
-        "COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm if not flying so long", "0: never."
+        "COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm delay without take-off", "0: off."
     ),
     BehaviourRow(
         "COM_OF_LOSS_T",
@@ -100,56 +96,56 @@ ROWS = (
         0.1,
         60.0,
         "Offboard loss timeout",
-        "A companion may be silent so long; its last body rates are followed for 0.3 s.",
+        "Longest silence of a companion; its last body rates are followed for 0.3 s.",
     ),
     BehaviourRow(
-        "COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."
+        "COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Stick loss timeout", "Longest silence of the sticks."
     ),
     BehaviourRow(
-        "GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."
+        "GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: off."
     ),
-    BehaviourRow("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
+    BehaviourRow("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: off."),
     BehaviourRow(
-        "ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."
+        "ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Orbit radius", "Default, if the command has NaN."
     ),
     BehaviourRow("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
     BehaviourRow("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
     BehaviourRow(
-        *("FLW_TGT_FA", "follow_angle_deg", "deg", -180.0, 180.0, "Follow: side of the target"),
-        *("Clockwise from ahead of it: 180 is behind.", 1.0, 1),
+        *("FLW_TGT_FA", "follow_angle_deg", "deg", -180.0, 180.0, "Follow: bearing from the target"),
+        *("Clockwise; 0 is ahead, 180 behind.", 1.0, 1),
     ),
     BehaviourRow(
-        *("FLW_TGT_ALT_M", "follow_altitude_mode", "", 0, 2, "Follow: what the height is above"),
+        *("FLW_TGT_ALT_M", "follow_altitude_mode", "", 0, 2, "Follow: height reference"),
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
     BehaviourRow(
-        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Failure of a rotor"),
-        *("Whether it is noticed. Set to 0 it also forgets one that has failed.",),
+        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Rotor failure"),
+        *("Detection; 0 also clears a detected failure.",),
         values=((0, "Ignore"), (1, "Land on three rotors")),
     ),
     BehaviourRow(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
-        *("Whether MAV_CMD_INJECT_FAILURE is obeyed.",),
+        *("Accept MAV_CMD_INJECT_FAILURE.",),
         values=_YES_OR_NO,
     ),
     BehaviourRow(
         *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
-        "Simulated: what the control law decides takes effect so much later; samples due meanwhile are skipped.",
+        "Simulated delay of commands; samples in between are skipped.",
         *(1e-3, 1),
     ),
     BehaviourRow(
-        *("SYS_CMD_DELAY", "delay_s", "ms", -1.0, 200.0, "Delay of commands"),
-        "Compensated: from a frame until its command takes effect. -1: the profile's, or measured.",
+        *("SYS_CMD_DELAY", "delay_s", "ms", -1.0, 200.0, "Compensated delay"),
+        "From a frame to the effect of its command. -1: profile or measured.",
         *(1e-3, 1),
     ),
     BehaviourRow(
-        *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
+        *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Track of mode track."),
         values=tuple(enumerate(TRACKS)),
     ),
 )
 """One row for each number of `Behaviour` and `Limits`."""
 
-_ANSWERS = "Only answers ground stations that request it: changes nothing."
+_ANSWERS = "Compatibility only, without effect."
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
@@ -178,16 +174,16 @@ def behaviour(parameters: Parameters) -> Behaviour:
 def _answers(system_id: int) -> list[Parameter]:
     return [
         _answer("SYS_AUTOSTART", 4001, "Airframe", read_only=True),
-        _answer("SYS_AUTOCONFIG", 0, "Reset of the airframe"),
-        _answer("CAL_GYRO0_ID", 1, "Gyroscope that is calibrated", read_only=True),
-        _answer("CAL_ACC0_ID", 1, "Accelerometer that is calibrated", read_only=True),
-        _answer("CAL_MAG0_ID", 1, "Magnetometer that is calibrated", read_only=True),
-        _answer("COM_RC_IN_MODE", 1, "Source of the sticks", values=((1, "Joystick"),)),
+        _answer("SYS_AUTOCONFIG", 0, "Airframe reset"),
+        _answer("CAL_GYRO0_ID", 1, "Calibrated gyroscope", read_only=True),
+        _answer("CAL_ACC0_ID", 1, "Calibrated accelerometer", read_only=True),
+        _answer("CAL_MAG0_ID", 1, "Calibrated magnetometer", read_only=True),
+        _answer("COM_RC_IN_MODE", 1, "Stick source", values=((1, "Joystick"),)),
         # MAVSDK sets these two before it follows; the chain of the reference has limits of its own.
         _answer("FLW_TGT_RS", 0.1, "Follow: filter", minimum=0.0, maximum=1.0, unit="norm"),
         _answer("FLW_TGT_MAX_VEL", 5.0, "Follow: speed", minimum=0.0, maximum=20.0, unit="m/s"),
         _answer(
-            *("MAV_SYS_ID", system_id, "System id", "The instance chooses it."), minimum=1, maximum=255, read_only=True
+            *("MAV_SYS_ID", system_id, "System id", "Set by the instance."), minimum=1, maximum=255, read_only=True
         ),
     ]
 

@@ -35,12 +35,10 @@ class Numbers:
         self._model = vehicle_numbers(self._tree)
         name, keys = profile.controller, f"controllers.{profile.controller}"
         self.definitions = [
-            number.parameter(self._table, f"Control law {name}", f"{keys}.{described(number.path)} of the profile.")
+            number.parameter(self._table, f"Control law {name}", f"Profile key {keys}.{described(number.path)}.")
             for number in self._law
         ] + [
-            number.parameter(
-                self._tree, "Vehicle model", f"{described(number.path)} of the vehicle, as the autopilot assumes it."
-            )
+            number.parameter(self._tree, "Vehicle model", f"Vehicle key {described(number.path)}, autopilot only.")
             for number in self._model
         ]
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}

@@ -1,5 +1,6 @@
 """`parameters.md`: the parameters of profile `flight`."""
 
+import re
 from collections.abc import Iterator
 from itertools import groupby
 
@@ -11,6 +12,12 @@ from colibri.mavlink.parameters.store import FLOAT32_MAX, Parameter, ParamType
 from colibri.plant.vehicle.description import load_vehicle
 from tools.pages.tables import with_body
 
+_INTRODUCTIONS = {
+    **{f"Control law {law}": f"With their keys in table `controllers.{law}` of the profile." for law in DESCRIBED},
+    "Vehicle model": "The vehicle as the autopilot assumes it, with the keys of the vehicle file.",
+}
+_KEY = re.compile(r"(?:Profile key controllers\.[\w-]+\.|Vehicle key )(\S*\w\]?).*")
+
 
 def _sections() -> Iterator[str]:
     profile = load_profile("flight")
@@ -19,12 +26,14 @@ def _sections() -> Iterator[str]:
     ordered = sorted(found, key=lambda parameter: (parameter.group, parameter.name))
     for group, parameters in groupby(ordered, key=lambda parameter: parameter.group):
         yield f"## {group}\n"
-        yield markdown(("name", "default", "from", "to", "unit", "what it is"), list(map(_row, parameters)), names=6)
+        if group in _INTRODUCTIONS:
+            yield f"{_INTRODUCTIONS[group]}\n"
+        yield markdown(("name", "default", "from", "to", "unit", "meaning"), list(map(_row, parameters)), names=6)
 
 
 def _row(p: Parameter) -> tuple[str, ...]:
     choices = "; ".join(f"{number} {meaning}" for number, meaning in p.values)
-    notes = " ".join(filter(None, [p.description + ".", p.details, choices and f"({choices})"]))
+    notes = " ".join(filter(None, [p.description + ".", _KEY.sub(r"`\1`", p.details), choices and f"({choices})"]))
     notes += " Read only." if p.read_only else " After a restart." if p.reboot_required else ""
     return (f"`{p.name}`", *(_number(p, value) for value in (p.default, p.minimum, p.maximum)), p.unit, notes)
 
