@@ -1,30 +1,33 @@
 """MAVLink commands to arm, change mode or speed, and set home."""
 
 from collections.abc import Mapping
-from math import isfinite, isnan
+from math import isnan
 
 from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.motion_commands import MotionCommands, Needs, denied
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
-from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
+from colibri.autopilot.commander.rules.modes import Mode, Need, mode_of, mode_of_custom
+from colibri.common.earth.geodesy import Geodetic
+from colibri.common.types import Vector
 from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import read_place
 from colibri.mavlink.wire.refusal import Refusal
 
 FORCE_MAGIC = 21196
 _OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
 """SPEED_TYPE: equivalent without an airspeed sensor."""
 _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
-_CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+CUSTOM: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 class Commands:
     """Handlers of the commands of ground stations."""
 
-    def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
-        self._pilot = pilot
-        self._needs = needs
+    def __init__(self, pilot: Pilot, fence: Fence, missions: Missions, needs: Needs) -> None:
+        self._pilot, self._missions = pilot, missions
+        self._fence, self._needs = fence, needs
         self._home = pilot.home
         self.motion = MotionCommands(pilot, fence, needs)
 
@@ -33,10 +36,10 @@ class Commands:
             **self.motion.handlers(),
             mav.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mav.MAV_CMD_DO_SET_MODE: self._set_mode,
-            mav.MAV_CMD_NAV_LAND: lambda _: self.select(Mode.LAND),
+            mav.MAV_CMD_NAV_LAND: lambda command: self._select_here(Mode.LAND, command),
             mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self.select(Mode.RETURN),
-            mav.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self.select(Mode.HOLD),
-            mav.MAV_CMD_MISSION_START: lambda _: self.select(Mode.MISSION),
+            mav.MAV_CMD_NAV_LOITER_UNLIM: lambda command: self._select_here(Mode.HOLD, command),
+            mav.MAV_CMD_MISSION_START: self._start_mission,
             mav.MAV_CMD_DO_PAUSE_CONTINUE: self._pause_or_go_on,
             mav.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
             mav.MAV_CMD_DO_SET_HOME: self._set_home,
@@ -44,77 +47,116 @@ class Commands:
             mav.MAV_CMD_RUN_PREARM_CHECKS: self._check,
         }
 
-    def select(self, mode: Mode | None) -> Refusal | None:
-        if mode is None:
-            return Refusal("this vehicle has no such mode", UNSUPPORTED)
+    def select(self, mode: Mode) -> Refusal | None:
         return self._pilot.select(mode, self._needs.missing())
+
+    def _select_known(self, mode: Mode | None, numbers: str) -> Refusal | None:
+        unknown = Refusal(f"mode refused: {numbers} is no mode of this vehicle", UNSUPPORTED)
+        return unknown if mode is None else self.select(mode)
+
+    def _select_here(self, mode: Mode, command: ReceivedCommand) -> Refusal | None:
+        refusal = self.select(mode)
+        if refusal is None:
+            self.motion.warn_elsewhere(command, mode)
+        return refusal
 
     def _arm_disarm(self, command: ReceivedCommand) -> Refusal | None:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
+            self._judge_fence()
             return self._pilot.arm(self._needs.missing(), force=force)
         if command.p1 == 0.0:
             return self._pilot.disarm(force=force)
-        return Refusal("arm with 1, disarm with 0")
+        return denied("arming", f"{command.p1:g} is not 1, to arm, or 0, to disarm")
 
     def _set_mode(self, command: ReceivedCommand) -> Refusal | None:
         self._needs.engage(command.peer, command.now_us)
         numbers = (command.p1, command.p2, 0.0 if isnan(command.p3) else command.p3)
         if not all(0.0 <= number < 256.0 and number == int(number) for number in numbers):
-            return Refusal("mode refused: not a PX4 main and sub mode")
+            return denied("mode", "{:g} {:g} {:g} is not a PX4 base, main and sub mode".format(*numbers))
         base, main, sub = map(int, numbers)
-        if not base & _CUSTOM:
-            return Refusal("mode refused: only custom modes are known", UNSUPPORTED)
-        return self.select(mode_of(main, sub))
+        if not base & CUSTOM:
+            return Refusal(f"mode refused: base mode {base} has no custom mode", UNSUPPORTED)
+        return self._select_known(mode_of(main, sub), f"{main} {sub}")
 
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
-        return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
+        mode = mode_of_custom(custom_mode) if base_mode & CUSTOM else None
+        return self._select_known(mode, f"{base_mode} {custom_mode}")
+
+    def _start_mission(self, command: ReceivedCommand) -> Refusal | None:
+        """Fly the mission from item p1 on, as in PX4; nan or -1: from the current one. It is flown to its end."""
+        first, last, total = command.p1, command.p2, self._missions.total
+        if not total:
+            return denied("mission", Need.MISSION.value)
+        if not isnan(first) and first not in range(-1, total):
+            return denied("mission", f"first item {first:g} is not within 0 to {total - 1}")
+        if not isnan(last) and last not in (-1.0, 0.0, total - 1, total):
+            return denied("mission", f"last item {last:g} is not {total - 1}, its end")
+        refusal = self.select(Mode.MISSION)
+        if refusal is None and first >= 0.0:
+            self._missions.set_current(int(first), False)
+        return refusal
 
     def _pause_or_go_on(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 0.0:
             return self.select(Mode.HOLD)
-        return self.select(Mode.MISSION) if command.p1 == 1.0 else Refusal("pause with 0, go on with 1")
+        if command.p1 == 1.0:
+            return self.select(Mode.MISSION)
+        return denied("pause", f"{command.p1:g} is not 0, to pause, or 1, to go on")
 
     def _change_speed(self, command: ReceivedCommand) -> Refusal | None:
         """Set the ground speed; -1 keeps it, -2 selects the parameters' speed."""
         kind, speed, _, relative = command[1:5]
         if kind not in _OVER_GROUND and not isnan(kind):
-            return Refusal("speed refused: only that over ground can be set", UNSUPPORTED)
+            return Refusal(f"speed refused: type {kind:g} is not 0 or 1, over ground", UNSUPPORTED)
         if relative == 1.0:
-            return Refusal("speed refused: only absolute ones can be set", UNSUPPORTED)
+            return Refusal("speed refused: relative 1 is not 0, absolute", UNSUPPORTED)
         if speed == _DEFAULT_SPEED:
             self._pilot.speed_m_s = None
-        elif self.motion.may_fly_at(speed):
+        elif not self.motion.speed_refused(speed):
             self._pilot.speed_m_s = speed
         elif speed != _SAME_SPEED:
-            return denied("speed", f"{speed:g} m/s")
+            return denied("speed", self.motion.speed_refused(speed))
         return None
 
     def _set_home(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 1.0:
             state = self._pilot.context().state
-            self._home.move(state.position_enu_m, state.euler[2])
+            self._missions.move_home(state.position_enu_m, state.euler[2], state)
             return None
         if command.p1 != 0.0 and not isnan(command.p1):
-            return denied("home", "1 is here, 0 is there")
-        if not is_on_earth(command.x, command.y) or not isfinite(command.z):
-            return denied("home", "not a latitude, longitude and altitude")
-        return self.move_home(Geodetic(command.x, command.y, command.z))
+            return denied("home", f"{command.p1:g} is not 1, here, or 0, there")
+        for name, value in (("latitude", command.x), ("longitude", command.y), ("altitude", command.z)):
+            if isnan(value):
+                return denied("home", f"{name} is missing")
+        return self._move_home(self.motion.read(command, above_sea=True))
 
     def move_home(self, place: Geodetic) -> Refusal | None:
-        home = enu_of(place, self._home.origin)
-        refusal = self.motion.unreachable(home)
+        home, frame = self._home, mav.MAV_FRAME_GLOBAL
+        return self._move_home(read_place(*place, frame, home_up_m=0.0, origin=home.origin, here=home.position_enu_m))
+
+    def _move_home(self, place: Vector | Refusal) -> Refusal | None:
+        if isinstance(place, Refusal):
+            return denied("home", place.reason)
+        refusal = self.motion.unreachable(place)
         if refusal is not None:
-            return Refusal(f"home refused: {refusal.reason}")
-        self._home.move(home, self._home.yaw_rad)
+            return denied("home", refusal.reason)
+        self._missions.move_home(place, self._home.yaw_rad, self._pilot.context().state)
         return None
 
     def _terminate(self, command: ReceivedCommand) -> Refusal | None:
         if command.p1 == 1.0:
             return self._pilot.disarm(force=True)
-        return Refusal("flight terminated by 1 alone, and never undone")
+        return denied("termination", f"{command.p1:g} is not 1; it is never undone")
 
     def _check(self, command: ReceivedCommand) -> Refusal | None:
         del command
+        self._judge_fence()
         reasons = self._pilot.readiness.refusals()
         return Refusal("not ready: " + "; ".join(reasons), FAILED) if reasons else None
+
+    def _judge_fence(self) -> None:
+        """Have readiness know the fence of this frame."""
+        vehicle = self._pilot.sensed.vehicle
+        if vehicle is not None:
+            self._pilot.readiness.judge_fence(self._fence.arming_refusal(vehicle.position_enu_m))

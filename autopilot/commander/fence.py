@@ -30,7 +30,7 @@ class Fence:
         self._geofence = Geofence((), home.origin)
         self._breach: Refusal | None = None
         self.against_arming: Refusal | None = None
-        self._breach_due_us = 0
+        self._breach_due_us, self._arming_margin_m = 0, 0.0
 
     def adopt(self, behaviour: Behaviour) -> None:
         self._behaviour = behaviour
@@ -45,9 +45,13 @@ class Fence:
         self._breach, self._breach_due_us = None, 0
 
     @property
+    def loaded(self) -> bool:
+        return bool(self._items)
+
+    @property
     def exists(self) -> bool:
         behaviour = self._behaviour
-        return bool(self._items) or behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
+        return self.loaded or behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
 
     @property
     def _around_home(self) -> AroundHome:
@@ -85,8 +89,14 @@ class Fence:
         if not self.exists:
             self._breach = self.against_arming = None
         elif now_us >= self._breach_due_us:
-            self._breach_due_us = now_us + _LOOK_EVERY_US
-            self._breach = self.against_arming = self.refusal(place)
-            if self._breach is None and margin_m > 0.0 and self.margin_m(place) < margin_m:
-                self.against_arming = Refusal(f"within {margin_m:g} m (GF_MARGIN) of the geofence's edge")
+            self._breach_due_us, self._arming_margin_m = now_us + _LOOK_EVERY_US, margin_m
+            self._breach = self.refusal(place)
+            self.against_arming = self._breach or self.arming_refusal(place)
         return self._breach
+
+    def arming_refusal(self, place: Vector) -> Refusal | None:
+        """Check a position by the fence of this moment, also in the frame in which it is loaded."""
+        refusal, margin_m = self.refusal(place), self._arming_margin_m
+        if refusal is None and margin_m > 0.0 and self.margin_m(place) < margin_m:
+            return Refusal(f"within {margin_m:g} m (GF_MARGIN) of the geofence's edge")
+        return refusal

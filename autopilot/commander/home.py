@@ -2,9 +2,11 @@
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.mavlink.wire.places import far
 from colibri.mavlink.wire.refusal import Refusal
 
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
+_DEEP_M = 10.0
 _UNCERTAIN_M = 0.5
 """Allowed difference between estimated heights and heights above sea level."""
 
@@ -25,10 +27,20 @@ class Home:
         if not self.chosen:
             self.position_enu_m, self.yaw_rad = position_enu_m, yaw_rad
 
+    def doubt(self, here: Vector) -> str:
+        """Return why home may be a mistake, for a vehicle that is `here`; empty if it is not."""
+        away, below_m = far(self.position_enu_m, here), -self.position_enu_m[2]
+        return f"home: {away}" if away else f"home: {below_m:.0f} m below the ground" if below_m > _DEEP_M else ""
+
     def refusal(self, height_m: float) -> Refusal | None:
         """Refuse a height, z of ENU, m, that is below both the origin and home."""
         below_m = min(0.0, self.position_enu_m[2]) - height_m
         return Refusal(f"{below_m:.1f} m below the ground") if below_m > _UNCERTAIN_M else None
+
+    def remark(self, height_m: float) -> str:
+        """Return a warning of a height at which the vehicle scrapes along the ground; empty if it does not."""
+        above_m = height_m - min(0.0, self.position_enu_m[2])
+        return f"{above_m:.1f} m above home is along the ground" if above_m < _UNCERTAIN_M else ""
 
     def move_origin(self, place: Geodetic) -> None:
         """Set the origin of the ENU frame; ENU coordinates keep their values."""

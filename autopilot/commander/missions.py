@@ -1,35 +1,42 @@
 """Uploaded plans, and the task that flies a mission."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import dist, hypot
 
 from colibri.autopilot.commander.fence import CHECKED_AT_ONCE, Fence
 from colibri.autopilot.commander.home import Home
-from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.mission.executor import MissionExecutor, MissionRecord, Reached, SetHome
-from colibri.autopilot.guidance.mission.items import places
+from colibri.autopilot.guidance.mission.executor import Circling, MissionEvent, MissionExecutor, MissionRecord, Reached
+from colibri.autopilot.guidance.mission.items import places, rally_places
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, homeward, landing
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext, TaskOutput
-from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem, StoredPlan
+from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.types import Vector
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, StoredPlan
 from colibri.mavlink.mission.service import MissionProgress
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import far, too_far
 from colibri.mavlink.wire.refusal import Refusal
 
 _PLACE_US = 2.0
 """Work to find the place of an item."""
+_ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_DO_SET_HOME)
+_NONE = Refusal()
+_MOVED_M = 1.0
 
 
 class Missions:
     """The mission of one vehicle, and the plans around it.
 
     Attributes:
-        outside, below: Why items lead outside the fence or below the ground; empty if they do not.
+        unmet: Needs of mode mission that the plan does not meet, each with the item that is the reason.
         checking: Whether `check_on` is due at the next frame, as the check of a long mission takes several.
         changes: Number of uploads.
     """
@@ -40,15 +47,17 @@ class Missions:
         self._lines = lines
         self._behaviour = behaviour
         self._executor = MissionExecutor()
-        self.outside = self.below = ""
+        self.unmet: dict[Need, str] = {}
+        self._remarks: tuple[str, ...] = ()
+        self._rally: Sequence[MissionItem] = ()
         self.checking = False
         self._check: Iterator[int] = iter(())
         self._reached: list[int] = []
         self.changes = 0
 
     @property
-    def has_mission(self) -> bool:
-        return bool(self._executor.items)
+    def total(self) -> int:
+        return len(self._executor.items)
 
     def adopt(self, behaviour: Behaviour) -> None:
         self._behaviour = behaviour
@@ -66,14 +75,46 @@ class Missions:
         elif plan_type == FENCE:
             self._lines.say(INFO, "geofence loaded" if items else "geofence cleared")
             self._fence.load(items)
+        else:
+            self._rally = items
+            self._lines.say(INFO, f"{len(items)} rally points" if items else "rally points cleared")
+            for seq, place in rally_places(items, self._home.position_enu_m, self._home.origin):
+                if fault := self._rally_fault(place):
+                    self._lines.say(WARNING, f"rally point {seq} is not flown to: {fault}")
         self._check_mission()
 
     def set_current(self, seq: int, reset: bool) -> Refusal | None:
         return self._executor.set_current(seq, reset)
 
+    def move_origin(self, place: Geodetic) -> None:
+        """Move the origin, and with it vehicle and home: the places of plans stay where they are on earth."""
+        moved_m = hypot(*enu_of(place, self._home.origin)[:2])
+        self._home.move_origin(place)
+        if moved_m > _MOVED_M and (self.total or self._rally or self._fence.loaded):
+            self._lines.say(WARNING, f"origin moved by {moved_m:.0f} m: the plans stay where they are")
+        self.moved_origin()
+
     def moved_origin(self) -> None:
         self._fence.rebuild()
         self._check_mission()
+
+    def move_home(self, place: Vector, yaw_rad: float, vehicle: VehicleState) -> None:
+        self._home.move(place, yaw_rad)
+        doubt = self._home.doubt(vehicle.position_enu_m)
+        if doubt:
+            self._lines.say(WARNING, doubt)
+        self._check_mission()
+
+    def homeward(self, context: TaskContext, *, tells: bool = True) -> TaskSequence:
+        """Return to the nearest of home and the rally points inside the fence, as PX4 does."""
+        places = [context.home_enu_m]
+        for _, place in rally_places(self._rally, context.home_enu_m, self._home.origin):
+            if not self._rally_fault(place):
+                places.append(place)
+        nearest = min(places, key=lambda place: dist(place[:2], context.place[:2]))
+        if tells and nearest is not places[0]:
+            self._lines.say(INFO, "returning to a rally point")
+        return homeward(context, nearest)
 
     def task(self) -> "MissionTask":
         self._executor.start()
@@ -93,6 +134,7 @@ class Missions:
     def resume(self, plans: Mapping[int, StoredPlan], record: MissionRecord | None) -> None:
         self._fence.load(plans[FENCE].items)
         self._executor.load(plans[MISSION].items)
+        self._rally = plans[RALLY].items
         if record is not None:
             self._executor.resume(record)
 
@@ -102,11 +144,17 @@ class Missions:
                 if isinstance(event, Reached):
                     self._reached.append(event.seq)
 
-    def flown(self, event: Reached | SetHome, state: VehicleState) -> None:
+    def flown(self, event: MissionEvent, state: VehicleState) -> None:
         if isinstance(event, Reached):
             self._reached.append(event.seq)
+        elif isinstance(event, Circling):
+            self._lines.say(WARNING, f"item {event.seq} of the mission: jumps in a circle, nothing is flown")
         else:
-            self._home.move(event.position_enu_m or state.position_enu_m, state.euler[2])
+            self.move_home(event.position_enu_m or state.position_enu_m, state.euler[2], state)
+
+    def _rally_fault(self, place: Vector) -> str:
+        outside = self._fence.refusal((*place[:2], self._home.position_enu_m[2]))
+        return too_far(place) or (outside.reason if outside else "")
 
     def take_reached(self) -> list[int]:
         reached, self._reached = self._reached, []
@@ -134,8 +182,8 @@ class Missions:
         self.check_on()
 
     def _checked(self) -> Iterator[int]:
-        """Warn of items outside the fence or below the ground; legs between items are not checked."""
-        home, items, said = self._home, self._executor.items, (self.outside, self.below)
+        """Find items that cannot be flown to, or may be a mistake; legs between items are not checked."""
+        home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
         self._fence.budget.spend(_PLACE_US * len(items))
         found = list(places(items, home.position_enu_m, home.origin))
         at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
@@ -144,20 +192,32 @@ class Missions:
             part = found[first : first + at_once]
             refused = self._fence.first_outside([place for _, place in part])
             if refused is not None:
-                outside = _of_item(part[refused[0]][0], refused[1])
+                outside = _of_item(part[refused[0]][0], refused[1].reason)
                 break
             if first + at_once < len(found):
                 yield first + at_once
-        flown = ((seq, place) for seq, place in found if items[seq].command != mav.MAV_CMD_NAV_LAND)
-        below = (_of_item(seq, refusal) for seq, place in flown if (refusal := home.refusal(place[2])))
-        self.outside, self.below = outside, next(below, "")
-        for text in (self.outside, self.below):
-            if text and text not in said:
+        flown = [each for each in found if items[each[0]].command not in _ON_THE_GROUND]
+        reasons = {
+            Need.WITHIN_REACH: _first(found, too_far),
+            Need.INSIDE_FENCE: outside,
+            Need.ABOVE_GROUND: _first(flown, lambda place: (home.refusal(place[2]) or _NONE).reason),
+        }
+        self.unmet = {need: reason for need, reason in reasons.items() if reason}
+        away = "" if Need.WITHIN_REACH in self.unmet else _first(found, lambda place: far(place, home.position_enu_m))
+        low = "" if Need.ABOVE_GROUND in self.unmet else _first(flown, lambda place: home.remark(place[2]))
+        self._remarks = tuple(filter(None, (away and f"{away} from home", low)))
+        for text in (*self.unmet.values(), *self._remarks):
+            if text not in said:
                 self._lines.say(WARNING, text)
 
 
-def _of_item(seq: int, refusal: Refusal) -> str:
-    return f"item {seq} of the mission: {refusal.reason}"
+def _first(found: Iterable[tuple[int, Vector]], fault: Callable[[Vector], str]) -> str:
+    """Return the first item whose place has a fault; empty if none has."""
+    return next((_of_item(seq, reason) for seq, place in found if (reason := fault(place))), "")
+
+
+def _of_item(seq: int, reason: str) -> str:
+    return f"item {seq} of the mission: {reason}"
 
 
 class MissionTask:
@@ -184,7 +244,8 @@ class MissionTask:
             if self._order is not None:
                 self._turns_before = 0.0
             self._order = step.order
-            self._task = task_of(step.order, context)
+            returns = isinstance(step.order, Return)
+            self._task = self._missions.homeward(context, tells=False) if returns else task_of(step.order, context)
             if isinstance(self._task, TaskSequence):
                 self._task.skip(self._legs_left)
             self._legs_left = ()
@@ -218,7 +279,5 @@ def task_of(order: Order, context: TaskContext, takeoff_speed_m_s: float | None 
             return TakeoffTask(order.height_enu_m, order.yaw_rad, context, takeoff_speed_m_s)
         case Land():
             return landing(order)
-        case Return():
-            return homeward(context)
-        case Hold():
+        case Return() | Hold():
             return HoldTask()

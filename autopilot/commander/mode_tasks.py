@@ -21,7 +21,6 @@ from colibri.autopilot.guidance.tasks.position import (
     TakeoffTask,
     TaskSequence,
     TrackTask,
-    homeward,
     landing,
     to_track,
 )
@@ -95,7 +94,7 @@ class ModeTasks:
             Mode.HOLD: lambda _: HoldTask(),
             Mode.TAKEOFF: climb,
             Mode.LAND: self._down,
-            Mode.RETURN: homeward,
+            Mode.RETURN: missions.homeward,
             Mode.MISSION: lambda _: missions.task(),
             Mode.OFFBOARD: lambda _: OffboardTask(attitude),
             Mode.ORBIT: lambda _: HoldTask(),

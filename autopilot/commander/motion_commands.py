@@ -1,7 +1,7 @@
 """MAVLink commands to move: take-off, reposition, orbit, turn."""
 
 from collections.abc import Mapping
-from math import hypot, isfinite, isnan, nan, pi, radians
+from math import dist, isnan, nan, pi, radians
 from typing import Protocol
 
 from colibri.autopilot.commander.fence import Fence
@@ -11,16 +11,14 @@ from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.autopilot.guidance.tasks.task import FlightTask
-from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import TEMPORARILY_REJECTED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import ABOVE_TERRAIN, MAX_DISTANCE_M, MAX_HEIGHT_M, far, height_m, read_place, too_far
 from colibri.mavlink.wire.refusal import Refusal
 
-MAX_DISTANCE_M = 100_000.0
-MAX_HEIGHT_M = 10_000.0
 MIN_CLIMB_M = 0.2
 """A lower climb might not lift the feet."""
 MIN_RADIUS_M = 1.0
@@ -29,13 +27,16 @@ MAX_TURN_DEG = 360.0
 _YAW_BEHAVIOURS = range(mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED + 1)
 _POINTS = 72
 """Points of a circle checked against the fence."""
-_RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+_NO_FRAME = (None, mav.MAV_FRAME_MISSION)
+_ELSEWHERE_M = 10.0
+_NOBODY = Peer(0, 0, 0)
+NOT_FLYING = "the vehicle is not flying"
 
 
 class Needs(Protocol):
     """Unmet needs of modes."""
 
-    def missing(self) -> tuple[Need, ...]: ...
+    def missing(self) -> Mapping[Need, str]: ...
 
     def engage(self, peer: Peer, now_us: int) -> None: ...
 
@@ -59,109 +60,133 @@ class MotionCommands:
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         """Fly to a place; DroneKit uses a mission item for it."""
-        return self._go(latitude_deg, longitude_deg, altitude_m, frame, nan, nan)
+        place = (latitude_deg, longitude_deg, altitude_m)
+        return self._go(ReceivedCommand(mav.MAV_CMD_DO_REPOSITION, nan, nan, nan, nan, *place, frame, _NOBODY, 0), None)
 
-    def may_fly_at(self, speed_m_s: float) -> bool:
-        return 0.0 < speed_m_s <= self._pilot.behaviour.max_speed_m_s
+    def speed_refused(self, speed_m_s: float) -> str:
+        """Return why a speed cannot be flown; empty if it can."""
+        maximum_m_s = self._pilot.behaviour.max_speed_m_s
+        return "" if 0.0 < speed_m_s <= maximum_m_s else f"speed {speed_m_s:g} is not within 0 to {maximum_m_s:g} m/s"
 
     def unreachable(self, *places: Vector) -> Refusal | None:
         """Refuse places, if one of them is too far away or outside the fence."""
-        for east, north, up in places:
-            away = hypot(east, north)
-            if not isfinite(away) or away > MAX_DISTANCE_M or not -MAX_HEIGHT_M < up < MAX_HEIGHT_M:
-                return Refusal("too far away")
-        outside = self._fence.first_outside(places)
-        return None if outside is None else outside[1]
+        reason = next(filter(None, map(too_far, places)), "")
+        outside = None if reason else self._fence.first_outside(places)
+        return Refusal(reason) if reason else outside and outside[1]
+
+    def read(self, command: ReceivedCommand, *, above_sea: bool = False) -> Vector | Refusal:
+        """Return the place of a command; what is nan is the vehicle's. `above_sea`: except above terrain."""
+        frame = command.frame
+        if frame in _NO_FRAME or (above_sea and frame not in ABOVE_TERRAIN):
+            frame = mav.MAV_FRAME_GLOBAL
+        assert frame is not None
+        home, here = self._home, self._pilot.context().place
+        x, y, z = command.x, command.y, command.z
+        return read_place(x, y, z, frame, home_up_m=home.position_enu_m[2], origin=home.origin, here=here)
+
+    def warn_elsewhere(self, command: ReceivedCommand, doing: str) -> None:
+        """Warn of a place in a command that is executed where the vehicle is; 0, 0 is here."""
+        if (isnan(command.x) and isnan(command.y)) or command.x == command.y == 0.0:
+            return
+        place, here = self.read(command._replace(z=nan)), self._pilot.context().place
+        if isinstance(place, Refusal) or dist(place, here) > _ELSEWHERE_M:
+            self._pilot.warn(f"{doing} here, not at {command.x:.6f}, {command.y:.6f}")
 
     def _fly(self, mode: Mode, task: FlightTask) -> Refusal | None:
         return self._pilot.fly(mode, task, self._needs.missing())
 
     def _take_off(self, command: ReceivedCommand) -> Refusal | None:
         pilot = self._pilot
-        height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
+        ground_m = pilot.ground.height_m
+        up_m = ground_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
-            height_m = self._height_of_takeoff(command)
-        if not pilot.ground.height_m + MIN_CLIMB_M <= height_m < MAX_HEIGHT_M:
-            return denied("take-off", "not a height above the ground")
+            up_m = self._height_of_takeoff(command)
+        if not ground_m + MIN_CLIMB_M <= up_m < MAX_HEIGHT_M:
+            return denied("take-off", f"{up_m - ground_m:g} m above the ground is not within {MIN_CLIMB_M:g} to 10 km")
         context = pilot.context()
         x, y, _ = context.place
-        refusal = self._fence.refusal((x, y, height_m))
+        refusal = self._fence.refusal((x, y, up_m))
         if refusal is not None:
             return denied("take-off", refusal.reason)
-        return self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
+        refusal = self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, pilot.behaviour.takeoff_speed_m_s))
+        if refusal is None:
+            self.warn_elsewhere(command, "take-off")
+        return refusal
 
     def _height_of_takeoff(self, command: ReceivedCommand) -> float:
         """Return z of ENU, m: above home, but above sea level from QGC, which sends a pitch of -1."""
-        above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
-        return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
+        frame = command.frame
+        if frame is None or frame in _NO_FRAME:
+            frame = mav.MAV_FRAME_GLOBAL if command.p1 == -1.0 else mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        return height_m(command.z, frame, self._home.position_enu_m[2], self._home.origin)
 
     def _reposition(self, command: ReceivedCommand) -> Refusal | None:
         """Fly to a place, or stop if all are nan; the mode-change flag is optional."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
-            return denied("reposition", f"a flag of {command.p2:g} is not known")
+            return denied("reposition", f"flag {command.p2:g} is not 0 or 1")
         if not (isnan(command.p4) or abs(command.p4) <= MAX_YAW_RAD):
-            return denied("reposition", "yaw is in radians")
+            return denied("reposition", f"yaw {command.p4:g} is not within {MAX_YAW_RAD:.1f} rad")
         speed = nan if command.p1 in (-1.0, 0.0) else command.p1
-        if not (isnan(speed) or self.may_fly_at(speed)):
-            return denied("reposition", f"a speed of {speed:g} m/s")
+        if not isnan(speed) and self.speed_refused(speed):
+            return denied("reposition", self.speed_refused(speed))
         if all(map(isnan, (command.x, command.y, command.z, command.p4))):
             return self._fly(Mode.HOLD, HoldTask())
-        frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
-        return self._go(command.x, command.y, command.z, frame, command.p4, speed)
+        return self._go(command, None if isnan(speed) else speed)
 
-    def _go(self, x: float, y: float, z: float, frame: int, yaw_ned: float, speed: float) -> Refusal | None:
-        pilot = self._pilot
+    def _go(self, command: ReceivedCommand, speed_m_s: float | None) -> Refusal | None:
         if not self._flies:
-            return Refusal("reposition refused: the vehicle is not flying")
-        context = pilot.context()
-        place, only_height = context.place, isnan(x) and isnan(y)
-        if not only_height:
-            if not is_on_earth(x, y):
-                return Refusal("reposition refused: not a latitude and longitude")
-            place = (*enu_of(Geodetic(x, y, 0.0), self._home.origin)[:2], place[2])
-        if not isnan(z):
-            height_m = self._home.position_enu_m[2] + z if frame in _RELATIVE else z - self._home.origin.altitude_m
-            place = (place[0], place[1], height_m)
+            return denied("reposition", NOT_FLYING)
+        context, place = self._pilot.context(), self.read(command)
+        if isinstance(place, Refusal):
+            return denied("reposition", place.reason)
         refusal = self.unreachable(place) or self._home.refusal(place[2])
         if refusal is not None:
-            return Refusal(f"reposition refused: {refusal.reason}")
-        yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else context.yaw_rad if only_height else None
-        return self._fly(Mode.HOLD, GoToTask(GoTo(place, yaw, None if isnan(speed) else speed), context))
+            return denied("reposition", refusal.reason)
+        keeps_heading = isnan(command.x) and isnan(command.y)
+        yaw = 0.5 * pi - command.p4 if not isnan(command.p4) else context.yaw_rad if keeps_heading else None
+        refusal = self._fly(Mode.HOLD, GoToTask(GoTo(place, yaw, speed_m_s), context))
+        if refusal is None:
+            self.warn_of("reposition", place)
+        return refusal
+
+    def warn_of(self, what: str, place: Vector) -> None:
+        """Warn of a place that may be a mistake, but can be flown to."""
+        for remark in (far(place, self._home.position_enu_m), self._home.remark(place[2])):
+            if remark:
+                self._pilot.warn(f"{what}: {remark}")
 
     @property
     def _flies(self) -> bool:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
     def _orbit(self, command: ReceivedCommand) -> Refusal | None:
-        """Fly a circle; z is above sea level in every frame, as in MAVSDK and PX4."""
+        """Fly a circle; z is above sea level, as in MAVSDK and PX4, except in frames above terrain."""
         pilot = self._pilot
         if not self._flies:
-            return denied("orbit", "the vehicle is not flying")
-        context = pilot.context()
-        x, y, z = context.place
-        if not (isnan(command.x) and isnan(command.y)):
-            if not is_on_earth(command.x, command.y):
-                return denied("orbit", "not a latitude and longitude")
-            x, y, _ = enu_of(Geodetic(command.x, command.y, 0.0), self._home.origin)
-        if not isnan(command.z):
-            z = command.z - self._home.origin.altitude_m
+            return denied("orbit", NOT_FLYING)
+        context, center = pilot.context(), self.read(command, above_sea=True)
+        if isinstance(center, Refusal):
+            return denied("orbit", center.reason)
         radius = pilot.behaviour.orbit_radius_m if isnan(command.p1) else command.p1
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
-        circle = Orbit((x, y, z), radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
+        circle = Orbit(center, radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
         refusal = self._no_circle(circle)
         if refusal is not None:
             return denied("orbit", refusal.reason)
-        return self._fly(Mode.ORBIT, OrbitTask(circle, context))
+        refusal = self._fly(Mode.ORBIT, OrbitTask(circle, context))
+        if refusal is None:
+            self.warn_of("orbit", center)
+        return refusal
 
     def _no_circle(self, circle: Orbit) -> Refusal | None:
         (x, y, z), radius, speed, yaw_behaviour = circle
         if not MIN_RADIUS_M <= abs(radius) <= MAX_DISTANCE_M:
-            return Refusal(f"a radius of {radius:g} m")
-        if speed is not None and not self.may_fly_at(speed):
-            return Refusal(f"a speed of {speed:g} m/s")
+            return Refusal(f"radius {radius:g} is not within {MIN_RADIUS_M:g} to {MAX_DISTANCE_M:g} m")
+        if speed is not None and self.speed_refused(speed):
+            return Refusal(self.speed_refused(speed))
         if yaw_behaviour not in _YAW_BEHAVIOURS:
-            return Refusal("no such yaw behaviour")
+            return Refusal(f"yaw behaviour is not within 0 to {_YAW_BEHAVIOURS[-1]}")
         angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
         return self._home.refusal(z) or self.unreachable(*around)
@@ -169,12 +194,14 @@ class MotionCommands:
     def _turn(self, command: ReceivedCommand) -> Refusal | None:
         """Turn clockwise from north, or from the heading if p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
-        if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):
-            return denied("turn", "not an angle and a direction")
+        if isnan(command.p1) or abs(angle) > MAX_TURN_DEG:
+            return denied("turn", f"angle {command.p1:g} is not within {MAX_TURN_DEG:g} degrees")
+        if way not in (-1.0, 0.0, 1.0):
+            return denied("turn", f"direction {way:g} is not -1, 0 or 1")
         if relative not in (0.0, 1.0):
-            return denied("turn", "1 counts from the heading, 0 from north")
+            return denied("turn", f"{relative:g} is not 1, from the heading, or 0, from north")
         if not self._flies:
-            return Refusal("turn refused: the vehicle is not flying", TEMPORARILY_REJECTED)
+            return Refusal(f"turn refused: {NOT_FLYING}", TEMPORARILY_REJECTED)
         context = self._pilot.context()
         zero_rad = context.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)

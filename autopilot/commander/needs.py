@@ -47,21 +47,20 @@ class ModeNeeds:
         for service in (self._offboard, self._manual, self._follow):
             service.engage(peer, now_us)
 
-    def missing(self) -> tuple[Need, ...]:
+    def missing(self) -> dict[Need, str]:
+        """Return the unmet needs, each with its reason."""
         sticks, setpoint, _ = self.steered(self._now_us)
         met = {
             Need.ATTITUDE_CONTROL: self._takes_attitude,
             Need.STICKS: sticks is not None,
             Need.SETPOINTS: setpoint is not None,
-            Need.MISSION: self._missions.has_mission,
-            Need.INSIDE_FENCE: not self._missions.outside,
-            Need.ABOVE_GROUND: not self._missions.below,
+            Need.MISSION: self._missions.total > 0,
             Need.CHECKED: not self._missions.checking,
             Need.CIRCLE: False,
             Need.FLYING: not self._pilot.ground.standing,
             Need.POSITION: self._pilot.sensed.position_known,
         }
-        return tuple(need for need, there in met.items() if not there)
+        return {need: need.value for need, there in met.items() if not there} | self._missions.unmet
 
     def steered(self, now_us: int) -> ClientInputs:
         behaviour = self._pilot.behaviour

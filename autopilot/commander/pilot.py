@@ -1,6 +1,7 @@
 """The pilot: modes, arming, take-off, landing, and the references of the control law."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.commander.flight.ground_contact import GroundContact, GroundRecord
@@ -30,7 +31,7 @@ from colibri.autopilot.guidance.tasks.task import (
     lifts,
 )
 from colibri.common.types import Vector
-from colibri.mavlink.services.statustext import INFO
+from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.wire.refusal import Refusal
 
 TaskFactory: TypeAlias = Callable[[Mode, TaskContext], FlightTask]
@@ -43,6 +44,7 @@ _SAVED_BY = {
 }
 _ENDS = {Mode.TAKEOFF: Event.ARRIVED, Mode.MISSION: Event.FINISHED, Mode.TRACK: Event.FINISHED}
 """Event when the task of a mode has arrived."""
+NOTHING_MISSING: Mapping[Need, str] = MappingProxyType({})
 
 
 class Sensed(NamedTuple):
@@ -193,18 +195,23 @@ class Pilot:
             blind=self.saving is Action.DESCEND or not position_known,
         )
 
+    def warn(self, text: str) -> None:
+        self._lines.say(WARNING, text)
+
     @property
     def flight(self) -> FlightState:
         return FlightState(self.state.armed, self.ground.standing, self.state.mode, self.saving)
 
-    def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
+    def arm(self, missing: Mapping[Need, str], *, force: bool = False) -> Refusal | None:
         if self.state.armed:
             return None
         forced = force and self.sensed.vehicle is not None and not self.readiness.only_lands
         reasons = [] if forced else self.readiness.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
-        unmet = [need for need in missing if need is not Need.POSITION]  # a check of its own, and by force
+        unmet: dict[Need, str] = {
+            need: why for need, why in missing.items() if need is not Need.POSITION
+        }  # a check of its own, and by force
         refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
         if refusal is None:
             now_us, vehicle, *_ = self.sensed
@@ -224,7 +231,7 @@ class Pilot:
             return Refusal("not disarmed: the vehicle is flying")
         return self._stop_rotors(Event.DISARM, "rotors stopped" if standing else "rotors stopped in the air")
 
-    def select(self, mode: Mode, missing: Collection[Need]) -> Refusal | None:
+    def select(self, mode: Mode, missing: Mapping[Need, str]) -> Refusal | None:
         if mode is self.state.mode and mode is not Mode.HOLD:
             return None
         refusal = self._follow(Event.SELECT, "", mode, missing)
@@ -233,8 +240,10 @@ class Pilot:
             self._engage(mode)
         return refusal
 
-    def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
-        refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
+    def fly(self, mode: Mode, task: FlightTask, missing: Mapping[Need, str]) -> Refusal | None:
+        refusal = self._follow(
+            Event.SELECT, "", mode, {need: why for need, why in missing.items() if need is not Need.CIRCLE}
+        )
         if refusal is None:
             self.saving = Action.NONE
             self.task, self._task_is_chosen = task, True
@@ -344,7 +353,7 @@ class Pilot:
             self.generator.set(task.start)
 
     def _follow(
-        self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
+        self, event: Event, text: str, selected: Mode | None = None, missing: Mapping[Need, str] = NOTHING_MISSING
     ) -> Refusal | None:
         only_lands = self.readiness.only_lands
         if event is Event.SELECT and self.state.armed and only_lands:

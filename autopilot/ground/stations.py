@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, TypeVarTuple
 
-from colibri.autopilot.commander.commands import Commands
+from colibri.autopilot.commander.commands import CUSTOM, Commands
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import MODES, custom_mode, mode_of_custom
+from colibri.autopilot.commander.rules.modes import MODES, custom_mode
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, OnboardLog
@@ -115,14 +115,14 @@ class Stations:
         self.system = SystemCommands(
             pilot, missions, parameters, identity=settings.identity, system_id=settings.system_id
         )
-        commands = Commands(pilot, fence, self.needs)
+        commands = Commands(pilot, fence, missions, self.needs)
         vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
         self.plans = MissionService(PLAN_RULES, vehicle, self._text)
         self._heartbeat = HeartbeatService(identity)
         self._streams = StreamService(telemetry(settings.boot_unix_us))
         modes = StandardModes(
             [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES],
-            lambda number, _: commands.select(mode_of_custom(number)),
+            lambda number, _: commands.set_custom_mode(CUSTOM, number),
         )
         metadata = Metadata(metadata_json(parameters))
         files = _files(settings, metadata, parameters)

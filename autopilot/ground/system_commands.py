@@ -5,15 +5,15 @@ from importlib.metadata import version as version_of_package
 from math import pi
 
 from colibri.autopilot.commander.missions import Missions
-from colibri.autopilot.commander.motion_commands import MAX_HEIGHT_M
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.ground.calibration import Calibration
-from colibri.common.earth.geodesy import Geodetic, is_on_earth
+from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import Handler, ReceivedCommand
 from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
 
 VERSION = version_of_package("colibri-sitl")
@@ -50,12 +50,10 @@ class SystemCommands:
         return self._calibration.poll(now_us)
 
     def set_origin(self, place: Geodetic) -> Refusal | None:
-        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= MAX_HEIGHT_M:
-            return Refusal("origin refused: not a latitude, longitude and altitude")
-        if self._pilot.state.armed:
-            return Refusal("origin refused: the rotors are armed")
-        self._pilot.home.move_origin(place)
-        self._missions.moved_origin()
+        wrong = misplaced(place.latitude_deg, place.longitude_deg) or misplaced_height(place.altitude_m)
+        if wrong or self._pilot.state.armed:
+            return Refusal(f"origin refused: {wrong or 'the rotors are armed'}")
+        self._missions.move_origin(place)
         return None
 
     def _set_origin(self, command: ReceivedCommand) -> Refusal | None:
@@ -68,7 +66,7 @@ class SystemCommands:
         if self._pilot.state.armed:
             return Refusal("restart refused: the rotors are armed")
         if command.p1 not in (REBOOT, SHUT_DOWN):
-            return Refusal("restart with 1, shut down with 2")
+            return Refusal(f"restart refused: {command.p1:g} is not 1, restart, or 2, shut down")
         self.restart = command.p1
         return None
 
@@ -78,7 +76,7 @@ class SystemCommands:
             if self._pilot.state.armed:
                 return Refusal("parameters refused: the rotors are armed")
             self._parameters.reset()
-        return None if command.p1 in (0.0, 1.0, 2.0) else Refusal("storage: 0, 1 or 2")
+        return None if command.p1 in (0.0, 1.0, 2.0) else Refusal(f"storage refused: {command.p1:g} is not 0, 1 or 2")
 
     def _status(self) -> str:
         mode, armed = self._pilot.state

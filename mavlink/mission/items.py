@@ -10,17 +10,20 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 from colibri.mavlink.node.service import Fields, Peer
-from colibri.mavlink.services.command import GLOBAL_FRAMES, NOT_GIVEN
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, NOT_GIVEN, command_name
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import misplaced, misplaced_height
 
 MISSION: int = mav.MAV_MISSION_TYPE_MISSION
 FENCE: int = mav.MAV_MISSION_TYPE_FENCE
 RALLY: int = mav.MAV_MISSION_TYPE_RALLY
 ALL: int = mav.MAV_MISSION_TYPE_ALL
 PLAN_TYPES = (MISSION, FENCE, RALLY)
+_NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally", ALL: "all plans"}
 
 ACCEPTED: int = mav.MAV_MISSION_ACCEPTED
 
+_FIRST_PARAMETER, _PARAMETERS = 3, 7
 _PACKED = Struct("<BHBffffiif")
 _INT32 = range(-(2**31), 2**31)
 
@@ -69,6 +72,26 @@ def item_of(message_name: str, fields: Any) -> MissionItem | int:
             return int(mav.MAV_MISSION_INVALID_PARAM6_Y)
     numbers = (fields.param1, fields.param2, fields.param3, fields.param4, x, y, fields.z)
     return MissionItem(fields.frame, fields.command, fields.autocontinue, *numbers)
+
+
+def plan_name(plan_type: int) -> str:
+    return _NAMES.get(plan_type, f"plan type {plan_type}")
+
+
+def fault_of(item: MissionItem, result: int) -> str:
+    """Name the field, and its value, for which an item is refused with a MAV_MISSION_RESULT."""
+    name = command_name(item.command)
+    if result == mav.MAV_MISSION_UNSUPPORTED:
+        return f"{name} is not supported"
+    if result == mav.MAV_MISSION_UNSUPPORTED_FRAME:
+        return f"{name} in frame {item.frame}"
+    number = result - mav.MAV_MISSION_INVALID_PARAM1
+    if not 0 <= number < _PARAMETERS:
+        return name
+    value = item[_FIRST_PARAMETER + number]
+    place = misplaced(item.x * DEGREES, item.y * DEGREES) if number in (4, 5) else ""
+    height = misplaced_height(value) if number == _PARAMETERS - 1 else ""
+    return f"{name}: {place or height or f'parameter {number + 1} is {value:g}'}"
 
 
 def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_type: int) -> Fields:

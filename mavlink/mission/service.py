@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite, isnan
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG
+from colibri.common.earth.geodesy import MAX_LATITUDE_DEG
 from colibri.mavlink.mission.items import (
     ACCEPTED,
     ALL,
@@ -19,13 +19,15 @@ from colibri.mavlink.mission.items import (
     MissionItem,
     StoredPlan,
     item_fields,
+    plan_name,
     plan_of,
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
-from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, ReceivedCommand
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, ReceivedCommand, command_name
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
@@ -54,15 +56,15 @@ class Downloads:
         target = (peer.system, peer.component)
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
-    def item(self, peer: Peer, plan_type: int, seq: int, newest: StoredPlan, current: int, now_us: int) -> Send:
-        """Return an item, also for the deprecated MISSION_REQUEST as MISSION_ITEM_INT."""
+    def item(self, peer: Peer, plan_type: int, seq: int, newest: StoredPlan, current: int, now_us: int) -> Send | None:
+        """Return an item, if there is one, also for the deprecated MISSION_REQUEST as MISSION_ITEM_INT."""
         reading = self._readings.get((peer, plan_type))
         plan = newest
         if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
             plan = reading.plan
             self._remember(peer, plan_type, plan, now_us)
         if seq >= len(plan.items):
-            return ack(peer, mav.MAV_MISSION_INVALID_SEQUENCE, plan_type)
+            return None
         is_current = plan is newest and seq == current
         return to(peer, "MISSION_ITEM_INT", *item_fields(peer, seq, plan.items[seq], is_current, plan_type))
 
@@ -134,7 +136,7 @@ class MissionService:
         if now_us < self._due_us and progress is self._shown and not self._outbox:
             return ()
         sends, self._outbox = self._outbox, []
-        sends += self._uploads.poll(now_us)
+        sends += self._explained(self._uploads.poll(now_us))
         if progress != self._shown or now_us >= self._stream_us:
             self._stream_us = now_us + STREAM_EVERY_US
             sends.append(self._current())
@@ -169,10 +171,10 @@ class MissionService:
 
     def do_set_mission_current(self, command: ReceivedCommand) -> Refusal | None:
         seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
-        if not (-1.0 <= seq <= 0xFFFF and seq == int(seq)):
-            return Refusal("mission: not a sequence number")
+        if not isfinite(seq) or seq != int(seq):
+            return Refusal(f"mission: item {seq:g} is not a whole number")
         if reset not in (0.0, 1.0):
-            return Refusal("mission: reset is 0 or 1")
+            return Refusal(f"mission: reset {reset:g} is not 0 or 1")
         refusal = self._vehicle.set_current(int(seq), reset == 1.0)
         if refusal is None:
             self._announce()
@@ -186,15 +188,14 @@ class MissionService:
 
     def _count(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         if fields.mission_type not in PLAN_TYPES:
-            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]
-        return [self._uploads.begin(peer, fields.mission_type, fields.count, now_us)]
+            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)
+        return self._explained([self._uploads.begin(peer, fields.mission_type, fields.count, now_us)])
 
     def _item(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if fields.current >= GUIDED and not self._uploads.expects(peer, fields.mission_type):
             return self._guided(message, peer)
-        answer = self._uploads.item(message, peer, now_us)
-        return () if answer is None else [answer]
+        return self._explained([self._uploads.item(message, peer, now_us)])
 
     def _guided(self, message: Message, peer: Peer) -> Iterable[Send]:
         result, reason = self._fly_to(message)
@@ -206,41 +207,45 @@ class MissionService:
         scale = DEGREES if message.name == "MISSION_ITEM_INT" else 1.0
         latitude, longitude = fields.x * scale, fields.y * scale
         known = (fields.current, fields.command, fields.mission_type) == (GUIDED, mav.MAV_CMD_NAV_WAYPOINT, MISSION)
+        what = f"item to fly to now (current {fields.current}): {command_name(fields.command)}"
         if not known:
-            return mav.MAV_MISSION_UNSUPPORTED, ""
+            return mav.MAV_MISSION_UNSUPPORTED, f"{what} is not supported"
         if fields.frame not in GLOBAL_FRAMES:
-            return mav.MAV_MISSION_UNSUPPORTED_FRAME, ""
-        if not abs(latitude) <= MAX_LATITUDE_DEG:
-            return mav.MAV_MISSION_INVALID_PARAM5_X, ""
-        if not abs(longitude) <= MAX_LONGITUDE_DEG:
-            return mav.MAV_MISSION_INVALID_PARAM6_Y, ""
-        if not isfinite(fields.z):
-            return mav.MAV_MISSION_INVALID_PARAM7, ""
+            return mav.MAV_MISSION_UNSUPPORTED_FRAME, f"{what} in frame {fields.frame}"
+        place = misplaced(latitude, longitude)
+        if place:
+            at_x = not abs(latitude) <= MAX_LATITUDE_DEG
+            return mav.MAV_MISSION_INVALID_PARAM5_X if at_x else mav.MAV_MISSION_INVALID_PARAM6_Y, f"{what}: {place}"
+        if misplaced_height(fields.z):
+            return mav.MAV_MISSION_INVALID_PARAM7, f"{what}: {misplaced_height(fields.z)}"
         refusal = self._vehicle.guided_goto(latitude, longitude, fields.z, fields.frame)
         return (ACCEPTED, "") if refusal is None else (mav.MAV_MISSION_DENIED, refusal.reason)
 
     def _request_list(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         if fields.mission_type not in PLAN_TYPES:
-            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]
+            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)
         self._uploads.hush(peer)
         return [self._downloads.begin(peer, fields.mission_type, self.plans[fields.mission_type], now_us)]
 
     def _request(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         plan_type = fields.mission_type
         if plan_type not in PLAN_TYPES:
-            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)]
+            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)
         current = self._progress().seq if plan_type == MISSION else -1
-        return [self._downloads.item(peer, plan_type, fields.seq, self.plans[plan_type], current, now_us)]
+        found = self._downloads.item(peer, plan_type, fields.seq, self.plans[plan_type], current, now_us)
+        if found is None:
+            why = f"there is no item {fields.seq}"
+            return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, plan_type, why)
+        return [found]
 
     def _ack(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         self._downloads.end(peer, fields.mission_type)
-        answer = self._uploads.acknowledged(peer, fields.mission_type, fields.type, now_us)
-        return () if answer is None else [answer]
+        return self._explained([self._uploads.acknowledged(peer, fields.mission_type, fields.type, now_us)])
 
     def _clear_all(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
         plan_type = fields.mission_type
         if plan_type not in (*PLAN_TYPES, ALL):
-            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)]
+            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)
         cleared = PLAN_TYPES if plan_type == ALL else (plan_type,)
         self._uploads.drop(peer, cleared)
         for each in cleared:
@@ -256,4 +261,14 @@ class MissionService:
 
     def _partial(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
         """Refuse partial lists: "not an official/standardised part of the mission service"."""
-        return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]
+        return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type, "partial lists are not supported")
+
+    def _refuse(self, peer: Peer, result: int, plan_type: int, why: str = "not known") -> list[Send]:
+        text = self._text.say(WARNING, f"{plan_name(plan_type)} refused: {why}")
+        return [ack(peer, result, plan_type), *text]
+
+    def _explained(self, sends: Iterable[Send | None]) -> list[Send]:
+        """Return answers to an upload, with the reason of a refusal."""
+        reason = self._uploads.take_reason()
+        text = self._text.say(WARNING, reason) if reason else ()
+        return [*filter(None, sends), *text]

@@ -12,8 +12,9 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, StoredPlan, item_of
+from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, StoredPlan, fault_of, item_of, plan_name
 from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.services.command import command_name
 from colibri.mavlink.wire.dialect import Message, mav
 
 ASK_EVERY_US = 250_000
@@ -31,7 +32,7 @@ class Rules(NamedTuple):
     """Limits of a plan of one type, by MAV_MISSION_RESULT."""
 
     check_item: Callable[[MissionItem], int]
-    check_plan: Callable[[Sequence[MissionItem]], int]
+    check_plan: Callable[[Sequence[MissionItem]], tuple[int, int]]  # with the number of the item that is refused
     maximum: int = 1000
 
 
@@ -89,6 +90,7 @@ class Uploads:
         self._rules = rules
         self._store = store
         self._under_way: dict[int, _Upload] = {}
+        self._reason = ""
         self._answers: dict[int, _Answer] = {}
         self.due_us = NEVER_US
 
@@ -98,12 +100,13 @@ class Uploads:
         began_us = other.began_us if other is not None and other.peer.channel == peer.channel else now_us
         if other is not None and other.peer != peer:
             if now_us - other.began_us < GIVES_WAY_AFTER_US:
-                return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
+                return self._refuse(peer, mav.MAV_MISSION_DENIED, plan_type, "another station is uploading")
             self.drop(other.peer, (plan_type,))
         self.drop(peer, PLAN_TYPES)
         self._answers.pop(plan_type, None)
-        if count > self._rules[plan_type].maximum:
-            return ack(peer, mav.MAV_MISSION_NO_SPACE, plan_type)
+        maximum = self._rules[plan_type].maximum
+        if count > maximum:
+            return self._refuse(peer, mav.MAV_MISSION_NO_SPACE, plan_type, f"{count} items, more than {maximum}")
         if count == 0:  # "has the same effect as clearing the mission"
             return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)
         upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us, began_us)
@@ -125,7 +128,11 @@ class Uploads:
             return self._asking(upload, now_us)
         item = item_of(message.name, fields)
         result = item if isinstance(item, int) else self._rules[upload.plan_type].check_item(item)
-        if result != ACCEPTED or isinstance(item, int):
+        if isinstance(item, int):
+            self._blame(upload, expected, f"{command_name(fields.command)} at {fields.x:g}, {fields.y:g}")
+            return self._end(upload, item, 0, now_us)
+        if result != ACCEPTED:
+            self._blame(upload, expected, fault_of(item, result))
             return self._end(upload, result, 0, now_us)
         upload.take(item, now_us)
         if len(upload.items) < upload.count:
@@ -163,7 +170,8 @@ class Uploads:
                 continue
             del self._under_way[upload.plan_type]
             if not upload.quiet:
-                sends.append(ack(upload.peer, mav.MAV_MISSION_OPERATION_CANCELLED, upload.plan_type))
+                why = f"item {len(upload.items)} of {upload.count} did not arrive"
+                sends.append(self._refuse(upload.peer, mav.MAV_MISSION_OPERATION_CANCELLED, upload.plan_type, why))
         self._schedule()
         return sends
 
@@ -173,9 +181,23 @@ class Uploads:
         return send
 
     def _complete(self, upload: _Upload, now_us: int) -> Send:
-        result = self._rules[upload.plan_type].check_plan(upload.items)
+        result, seq = self._rules[upload.plan_type].check_plan(upload.items)
+        if result != ACCEPTED:
+            self._blame(upload, seq, fault_of(upload.items[seq], result))
         plan_id = self._store(upload.plan_type, upload.items).id if result == ACCEPTED else 0
         return self._end(upload, result, plan_id, now_us)
+
+    def take_reason(self) -> str:
+        """Return why something was refused since the last call; empty if nothing was."""
+        reason, self._reason = self._reason, ""
+        return reason
+
+    def _blame(self, upload: _Upload, seq: int, fault: str) -> None:
+        self._reason = f"{plan_name(upload.plan_type)} item {seq}: {fault}"
+
+    def _refuse(self, peer: Peer, result: int, plan_type: int, why: str) -> Send:
+        self._reason = f"{plan_name(plan_type)} refused: {why}"
+        return ack(peer, result, plan_type)
 
     def _end(self, upload: _Upload, result: int, plan_id: int, now_us: int) -> Send:
         self.drop(upload.peer, (upload.plan_type,))

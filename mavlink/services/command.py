@@ -6,7 +6,7 @@ from math import nan
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
-from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
+from colibri.mavlink.services.statustext import ERROR, INFO, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -18,6 +18,9 @@ FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 UNSUPPORTED_MAV_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects."""
+
+_SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}
+"""Others are warnings; of what is not supported ground stations ask by themselves."""
 
 PENDING = Refusal(result=-1)
 """Result of a command that takes a few frames: its sender gets the answer with `finish`."""
@@ -83,6 +86,12 @@ class _Answered(NamedTuple):
     refusal: Refusal | None
 
 
+def command_name(number: int) -> str:
+    """Return the name of a MAV_CMD without its prefix, and its number."""
+    definition = mav.enums["MAV_CMD"].get(number)
+    return f"{definition.name.removeprefix('MAV_CMD_')} ({number})" if definition else f"command {number}"
+
+
 class CommandService:
     """Passes commands to their handlers and acknowledges each to its sender; denies all while `closed` for a reason."""
 
@@ -106,12 +115,12 @@ class CommandService:
             return [_ack(fields.command, peer, DENIED), *self._reason(Refusal(self.closed), now_us)]
         handler = self._handlers.get(fields.command)
         if handler is None:
-            return [_ack(fields.command, peer, UNSUPPORTED)]
+            return self._refused(fields.command, peer, UNSUPPORTED, "is not supported", now_us)
         if message.name == "COMMAND_LONG":
             return self._obey(handler, _from_long(fields, peer, now_us), fields.confirmation)
         goes_to_a_place = _goes_to_a_place(fields.command)
         if goes_to_a_place and fields.frame not in PLACES:
-            return [_ack(fields.command, peer, UNSUPPORTED_MAV_FRAME)]
+            return self._refused(fields.command, peer, UNSUPPORTED_MAV_FRAME, f"in frame {fields.frame}", now_us)
         return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -136,13 +145,16 @@ class CommandService:
         now_us = running.command.now_us
         return [self._answered_with(running.command, 0, refusal, now_us), *self._reason(refusal, now_us)]
 
+    def _refused(self, number: int, peer: Peer, result: int, why: str, now_us: int) -> list[Send]:
+        return [_ack(number, peer, result), *self._reason(Refusal(f"{command_name(number)} {why}", result), now_us)]
+
     def _obey(self, handler: Handler, command: ReceivedCommand, confirmation: int) -> list[Send]:
         """Execute a command unless it is a repetition after a lost answer, or another is in progress."""
         running = self._running.get(command.id)
         if running is not None:
             if running.command.peer == command.peer and _parameters(running.command) == _parameters(command):
                 return [_ack(command.id, command.peer, IN_PROGRESS)]
-            return [_ack(command.id, command.peer, TEMPORARILY_REJECTED)]
+            return self._refused(command.id, command.peer, TEMPORARILY_REJECTED, "is in progress", command.now_us)
         before = self._answered.get((command.peer, command.id))
         if before is not None and _is_sent_again(command, confirmation, before):
             return [self._answered_with(command, confirmation, before.refusal, before.at_us)]
@@ -172,7 +184,7 @@ class CommandService:
         if reason == refusal.reason and 0 <= now_us - at_us < SAME_REASON_AFTER_US:
             return []
         self._said = (refusal.reason, now_us)
-        return self._text.say(ERROR if refusal.result == FAILED else WARNING, refusal.reason)
+        return self._text.say(_SEVERITIES.get(refusal.result, WARNING), refusal.reason)
 
 
 def _goes_to_a_place(number: int) -> bool:

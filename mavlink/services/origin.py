@@ -6,13 +6,12 @@ SET_GPS_GLOBAL_ORIGIN is answered by GPS_GLOBAL_ORIGIN with the same integers, a
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from colibri.common.earth.geodesy import Geodetic, is_on_earth
+from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.node.service import Peer, Send, to_all
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
-
-_MIN_HEIGHT_MM, _MAX_HEIGHT_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
@@ -37,9 +36,10 @@ class OriginService:
         if message.name == "SET_MODE":
             return self._refused(self._setters.mode(fields.base_mode, fields.custom_mode))
         place = Geodetic(fields.latitude * 1e-7, fields.longitude * 1e-7, fields.altitude * 1e-3)
-        on_earth = is_on_earth(place.latitude_deg, place.longitude_deg)
-        if not on_earth or not _MIN_HEIGHT_MM <= fields.altitude <= _MAX_HEIGHT_MM:
-            return self._refused(Refusal("refused: not a latitude, longitude and altitude"))
+        wrong = misplaced(place.latitude_deg, place.longitude_deg) or misplaced_height(place.altitude_m)
+        if wrong:
+            subject = "home" if message.name == "SET_HOME_POSITION" else "origin"
+            return self._refused(Refusal(f"{subject} refused: {wrong}"))
         if message.name == "SET_HOME_POSITION":
             return self._refused(self._setters.home(place))
         refusal = self._setters.origin(place)

@@ -44,7 +44,7 @@ class StandardModes:
         if index == 0.0:
             return [to(command.peer, "AVAILABLE_MODES", *self._fields(number)) for number in numbers]
         if index not in numbers:
-            return Refusal()
+            return Refusal(f"AVAILABLE_MODES: index {index:g} is not within 0 to {len(self._modes)}")
         return [to(command.peer, "AVAILABLE_MODES", *self._fields(int(index)))]
 
     def monitor(self, command: ReceivedCommand) -> list[Send]:
@@ -61,4 +61,4 @@ class StandardModes:
         for mode in self._modes:
             if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
                 return self._set_mode(mode.custom_mode, command)
-        return Refusal("There is no such standard mode", FAILED)
+        return Refusal(f"standard mode {command.p1:g} is no mode of this vehicle", FAILED)

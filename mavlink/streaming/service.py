@@ -125,7 +125,8 @@ class StreamService:
         message_id, interval_us = _whole(command.p1), command.p2
         name = self._names.get(message_id)
         if name is None:
-            return Refusal(result=DENIED if self._is_known(message_id) else UNSUPPORTED)
+            result = DENIED if self._is_known(message_id) else UNSUPPORTED
+            return Refusal(f"interval refused: {_named(message_id, command.p1)} is not streamed", result)
         if interval_us == DISABLED:
             self._set(command.peer.channel, name, None, command.now_us)
         elif interval_us == DEFAULT:
@@ -134,17 +135,18 @@ class StreamService:
             whole_us = max(MIN_INTERVAL_US, round(interval_us))
             self._set(command.peer.channel, name, whole_us, command.now_us)
         else:
-            return Refusal()
+            return Refusal(f"interval of {name} refused: {interval_us:g} is not within 1 to {MAX_INTERVAL_US} us")
         return None
 
     def _get_message_interval(self, command: ReceivedCommand) -> Refusal | None:
-        return self._report_interval(_whole(command.p1), command.peer)
+        return self._report_interval(command.p1, command.peer)
 
     def _interval_requested(self, command: ReceivedCommand) -> list[Send] | Refusal:
-        return self._report_interval(_whole(command.p2), command.peer) or []
+        return self._report_interval(command.p2, command.peer) or []
 
-    def _report_interval(self, message_id: int, peer: Peer) -> Refusal | None:
+    def _report_interval(self, asked: float, peer: Peer) -> Refusal | None:
         """Send MESSAGE_INTERVAL; -1 if the message is not streamed."""
+        message_id = _whole(asked)
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
             interval_us = HEARTBEAT_US
         elif message_id in self._names:
@@ -152,7 +154,7 @@ class StreamService:
         elif self._is_known(message_id):
             interval_us = -1
         else:
-            return Refusal(result=UNSUPPORTED)
+            return Refusal(f"interval refused: {_named(message_id, asked)} is not streamed", UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 
     def _request_message(self, command: ReceivedCommand) -> Refusal | None:
@@ -169,13 +171,13 @@ class StreamService:
             return answer if isinstance(answer, Refusal) else self._post(answer)
         name = self._names.get(message_id)
         if name is None:
-            return Refusal(result=UNSUPPORTED)
+            return Refusal(f"request refused: {_named(message_id, command.p1)} is not sent", UNSUPPORTED)
         sends = [to(command.peer, name, *fields) for fields in self._encode(name)]
-        return self._post(sends) if sends else Refusal(result=TEMPORARILY_REJECTED)
+        return self._post(sends) if sends else Refusal(f"{name} is not known yet", TEMPORARILY_REJECTED)
 
     def _post(self, sends: list[Send]) -> Refusal | None:
         if len(self._waiting) + len(sends) > MAX_WAITING:
-            return Refusal(result=TEMPORARILY_REJECTED)
+            return Refusal(f"{len(self._waiting)} requested messages wait: ask again", TEMPORARILY_REJECTED)
         self._waiting.extend(sends)
         return None
 
@@ -212,6 +214,11 @@ def _message_id(name: str) -> int:
     """Return the id of a message; -2, which cannot be requested, if the dialect lacks it."""
     number: int = getattr(mav, f"MAVLINK_MSG_ID_{name}", -2)
     return number
+
+
+def _named(message_id: int, asked: float) -> str:
+    definition = mav.mavlink_map.get(message_id)
+    return f"message {asked:g}" if definition is None else f"{definition.msgname} ({message_id})"
 
 
 def _whole(number: float) -> int:

@@ -79,7 +79,7 @@ class Cockpit:
         self.pilot = Pilot(planned_at, behaviour, self.tasks.begin, self.home, self.lines)
         self.unmet: tuple[Need, ...] = (Need.CIRCLE,)
         self.engaged: list[tuple[Peer, int]] = []
-        self.commands = Commands(self.pilot, self.fence, self)
+        self.commands = Commands(self.pilot, self.fence, self.missions, self)
         self.now_us = 0
         self.state = at(place)
         self.steered: ClientInputs = NOT_STEERED
@@ -87,8 +87,8 @@ class Cockpit:
         self.pilot.begin(0, self.state, mode=mode)
         self.stock()
 
-    def missing(self) -> tuple[Need, ...]:
-        return self.unmet
+    def missing(self) -> dict[Need, str]:
+        return {need: need.value for need in self.unmet}
 
     def engage(self, peer: Peer, now_us: int) -> None:
         self.engaged.append((peer, now_us))

@@ -15,7 +15,7 @@ from colibri.mavlink.wire.refusal import Refusal
 VEHICLE = (1, 1)
 FIRST = Peer(0, 255, 190)
 SECOND = Peer(1, 255, 190)
-VALID = Rules(lambda _: ACCEPTED, lambda _: ACCEPTED)
+VALID = Rules(lambda _: ACCEPTED, lambda _: (ACCEPTED, 0))
 
 
 def some_item(number: int = 0, **changes: Any) -> MissionItem:

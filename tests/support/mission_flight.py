@@ -4,7 +4,7 @@ from math import atan2, cos, dist, nan, sin, tau
 
 from hypothesis import strategies as st
 
-from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, MissionExecutor, Reached, SetHome
+from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, Circling, MissionExecutor, Reached, SetHome
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, SKIPPED
 from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Orbit, Order, Return, TakeOff
@@ -45,6 +45,7 @@ class Flight:
         self.now_us = 0
         self.orders: list[Order] = []
         self.reached: list[int] = []
+        self.circling: list[int] = []
         self.homes: list[Vector | None] = []
         self.speeds: list[float] = []
 
@@ -61,6 +62,7 @@ class Flight:
         step = self.mission.step(mission_context, self.now_us)
         assert step.flying == (self.mission.progress.state == ACTIVE)
         self.reached += [event.seq for event in step.events if isinstance(event, Reached)]
+        self.circling += [event.seq for event in step.events if isinstance(event, Circling)]
         self.homes += [event.position_enu_m for event in step.events if isinstance(event, SetHome)]
         if not self.orders or self.orders[-1] is not step.order:
             self.orders.append(step.order)

@@ -140,8 +140,8 @@ def _take_off(flight: SteppedFlight[Copter]) -> None:
     while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
         flight.step()
         assert plant.world.time_us < _MAX_DURATION_S * 1e6, "it must be ready to arm"
-    copter.pilot.select(Mode.TAKEOFF, ())
-    copter.pilot.arm(())
+    copter.pilot.select(Mode.TAKEOFF, {})
+    copter.pilot.arm({})
     began_us = plant.world.time_us
     while copter.pilot.state.mode is not Mode.HOLD:
         flight.step()

@@ -3,6 +3,7 @@
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.mavlink.services.statustext import EMERGENCY
+from colibri.mavlink.wire.refusal import Refusal
 
 
 class Readiness:
@@ -16,6 +17,9 @@ class Readiness:
 
     def update(self, inputs: ArmingInputs) -> None:
         self._inputs = inputs
+
+    def judge_fence(self, outside: Refusal | None) -> None:
+        self._inputs = self._inputs._replace(outside_fence=outside)
 
     def refusals(self) -> list[str]:
         return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error))]

@@ -1,6 +1,6 @@
 """Flight modes as two tables; source of `docs/modes.md`. Custom modes are PX4's: main << 16 | sub << 24."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from enum import Enum, StrEnum
 from typing import NamedTuple
 
@@ -32,6 +32,7 @@ class Need(Enum):
     STICKS = "no MANUAL_CONTROL received"
     SETPOINTS = "no offboard setpoints received: send them before the mode"
     MISSION = "there is no mission"
+    WITHIN_REACH = "the mission leads too far away"
     INSIDE_FENCE = "the mission leads outside the geofence"
     ABOVE_GROUND = "the mission leads below the ground"
     CHECKED = "the mission is being compared with the geofence: try again"
@@ -106,7 +107,7 @@ MODES: tuple[ModeRow, ...] = (
         AUTO,
         5,
         (Need.POSITION,),
-        "climbs, flies home and lands",
+        "climbs, flies to the nearest of home and rally points, and lands",
         mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
         to_arm=False,
     ),
@@ -114,7 +115,7 @@ MODES: tuple[ModeRow, ...] = (
         Mode.MISSION,
         AUTO,
         4,
-        (Need.MISSION, Need.INSIDE_FENCE, Need.ABOVE_GROUND, Need.POSITION),
+        (Need.MISSION, Need.WITHIN_REACH, Need.INSIDE_FENCE, Need.ABOVE_GROUND, Need.POSITION),
         "flies the uploaded mission",
         mav.MAV_STANDARD_MODE_MISSION,
     ),
@@ -173,7 +174,7 @@ class State(NamedTuple):
 FIRST = State(Mode.HOLD, armed=False)
 
 
-def next_state(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
+def next_state(state: State, event: Event, selected: Mode | None, missing: Mapping[Need, str]) -> State | Refusal:
     for row in TRANSITIONS:
         if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
             break
@@ -183,11 +184,11 @@ def next_state(state: State, event: Event, selected: Mode | None, missing: Colle
     if event is Event.SELECT and (state.armed or not ROWS[mode].selectable):
         need = first_missing(mode, missing)
         if need is not None:
-            return Refusal(f"{mode} refused: {need.value}")
+            return Refusal(f"{mode} refused: {missing[need]}")
     if event is Event.ARM:
         need = first_missing(mode, missing)
         if need is not None or not ROWS[mode].to_arm:
-            return Refusal(f"not armed in {mode}: {need.value if need else 'choose another mode first'}")
+            return Refusal(f"not armed in {mode}: {missing[need] if need else 'choose another mode first'}")
     armed = event is Event.ARM or (state.armed and not row.disarms)
     return State(mode, armed)
 

@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, or
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.mission.service import MissionProgress
+from colibri.mavlink.services.command import FAILED
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -25,6 +26,8 @@ MAX_ITEMS_A_STEP = 16
 """Maximum of items started in a step."""
 REST_US = 1_000_000
 """Delay between jumps of a mission without flight between them."""
+CIRCLING_AFTER = 3
+"""Jumps without flight between them."""
 _HOLD = Hold()
 _DEFAULTS = Defaults()
 _FLYING, _SUSPENDED = 1, 2
@@ -42,7 +45,13 @@ class SetHome(NamedTuple):
     position_enu_m: Vector | None
 
 
-MissionEvent: TypeAlias = Reached | SetHome
+class Circling(NamedTuple):
+    """Jumps lead in a circle, with nothing flown between; the vehicle holds."""
+
+    seq: int
+
+
+MissionEvent: TypeAlias = Reached | SetHome | Circling
 
 
 class MissionStep(NamedTuple):
@@ -61,7 +70,7 @@ class MissionRecord(NamedTuple):
         mission_context: At the start of the item, like `defaults` and `order_before`.
         phases: Remaining phases of the item.
         fresh: Whether the phase began in the last step.
-        jumped: Whether there was no flight since the last jump.
+        jumped: Number of jumps since the last flight.
     """
 
     seq: int
@@ -75,7 +84,7 @@ class MissionRecord(NamedTuple):
     phases: int
     since_us: int
     fresh: bool
-    jumped: bool
+    jumped: int
     rest_until_us: int
 
 
@@ -93,7 +102,8 @@ class MissionExecutor:
         self._context: ItemContext | None = None
         self._since_us = 0
         self._fresh = True
-        self._jumped = False
+        self._jumped = 0
+        self._chosen = False  # the item of a complete mission, by a command
         self._rest_until_us = 0
         self.load(items)
 
@@ -112,8 +122,9 @@ class MissionExecutor:
         if not self.items:
             return Refusal("mission: there is none")
         if self.progress.state == COMPLETE:
+            seq = self.progress.seq if self._chosen else 0
             self._reset()
-            self._show(0, ACTIVE)
+            self._show(seq, ACTIVE)
         elif not self.active:
             self._leave()
             self._order = _HOLD
@@ -135,16 +146,18 @@ class MissionExecutor:
         return (Reached(seq),)
 
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` resets the jumps."""
+        """Go to an item, -1 for the current one; `reset` resets the jumps, and pauses a complete mission."""
         if not self.items:
-            return Refusal("mission: there is none")
+            return Refusal("mission: there is none", FAILED)
         seq = self.progress.seq if seq == -1 else seq
         if not 0 <= seq < len(self.items):
-            return Refusal(f"mission: there is no item {seq}")
+            return Refusal(f"mission: item {seq} is not within 0 to {len(self.items) - 1}", FAILED)
         if reset:
             self._jumps.clear()
         self._leave()
-        self._show(seq, PAUSED if self.progress.state == COMPLETE else self.progress.state)
+        state = self.progress.state
+        self._chosen = state == COMPLETE and not reset
+        self._show(seq, PAUSED if reset and state == COMPLETE else state)
         return None
 
     def step(self, mission_context: MissionContext, now_us: int) -> MissionStep:
@@ -203,7 +216,7 @@ class MissionExecutor:
             phase = self._phases[0]
             seen = mission_context._replace(arrived=False, turns=0.0) if self._fresh else mission_context
             if not phase.ends(seen, (now_us - self._since_us) * 1e-6):
-                self._fresh = self._jumped = False
+                self._fresh, self._jumped = False, 0
                 return False
             if phase.reaches:
                 events.append(Reached(seq))
@@ -229,11 +242,11 @@ class MissionExecutor:
         elif item.command == mav.MAV_CMD_DO_SET_HOME:
             here = item.p1 == 1.0
             events.append(SetHome(None if here else place_of(item, mission_context.home_enu_m, mission_context.origin)))
-        elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us):
+        elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us, events):
             return
         self._advance()
 
-    def _jump(self, item: MissionItem, now_us: int) -> bool:
+    def _jump(self, item: MissionItem, now_us: int, events: list[MissionEvent]) -> bool:
         seq = self.progress.seq
         left = self._jumps.get(seq, int(item.p2))
         if left == 0:
@@ -243,7 +256,9 @@ class MissionExecutor:
         self._show(int(item.p1), ACTIVE)
         if self._jumped:
             self._rest_until_us = now_us + REST_US
-        self._jumped = True
+        self._jumped += 1
+        if self._jumped == CIRCLING_AFTER:
+            events.append(Circling(seq))
         return True
 
     def _advance(self) -> None:
@@ -261,6 +276,7 @@ class MissionExecutor:
     def _reset(self) -> None:
         self._leave()
         self._jumps.clear()
+        self._jumped, self._chosen = 0, False
         self._speed_m_s = None
         self._order = _HOLD
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.guidance.mission.items import MAX_DISTANCE_M, check_place
+from colibri.autopilot.guidance.mission.items import check_place
 from colibri.common.earth.compiled_geodesy import enu_of
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Array, Vector
@@ -19,6 +19,7 @@ from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import MAX_DISTANCE_M
 from colibri.mavlink.wire.refusal import Refusal
 
 RETURN_POINT: int = mav.MAV_CMD_NAV_FENCE_RETURN_POINT
@@ -45,18 +46,20 @@ def check_fence_item(item: MissionItem) -> int:
         return int(mav.MAV_MISSION_INVALID_PARAM1)
     if item.command in INCLUSIONS and not (isnan(item.p2) or isfinite(item.p2)):
         return int(mav.MAV_MISSION_INVALID_PARAM2)
-    return check_place(item)
+    return ACCEPTED if _is_ignored(item) else check_place(item)
 
 
-def check_fence(items: Sequence[MissionItem]) -> int:
+def check_fence(items: Sequence[MissionItem]) -> tuple[int, int]:
     """Check that polygons are complete, of one kind and group."""
+    seq = 0
     for vertices in _zones(items):
         first = vertices[0]
         if len(vertices) < _length(first) or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
-            return int(mav.MAV_MISSION_INVALID_PARAM1)
+            return int(mav.MAV_MISSION_INVALID_PARAM1), seq
         if first.command == POLYGONS[0] and any(_group(v) != _group(first) for v in vertices):
-            return int(mav.MAV_MISSION_INVALID_PARAM2)
-    return ACCEPTED
+            return int(mav.MAV_MISSION_INVALID_PARAM2), seq
+        seq += len(vertices)
+    return ACCEPTED, 0
 
 
 FENCE_RULES = Rules(check_fence_item, check_fence)

@@ -8,18 +8,13 @@ from math import isfinite, isnan
 from typing import NamedTuple, TypeAlias
 
 from colibri.common.earth.compiled_geodesy import enu_of
-from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic
+from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
-
-MAX_HEIGHT_M = 10_000.0
-MAX_DISTANCE_M = 100_000.0
-
-_ABOVE_SEA = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
-"""Altitudes of the other global frames are above home, even above-terrain ones, without a terrain map."""
+from colibri.mavlink.wire.places import MAX_DISTANCE_M, height_m, misplaced, misplaced_height
 
 _PAYLOAD = (
     "NAV_ROI CONDITION_DISTANCE DO_SET_RELAY DO_REPEAT_RELAY DO_SET_SERVO DO_REPEAT_SERVO DO_SET_ACTUATOR "
@@ -118,10 +113,11 @@ def check_item(item: MissionItem) -> int:
     return check_height(item) if allowed.height else ACCEPTED
 
 
-def check_mission(items: Sequence[MissionItem]) -> int:
+def check_mission(items: Sequence[MissionItem]) -> tuple[int, int]:
     """Check that jumps stay inside."""
-    outside = any(item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items) for item in items)
-    return int(mav.MAV_MISSION_INVALID_PARAM1 if outside else ACCEPTED)
+    jumps = (seq for seq, item in enumerate(items) if item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items))
+    outside = next(jumps, None)
+    return (ACCEPTED, 0) if outside is None else (int(mav.MAV_MISSION_INVALID_PARAM1), outside)
 
 
 def check_rally_item(item: MissionItem) -> int:
@@ -133,13 +129,14 @@ def check_rally_item(item: MissionItem) -> int:
 
 
 def check_place(item: MissionItem) -> int:
-    if abs(item.x * DEGREES) > MAX_LATITUDE_DEG:
-        return int(mav.MAV_MISSION_INVALID_PARAM5_X)
-    return int(mav.MAV_MISSION_INVALID_PARAM6_Y if abs(item.y * DEGREES) > MAX_LONGITUDE_DEG else ACCEPTED)
+    if not misplaced(item.x * DEGREES, item.y * DEGREES):
+        return ACCEPTED
+    on_earth = abs(item.x * DEGREES) <= MAX_LATITUDE_DEG and (item.x or item.y)
+    return int(mav.MAV_MISSION_INVALID_PARAM6_Y if on_earth else mav.MAV_MISSION_INVALID_PARAM5_X)
 
 
 def check_height(item: MissionItem) -> int:
-    return int(ACCEPTED if abs(item.z) <= MAX_HEIGHT_M else mav.MAV_MISSION_INVALID_PARAM7)
+    return int(mav.MAV_MISSION_INVALID_PARAM7 if misplaced_height(item.z) else ACCEPTED)
 
 
 def is_here(item: MissionItem) -> bool:
@@ -157,14 +154,14 @@ def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
     """Return the height of an item, z of ENU, m; by default home's."""
     if not isfinite(item.z):
         return home_enu_m[2]
-    return item.z - origin.altitude_m if item.frame in _ABOVE_SEA else home_enu_m[2] + item.z
+    return height_m(item.z, item.frame, home_enu_m[2], origin)
 
 
 def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
     """Yield sequence number and place, m, ENU, of destinations."""
     for seq, item in enumerate(items):
         allowed = _ALLOWED.get(item.command)
-        if allowed is None or not allowed.place:
+        if allowed is None or not (allowed.place or (item.command == mav.MAV_CMD_DO_SET_HOME and item.p1 != 1.0)):
             continue
         if not (allowed.here and is_here(item)):
             yield seq, place_of(item, home_enu_m, origin)
@@ -172,5 +169,10 @@ def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -
             yield seq, (home_enu_m[0], home_enu_m[1], height_of(item, home_enu_m, origin))
 
 
+def rally_places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
+    """Yield sequence number and place, m, ENU, of rally points."""
+    return ((seq, place_of(item, home_enu_m, origin)) for seq, item in enumerate(items))
+
+
 MISSION_RULES = Rules(check_item, check_mission)
-RALLY_RULES = Rules(check_rally_item, lambda _: ACCEPTED)
+RALLY_RULES = Rules(check_rally_item, lambda _: (ACCEPTED, 0))

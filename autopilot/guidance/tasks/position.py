@@ -29,6 +29,8 @@ _THERE_M, _THERE_M_S = 0.3, 0.5
 """Distance and speed at arrival; the reference settles the rest."""
 _REST_M_S = 0.05
 _REST_RAD_S = 0.05
+_BELOW_FENCE = 0.9
+"""Part of the height fence that a return climbs to."""
 _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
 """Descent speed per height, down to the landing speed at this height."""
 
@@ -212,13 +214,16 @@ def landing(order: Land) -> TaskSequence:
     )
 
 
-def homeward(context: TaskContext) -> TaskSequence:
-    """Climb if home is far, fly there, land; the geofence does not restrict a return."""
-    x, y, z = context.home_enu_m
+def homeward(context: TaskContext, place: Vector) -> TaskSequence:
+    """Climb if home or a rally point is far, fly there, land; of the fence only the height restricts a return."""
+    x, y, z = place
+    behaviour, home_m = context.behaviour, context.home_enu_m[2]
     down = landing(Land((x, y, z)))
-    if hypot(x - context.place[0], y - context.place[1]) <= context.behaviour.return_radius_m:
+    if hypot(x - context.place[0], y - context.place[1]) <= behaviour.return_radius_m:
         return down
-    high_m = z + context.behaviour.return_height_m
+    high_m = max(home_m + behaviour.return_height_m, z)
+    if behaviour.max_height_m > 0.0:
+        high_m = min(high_m, home_m + _BELOW_FENCE * behaviour.max_height_m)
     return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), lambda _: down)
 
 

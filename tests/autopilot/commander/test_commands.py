@@ -55,7 +55,7 @@ def standing() -> Cockpit:
     ],
 )
 def test_a_command_changes_the_mode(flying: Cockpit, command: str, params: tuple[float, ...], mode: Mode) -> None:
-    flying.pilot.select(Mode.OFFBOARD, ())
+    flying.pilot.select(Mode.OFFBOARD, {})
     assert flying.do(command, *params).result == ACCEPTED
     assert flying.pilot.state == State(mode, armed=True)
 
@@ -208,7 +208,7 @@ def test_home_here_there_and_too_far_away(flying: Cockpit) -> None:
     assert flying.home.position_enu_m == pytest.approx((5.0, 6.0, 1.0), abs=0.01)
     assert flying.home.chosen
     far = Geodetic(there.latitude_deg + 5.0, there.longitude_deg, altitude_m)
-    assert flying.commands.move_home(far) == Refusal("home refused: too far away")
+    assert flying.commands.move_home(far) == Refusal("home refused: 556 km away, more than 100")
 
 
 @pytest.mark.parametrize("command", ["DO_REPOSITION", "DO_ORBIT"])

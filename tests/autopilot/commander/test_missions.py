@@ -2,10 +2,11 @@
 
 import pytest
 
-from colibri.autopilot.commander.rules.modes import FIRST, Mode, State
+from colibri.autopilot.commander.rules.modes import FIRST, Mode, Need, State
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
+from colibri.mavlink.services.command import FAILED
 from colibri.mavlink.wire.refusal import Refusal
 from tests.support.cockpit import FLYING, Cockpit, item
 
@@ -14,11 +15,11 @@ PLAN = (item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)), item("NAV_WAYPOINT", place
 
 def test_a_mission_is_flown_item_after_item_and_then_held() -> None:
     cockpit = Cockpit(FLYING)
-    assert not cockpit.missions.has_mission
+    assert not cockpit.missions.total
     cockpit.load(MISSION, *PLAN)
     assert cockpit.said("mission of 2 items")
-    assert (cockpit.missions.has_mission, cockpit.missions.progress().state) == (True, NOT_STARTED)
-    assert cockpit.pilot.select(Mode.MISSION, ()) is None
+    assert (bool(cockpit.missions.total), cockpit.missions.progress().state) == (True, NOT_STARTED)
+    assert cockpit.pilot.select(Mode.MISSION, {}) is None
     cockpit.step()
     assert cockpit.missions.progress().state == ACTIVE
     cockpit.fly_for(15.0)
@@ -33,12 +34,12 @@ def test_a_mission_is_flown_item_after_item_and_then_held() -> None:
 def test_another_mode_pauses_it_and_it_goes_on_where_it_was() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(MISSION, *PLAN)
-    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.pilot.select(Mode.MISSION, {})
     cockpit.fly_for(1.0)
-    cockpit.pilot.select(Mode.HOLD, ())
+    cockpit.pilot.select(Mode.HOLD, {})
     cockpit.step()
     assert cockpit.missions.progress().state == PAUSED
-    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.pilot.select(Mode.MISSION, {})
     cockpit.fly_for(15.0)
     assert cockpit.missions.progress().state == COMPLETE
 
@@ -46,7 +47,7 @@ def test_another_mode_pauses_it_and_it_goes_on_where_it_was() -> None:
 def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(MISSION, PLAN[0], item("NAV_RETURN_TO_LAUNCH"))
-    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.pilot.select(Mode.MISSION, {})
     cockpit.fly_for(8.0)
     assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
     assert cockpit.said("return item reached: return")
@@ -59,7 +60,7 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
 def test_a_mission_moves_home() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(MISSION, item("DO_SET_HOME", 1.0), PLAN[0])
-    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.pilot.select(Mode.MISSION, {})
     cockpit.step(2)
     assert cockpit.home.position_enu_m == pytest.approx(FLYING, abs=0.01)
     assert cockpit.home.chosen
@@ -69,25 +70,25 @@ def test_an_item_outside_the_fence_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
     cockpit.load(MISSION, PLAN[0], item("NAV_WAYPOINT", place=(9.0, 0.0, 10.0)))
-    assert cockpit.missions.outside
+    assert Need.INSIDE_FENCE in cockpit.missions.unmet
     assert cockpit.said("item 1 of the mission: outside the geofence")
     cockpit.missions.moved_origin()
     assert not cockpit.said("item 1")
     cockpit.load(FENCE)
-    assert not cockpit.missions.outside
+    assert Need.INSIDE_FENCE not in cockpit.missions.unmet
 
 
 def test_an_item_below_the_ground_blocks_the_mission() -> None:
     cockpit = Cockpit(FLYING)
     low, high = item("NAV_WAYPOINT", place=(9.0, 0.0, -4.0)), item("NAV_WAYPOINT", place=(9.0, 0.0, 0.0))
     cockpit.load(MISSION, PLAN[0], high, low)
-    assert cockpit.missions.below
+    assert Need.ABOVE_GROUND in cockpit.missions.unmet
     assert cockpit.said("item 2 of the mission: 4.0 m below the ground")
     cockpit.load(MISSION, PLAN[0], high, item("NAV_LAND", place=(9.0, 0.0, -4.0)))
-    assert not cockpit.missions.below
+    assert Need.ABOVE_GROUND not in cockpit.missions.unmet
     cockpit.home.move((0.0, 0.0, -4.0), 0.0)
     cockpit.load(MISSION, high)
-    assert not cockpit.missions.below, "as low as home"
+    assert Need.ABOVE_GROUND not in cockpit.missions.unmet, "as low as home"
 
 
 def test_the_home_fence_follows_home_and_parameters() -> None:
@@ -112,7 +113,7 @@ def test_a_breach_is_judged_ten_times_a_second() -> None:
 def test_plans_that_were_kept_go_on_where_the_mission_stood() -> None:
     before = Cockpit(FLYING)
     before.load(MISSION, *PLAN)
-    before.pilot.select(Mode.MISSION, ())
+    before.pilot.select(Mode.MISSION, {})
     before.fly_for(4.0)
     record = before.missions.record()
     plans = {RALLY: plan_of(()), FENCE: plan_of(()), MISSION: plan_of(PLAN)}
@@ -130,7 +131,7 @@ def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     for plan_type in (MISSION, FENCE, RALLY):
         cockpit.load(plan_type)
     assert cockpit.missions.changes == 3
-    assert cockpit.missions.set_current(0, False) == Refusal("mission: there is none")
+    assert cockpit.missions.set_current(0, False) == Refusal("mission: there is none", FAILED)
     cockpit.load(MISSION, *PLAN)
     assert cockpit.missions.set_current(1, False) is None
     assert cockpit.missions.progress().seq == 1

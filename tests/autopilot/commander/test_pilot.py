@@ -41,9 +41,9 @@ def flying() -> Cockpit:
 
 @pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
 def test_a_refused_mode_leaves_the_flight_as_it_is(flying: Cockpit, mode: Mode, need: Need) -> None:
-    flying.pilot.select(Mode.LAND, ())
+    flying.pilot.select(Mode.LAND, {})
     task = flying.pilot.task
-    refusal = flying.pilot.select(mode, (need,))
+    refusal = flying.pilot.select(mode, {need: need.value})
     assert refusal is not None
     assert refusal.reason == f"{mode} refused: {need.value}"
     assert flying.pilot.state == State(Mode.LAND, armed=True)
@@ -54,7 +54,7 @@ def test_a_refused_mode_leaves_the_flight_as_it_is(flying: Cockpit, mode: Mode, 
 @pytest.mark.parametrize("action", LEADS)
 def test_a_failsafe_action_sets_its_mode_from_any_mode(action: Action, mode: Mode) -> None:
     cockpit = in_the_air()
-    cockpit.pilot.select(mode, ())
+    cockpit.pilot.select(mode, {})
     cockpit.pilot.save(action)
     if action is Action.TERMINATE:
         assert cockpit.pilot.state == FIRST
@@ -63,7 +63,7 @@ def test_a_failsafe_action_sets_its_mode_from_any_mode(action: Action, mode: Mod
     assert cockpit.pilot.state == State(LEADS[action], armed=True)
     assert cockpit.pilot.saving is action
     assert cockpit.pilot.context().blind is (action is Action.DESCEND)
-    assert cockpit.pilot.select(Mode.HOLD, ()) is None
+    assert cockpit.pilot.select(Mode.HOLD, {}) is None
     assert cockpit.pilot.saving is Action.NONE
 
 
@@ -71,15 +71,15 @@ def test_a_failsafe_action_sets_its_mode_from_any_mode(action: Action, mode: Mod
 def test_a_missing_need_other_than_position_prevents_arming(mode: Mode, need: Need) -> None:
     cockpit = Cockpit()
     cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
-    cockpit.pilot.select(mode, ())
-    armed = cockpit.pilot.arm((need,)) is None
+    cockpit.pilot.select(mode, {})
+    armed = cockpit.pilot.arm({need: need.value}) is None
     assert armed is (ROWS[mode].to_arm and need is Need.POSITION)
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_a_flying_vehicle_is_disarmed_by_force_alone(mode: Mode) -> None:
     cockpit = in_the_air()
-    cockpit.pilot.select(mode, ())
+    cockpit.pilot.select(mode, {})
     refusal = cockpit.pilot.disarm()
     assert refusal is not None
     assert refusal.reason == "not disarmed: the vehicle is flying"
@@ -90,8 +90,8 @@ def test_a_flying_vehicle_is_disarmed_by_force_alone(mode: Mode) -> None:
 
 def test_a_takeoff_climbs_and_holds() -> None:
     cockpit = Cockpit()
-    assert cockpit.pilot.select(Mode.TAKEOFF, ()) is None
-    assert cockpit.pilot.arm(()) is None
+    assert cockpit.pilot.select(Mode.TAKEOFF, {}) is None
+    assert cockpit.pilot.arm({}) is None
     cockpit.step()
     assert cockpit.guidance.begins
     assert not cockpit.pilot.ground.standing
@@ -104,7 +104,7 @@ def test_a_takeoff_climbs_and_holds() -> None:
 
 def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
     cockpit = Cockpit((0.0, 0.0, 3.0))
-    assert cockpit.pilot.select(Mode.LAND, ()) is None
+    assert cockpit.pilot.select(Mode.LAND, {}) is None
     cockpit.fly_for(11.0)
     assert cockpit.pilot.ground.standing
     assert cockpit.pilot.state == FIRST
@@ -114,7 +114,7 @@ def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
 
 def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
     cockpit = Cockpit(behaviour=Behaviour(disarm_on_ground_s=1.0))
-    assert cockpit.pilot.arm(()) is None
+    assert cockpit.pilot.arm({}) is None
     cockpit.fly_for(0.9)
     assert cockpit.pilot.state.armed
     cockpit.fly_for(0.2)
@@ -126,11 +126,11 @@ def test_home_is_set_at_arming_unless_it_was_chosen() -> None:
     cockpit = Cockpit()
     cockpit.state = at((3.0, 4.0, 0.0), yaw_rad=1.0)
     cockpit.step()
-    cockpit.pilot.arm(())
+    cockpit.pilot.arm({})
     assert (cockpit.home.position_enu_m, cockpit.home.yaw_rad) == ((3.0, 4.0, 0.0), 1.0)
     cockpit.pilot.disarm()
     cockpit.home.move((1.0, 1.0, 0.0), 0.5)
-    cockpit.pilot.arm(())
+    cockpit.pilot.arm({})
     assert (cockpit.home.position_enu_m, cockpit.home.yaw_rad) == ((1.0, 1.0, 0.0), 0.5)
 
 
@@ -138,11 +138,11 @@ def test_home_is_set_at_arming_unless_it_was_chosen() -> None:
 def test_a_failed_rotor_prevents_mode_changes_and_arming(mode: Mode) -> None:
     cockpit = in_the_air()
     cockpit.pilot.readiness.lose_rotor(2)
-    refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, HoldTask(), ())
+    refusal = cockpit.pilot.select(mode, {}) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, HoldTask(), {})
     assert refusal is not None
     assert refusal.reason == f"{mode} refused: rotor 3 failed"
     cockpit.pilot.disarm(force=True)
-    assert cockpit.pilot.arm((), force=True) is not None
+    assert cockpit.pilot.arm({}, force=True) is not None
     cockpit.pilot.adopt(replace(cockpit.pilot.behaviour, land_on_three=False))
     assert cockpit.pilot.readiness.rotor_failed == ""
 
@@ -189,11 +189,11 @@ def test_whatever_comes_the_pilot_stays_of_one_mind(orders: list[Mode | Action |
 def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
     pilot = cockpit.pilot
     if isinstance(order, Mode):
-        pilot.select(order, cockpit.unmet)
+        pilot.select(order, cockpit.missing())
     elif isinstance(order, Action):
         pilot.save(order)
     elif order == "arm":
-        pilot.arm(cockpit.unmet)
+        pilot.arm(cockpit.missing())
     elif order == "lose":
         pilot.readiness.lose_rotor(0)
     elif order == "touch" and pilot.state.armed:

@@ -26,7 +26,7 @@ from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.tasks.task import ClientInputs, FlightTask
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Vector
-from colibri.mavlink.mission.items import FENCE, MISSION, plan_of
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
 from colibri.mavlink.setpoints.setpoints import PositionSetpoint, Sticks, TargetState
 from tests.support.cockpit import Cockpit, item
 
@@ -36,7 +36,7 @@ MISSION_ITEMS = (
     item("NAV_LOITER_TURNS", 0.75, 0.0, 2.0, place=(4.0, 0.0, 4.0)),
     item("NAV_LAND", place=(8.0, 0.0, 0.0)),
 )
-PLANS = {MISSION: plan_of(MISSION_ITEMS), FENCE: plan_of(())}
+PLANS = {MISSION: plan_of(MISSION_ITEMS), FENCE: plan_of(()), RALLY: plan_of(())}
 STEERED = ClientInputs(
     Sticks(pitch=0.5, roll=-0.3, thrust=0.7, yaw=0.2),
     PositionSetpoint((20.0, 5.0, 8.0)),
@@ -48,33 +48,33 @@ DATA = TypeVar("DATA")
 
 
 def go_far(cockpit: Cockpit) -> None:
-    cockpit.pilot.fly(Mode.HOLD, GoToTask(GoTo((60.0, 10.0, 12.0)), cockpit.pilot.context()), ())
+    cockpit.pilot.fly(Mode.HOLD, GoToTask(GoTo((60.0, 10.0, 12.0)), cockpit.pilot.context()), {})
 
 
 def brake(cockpit: Cockpit) -> None:
     go_far(cockpit)
     cockpit.fly_for(3.0)
-    cockpit.pilot.select(Mode.HOLD, ())
+    cockpit.pilot.select(Mode.HOLD, {})
 
 
 def take_off(cockpit: Cockpit) -> None:
     cockpit.pilot.touch_down()
-    cockpit.pilot.arm((), force=True)
-    cockpit.pilot.select(Mode.TAKEOFF, ())
+    cockpit.pilot.arm({}, force=True)
+    cockpit.pilot.select(Mode.TAKEOFF, {})
 
 
 def come_home(cockpit: Cockpit) -> None:
     go_far(cockpit)
     cockpit.fly_for(10.0)
-    cockpit.pilot.select(Mode.RETURN, ())
+    cockpit.pilot.select(Mode.RETURN, {})
 
 
 def circle(cockpit: Cockpit) -> None:
-    cockpit.pilot.fly(Mode.ORBIT, OrbitTask(Orbit((0.0, 0.0, 2.0), 2.0), cockpit.pilot.context()), ())
+    cockpit.pilot.fly(Mode.ORBIT, OrbitTask(Orbit((0.0, 0.0, 2.0), 2.0), cockpit.pilot.context()), {})
 
 
 def begins(mode: Mode) -> Callable[[Cockpit], object]:
-    return lambda cockpit: cockpit.pilot.select(mode, ())
+    return lambda cockpit: cockpit.pilot.select(mode, {})
 
 
 MIDWAY: dict[type, tuple[Callable[[Cockpit], object], float]] = {

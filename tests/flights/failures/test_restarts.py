@@ -193,7 +193,7 @@ def test_what_was_kept_of_another_flight_is_not_used(sitl: Sitl, late_us: int) -
     restart(sitl, lambda kept: kept._replace(checkpoint=kept.checkpoint._replace(time_us=moved_us)))
     sitl.run(0.1)
     assert state(sitl) == HOLDING
-    assert not sitl.inside.copter.stations.missions.has_mission
+    assert not sitl.inside.copter.stations.missions.total
 
 
 @IN_THE_AIR

@@ -133,7 +133,7 @@ def test_copies_of_answers_do_not_breed_requests() -> None:
 
 def test_a_refused_plan_names_the_item() -> None:
     no_place: int = mav.MAV_MISSION_INVALID_PARAM5_X
-    rules = Rules(lambda item: no_place if item.x == ITEMS[7].x else OK, lambda _: OK)
+    rules = Rules(lambda item: no_place if item.x == ITEMS[7].x else OK, lambda _: (OK, 0))
     rig = Rig(rules=rules)
     upload = Upload(TARGET, ITEMS, FENCE)
     assert (rig.ended(upload), upload.seq) == (no_place, 7)

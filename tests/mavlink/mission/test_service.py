@@ -200,14 +200,15 @@ def test_other_types_and_partial_lists_are_unsupported(plan_type: int) -> None:
         ("MISSION_REQUEST_LIST", (plan_type,)),
         ("MISSION_REQUEST_INT", (0, plan_type)),
     ):
-        (answer,) = ground.hear(FIRST, name, *VEHICLE, *fields)
+        answer, text = ground.hear(FIRST, name, *VEHICLE, *fields)
+        assert text.fields.text == f"{'all plans' if plan_type == 255 else f'plan type {plan_type}'} refused: not known"
         assert (answer.fields.type, answer.fields.mission_type) == (mav.MAV_MISSION_UNSUPPORTED, plan_type)
     for name in ("MISSION_WRITE_PARTIAL_LIST", "MISSION_REQUEST_PARTIAL_LIST"):
         assert results(ground.hear(FIRST, name, *VEHICLE, 0, 1, 0)) == [mav.MAV_MISSION_UNSUPPORTED]
 
 
 def test_a_refused_item_keeps_the_old_plan() -> None:
-    picky = Rules(lambda item: 9 if item.p1 == 0.5 else ACCEPTED, lambda items: 13 if len(items) == 1 else ACCEPTED)
+    picky = Rules(lambda item: 9 * (item.p1 == 0.5), lambda items: (13 * (len(items) == 1), 0))
     ground = Ground(picky)
     count(ground, 3)
     give(ground, 0, ITEMS[0])
@@ -216,8 +217,9 @@ def test_a_refused_item_keeps_the_old_plan() -> None:
     ground.poll(300_000)
     assert results(give(ground, 1, ITEMS[1])) == [9]  # its acknowledgement was lost
     count(ground, 1)
-    (answer,) = give(ground, 0, ITEMS[0])
+    answer, text = give(ground, 0, ITEMS[0])
     assert (answer.fields.type, answer.fields.opaque_id) == (13, 0)
+    assert text.fields.text == "mission item 0: NAV_WAYPOINT (16)"
     assert ground.loaded == []
 
 
@@ -355,8 +357,7 @@ def test_setting_the_current_item() -> None:
         (nan, 0.0, None),
         (inf, 0.0, None),
         (1.5, 0.0, None),
-        (-2.0, 0.0, None),
-        (1e9, 0.0, None),
+        (-2.0, 0.0, (-2, False)),  # the vehicle knows how many there are
         (1.0, 2.0, None),
     ],
 )

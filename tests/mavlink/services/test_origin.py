@@ -67,11 +67,20 @@ def test_a_refusal_is_told_in_words(received: Message) -> None:
 
 @pytest.mark.parametrize("make", [origin, home])
 @pytest.mark.parametrize(
-    "place", [(900000001, 0, 0), (0, -1800000001, 0), (-(2**31), 2**31 - 1, 0), (0, 0, 20_000_001), (0, 0, -1_000_001)]
+    ("place", "fault"),
+    [
+        ((900000001, 0, 0), "latitude 90"),
+        ((5, -1800000001, 0), "longitude -180"),
+        ((-(2**31), 2**31 - 1, 0), "latitude -214.7484"),
+        ((0, 0, 488_000), "latitude 0, longitude 0"),
+        ((5, 0, 10_000_001), "altitude 10000"),
+        ((5, 0, -10_000_001), "altitude -10000"),
+    ],
 )
-def test_what_is_no_place_is_never_handed_on(make: object, place: tuple[int, int, int]) -> None:
+def test_what_is_no_place_is_never_handed_on(make: object, place: tuple[int, int, int], fault: str) -> None:
     vehicle = Vehicle()
     assert callable(make)
-    (answer,) = vehicle.hear(make(*place))
-    assert answer.name == "STATUSTEXT"
+    text, *_ = vehicle.hear(make(*place))
+    assert text.name == "STATUSTEXT"
+    assert f"refused: {fault}" in text.fields.text
     assert vehicle.told == []

@@ -58,7 +58,7 @@ def test_every_transition_leads_where_its_row_says(row: Transition) -> None:
         if row.event is Event.ARM and not ROWS[mode].to_arm:
             continue
         selected = Mode.HOLD if row.event is Event.SELECT else None
-        after = next_state(State(mode, armed=row.event is not Event.ARM), row.event, selected, ())
+        after = next_state(State(mode, armed=row.event is not Event.ARM), row.event, selected, {})
         assert isinstance(after, State)
         expected = row.target or selected or mode
         assert after == State(expected, armed=not row.disarms)
@@ -69,7 +69,7 @@ def test_every_transition_leads_where_its_row_says(row: Transition) -> None:
 def test_events_without_a_row_are_refused(event: Event, armed: bool) -> None:
     for mode in Mode:
         rows = [row for row in TRANSITIONS if row.event is event and (not row.sources or mode in row.sources)]
-        after = next_state(State(mode, armed), event, None, ())
+        after = next_state(State(mode, armed), event, None, {})
         if not any(armed or not row.armed for row in rows):
             assert isinstance(after, Refusal)
         elif isinstance(after, State):
@@ -79,25 +79,25 @@ def test_events_without_a_row_are_refused(event: Event, armed: bool) -> None:
 
 def test_nothing_but_arming_arms() -> None:
     for mode, event, selected in product(Mode, Event, (None, *Mode)):
-        after = next_state(State(mode, armed=False), event, selected, ())
+        after = next_state(State(mode, armed=False), event, selected, {})
         assert event is Event.ARM or isinstance(after, Refusal) or not after.armed
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_a_mode_is_refused_by_its_first_missing_need(mode: Mode) -> None:
     flying = State(Mode.LAND, armed=True)
-    assert next_state(flying, Event.SELECT, mode, ()) == State(mode, armed=True)
+    assert next_state(flying, Event.SELECT, mode, {}) == State(mode, armed=True)
     for need in ROWS[mode].needs:
-        refusal = next_state(flying, Event.SELECT, mode, (need,))
+        refusal = next_state(flying, Event.SELECT, mode, {need: "why"})
         assert isinstance(refusal, Refusal)
-        assert need.value in refusal.reason
-    others = [need for need in Need if need not in ROWS[mode].needs]
+        assert "why" in refusal.reason
+    others = {need: "" for need in Need if need not in ROWS[mode].needs}
     assert next_state(flying, Event.SELECT, mode, others) == State(mode, armed=True)
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_on_the_ground_needs_hold_back_arming_and_not_the_choice(mode: Mode) -> None:
-    needs = ROWS[mode].needs
+    needs = dict.fromkeys(ROWS[mode].needs, "why")
     chosen = next_state(FIRST, Event.SELECT, mode, needs)
     assert isinstance(chosen, State) is ROWS[mode].selectable
     armed = next_state(State(mode, armed=False), Event.ARM, None, needs)

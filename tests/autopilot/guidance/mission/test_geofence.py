@@ -1,5 +1,6 @@
 """Geofences: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and the items after it."""
 
+from collections.abc import Sequence
 from math import atan2, cos, hypot, inf, nan, pi, sin
 from typing import Any
 
@@ -35,7 +36,7 @@ def polygon(command: int, vertices: list[tuple[float, float]], **changes: Any) -
 
 def fence(*items: MissionItem) -> Geofence:
     assert all(FENCE_RULES.check_item(each) == ACCEPTED for each in items)
-    assert FENCE_RULES.check_plan(items) == ACCEPTED
+    assert FENCE_RULES.check_plan(items) == (ACCEPTED, 0)
     return Geofence(items, DEFAULT_ORIGIN)
 
 
@@ -165,7 +166,10 @@ def test_items_and_why_they_are_refused(changes: dict[str, Any], result: int) ->
 
 def test_polygons_must_be_whole() -> None:
     square = polygon(IN, SQUARE)
-    check = FENCE_RULES.check_plan
+
+    def check(items: Sequence[MissionItem]) -> int:
+        return FENCE_RULES.check_plan(items)[0]
+
     assert check([*square, *polygon(OUT, HOLE), item(BACK, 0.0, 0.0)]) == ACCEPTED
     assert check(square[:3]) == mav.MAV_MISSION_INVALID_PARAM1
     assert check([*square[:3], item(DISC_IN, 0.0, 0.0, 4.0)]) == mav.MAV_MISSION_INVALID_PARAM1

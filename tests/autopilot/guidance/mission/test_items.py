@@ -93,8 +93,8 @@ def test_items_that_are_refused_and_why(refused: MissionItem, result: int) -> No
 
 def test_a_jump_out_of_the_mission_is_refused() -> None:
     jumps = [item("NAV_WAYPOINT"), item("DO_JUMP", frame=2, p1=1.0, p2=1.0)]
-    assert MISSION_RULES.check_plan(jumps) == ACCEPTED
-    assert MISSION_RULES.check_plan([jumps[0], jumps[1]._replace(p1=2.0)]) == P1
+    assert MISSION_RULES.check_plan(jumps) == (ACCEPTED, 0)
+    assert MISSION_RULES.check_plan([jumps[0], jumps[1]._replace(p1=2.0)]) == (P1, 1)
 
 
 def test_rally_points() -> None:
@@ -125,4 +125,4 @@ def test_where_items_are() -> None:
 def test_whatever_an_item_says_it_gets_an_answer(items: list[MissionItem]) -> None:
     for rules in (MISSION_RULES, FENCE_RULES, RALLY_RULES):
         valid = [each for each in items if rules.check_item(each) == ACCEPTED]
-        assert 0 <= rules.check_plan(valid) < mav.MAV_MISSION_RESULT_ENUM_END
+        assert 0 <= rules.check_plan(valid)[0] < mav.MAV_MISSION_RESULT_ENUM_END
