@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import msgspec
+
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.control.registry import factory_of
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
@@ -17,6 +19,23 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 TRACK = "spiral"
 """The default track."""
+
+
+class Trajectory(msgspec.Struct, frozen=True):
+    """Samples of a track.
+
+    Attributes:
+        name: `samples:NAME`, by which its text can be flown again.
+        text: As in a file of `samples:FILE`.
+        note: What was derived, for the user.
+    """
+
+    name: str
+    text: str
+    note: str = ""
+
+    def __str__(self) -> str:
+        return self.name
 
 
 def name_of(given: str | Profile | Vehicle) -> str:
@@ -122,7 +141,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
         ),
     ] = None
     track: Annotated[
-        str | None,
+        str | Trajectory | None,
         Option("what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)", "TRACK"),
     ] = None
     stepped: Annotated[
@@ -142,6 +161,6 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
         return bool(self.gcs or self.stepped)
 
     @property
-    def flown(self) -> str | None:
+    def flown(self) -> str | Trajectory | None:
         """The track that is flown from the start; None where ground stations say what to fly."""
         return self.track if self.served else self.track or TRACK

@@ -63,7 +63,7 @@ def setup_of(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, track_file
         delay_s=spec.delay_s,
         vehicle=name_of(spec.vehicle or profile.simulation.vehicle),
         feedback=spec.feedback,
-        track=spec.flown,
+        track=None if spec.flown is None else str(spec.flown),
         floor_m=spec.floor,
         origin=spec.home.origin,
         boot_unix_us=spec.boot_unix_us,

@@ -33,7 +33,11 @@ def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, s
         ground = _ground(spec, profile, vehicle, status, stop) if spec.served else None
         autopilot: Autopilot[Any] = ground.autopilot if ground else _alone(spec, profile, vehicle, status)
         end = _flier(spec, vehicle) if spec.simulator else _end(spec, autopilot.frame_interval_us)
-        setup = setup_of(spec, profile, vehicle, spec.flown and file_text(spec.flown)) if spec.out else None
+        setup = (
+            setup_of(spec, profile, vehicle, None if spec.flown is None else file_text(spec.flown))
+            if spec.out
+            else None
+        )
     except Error as error:
         fail(keep_failure(error, spec.out))
     log = log_in(spec.out, setup) if spec.out and setup else None

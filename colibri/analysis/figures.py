@@ -83,7 +83,7 @@ def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
 
 
 def figures_of(flown: FigureSeries, plan: FlightPlan) -> Iterator[tuple[str, Figure]]:
-    flight = f"{shortened(plan.spec.track)}, {plan.flown_by}"
+    flight = f"{shortened(str(plan.spec.track))}, {plan.flown_by}"
     yield "trajectory", draw_trajectory(flown.in_space(), f"{flight}: trajectory")
     series = flown.over_time()
     for figure in flight_figures(series, plan):

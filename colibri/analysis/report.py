@@ -34,7 +34,7 @@ def report(
     sim_time_s = float(t[-1])
     settled = error[t >= SETTLED_AFTER_S]
     return {
-        "track": plan.spec.track,
+        "track": str(plan.spec.track),
         "track_note": plan.track_note,
         "without_effect": plan.without_effect,
         "profile": plan.profile.name,

@@ -182,7 +182,8 @@ def plan_point(common: Common, point: Point) -> FlightPlan:
     plant_vehicle = whole.without(spec.without)
     if spec.link == "udp":  # its processes know neither `common` nor the keys
         spec = replace(spec, profile=profile, vehicle=vehicle, plant_vehicle=plant_vehicle)
-    return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, common.track_files.get(spec.track), whole))
+    text = common.track_files.get(spec.track) if isinstance(spec.track, str) else file_text(spec.track)
+    return FlightPlan.of(spec, Contents(profile, vehicle, plant_vehicle, text, whole))
 
 
 def _killed(point: Point, common: Common) -> FlightResult:

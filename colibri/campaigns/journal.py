@@ -91,6 +91,7 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
         "winds": {name: repr(blows) for name, blows in common.winds.items()},
         "track_files": common.track_files,
         "laws": {shown(law): origin_of(law) if isinstance(law, str) else _origin(law) for law in laws},
+        "tracks": {shown(each): _origin(each) for each in campaign.values("track") if not isinstance(each, str)},
         "metrics": [_origin(metric.of) for metric in campaign.metrics if metric.of is not None],
     }
     return {

@@ -112,11 +112,12 @@ class Flight:
         return table_html(title, report_rows(self.report).items()) + figure_html(self.plot())
 
 
-def fly(track: str, **options: Any) -> Flight:
+def fly(track: Any, **options: Any) -> Flight:
     """Fly a track in this process, without permanent files.
 
     Args:
-        track: As in `colibri fly`, with its options: `lemniscate:lap=5`.
+        track: As in `colibri fly`, with its options: `lemniscate:lap=5`; or a function of time or an object, whose
+            positions are sampled.
         options: As in `colibri fly`, with underscores, as Python values or texts: `seed=3, wind="5@270", start={"x":
             1.0}, link="udp"`. `profile` also takes a `Profile`, `vehicle` and `plant_vehicle` a `Vehicle`, and
             `controller` a class or another factory of (table of the profile, vehicle, clock); its table is

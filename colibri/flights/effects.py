@@ -12,7 +12,7 @@ class NoEffectWarning(UserWarning):
     """An option has no effect on the flight."""
 
 
-class Setting(NamedTuple):
+class FlownOptions(NamedTuple):
     """Options, and the vehicles of autopilot and plant.
 
     Attributes:
@@ -41,41 +41,43 @@ class Setting(NamedTuple):
         return self.whole is None or all(self.whole.without([part]) != self.whole for part in self.spec.without)
 
 
-class Need(NamedTuple):
+class EffectRule(NamedTuple):
     """What an option needs: if it is not met, it has no effect for this reason."""
 
     option: str
     reason: str
-    is_met: Callable[[Setting], bool]
+    is_met: Callable[[FlownOptions], bool]
 
 
 _NO_DRAG = "vehicle {vehicle} has no drag"
 _NO_STATIONS = "no ground station is served"
-NEEDS = (
-    Need("wind", _NO_DRAG, lambda it: it.has_drag),
-    Need("gusts", _NO_DRAG, lambda it: it.has_drag),
-    Need("gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)),
-    Need("turbulence", _NO_DRAG, lambda it: it.has_drag),
-    Need("seed", "only sensors, and turbulence on drag, are random", lambda it: it.is_random),
-    Need("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
-    Need(
+RULES = (
+    EffectRule("wind", _NO_DRAG, lambda it: it.has_drag),
+    EffectRule("gusts", _NO_DRAG, lambda it: it.has_drag),
+    EffectRule(
+        "gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)
+    ),
+    EffectRule("turbulence", _NO_DRAG, lambda it: it.has_drag),
+    EffectRule("seed", "only sensors, and turbulence on drag, are random", lambda it: it.is_random),
+    EffectRule("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
+    EffectRule(
         "start",
         "rotors of vehicle {vehicle} follow commands at once",
         lambda it: set(it.spec.start) != {"rotors"} or it.plant_vehicle.rotors.lag is not None or it.spec.latency > 0.0,
     ),
-    Need("plant_vehicle", "it is the vehicle of the autopilot", lambda it: it.whole != it.vehicle),
-    Need("tlog", "link direct sends no frames", lambda it: it.spec.link != "direct"),
-    Need("signing_key", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
-    Need("insecure", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
-    Need("spacing", "one vehicle flies", lambda it: it.spec.count > 1),
+    EffectRule("plant_vehicle", "it is the vehicle of the autopilot", lambda it: it.whole != it.vehicle),
+    EffectRule("tlog", "link direct sends no frames", lambda it: it.spec.link != "direct"),
+    EffectRule("signing_key", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    EffectRule("insecure", _NO_STATIONS, lambda it: bool(it.spec.gcs) or not hasattr(it.spec, "link")),
+    EffectRule("spacing", "one vehicle flies", lambda it: it.spec.count > 1),
 )
 
 
-def without_effect(setting: Setting) -> dict[str, str]:
+def without_effect(setting: FlownOptions) -> dict[str, str]:
     """Return the options given without effect, and the reason of each."""
     known = fields_of(type(setting.spec))
     given = {name for name, field in known.items() if getattr(setting.spec, name) != field.default}
-    lacking = (need for need in NEEDS if need.option in given and not need.is_met(setting))
+    lacking = (need for need in RULES if need.option in given and not need.is_met(setting))
     return {need.option: need.reason.format(vehicle=setting.name) for need in lacking}
 
 

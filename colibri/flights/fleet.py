@@ -14,7 +14,7 @@ from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.common.process.log_files import set_aside
 from colibri.common.spec import part_of
-from colibri.flights.effects import Setting, in_words, without_effect
+from colibri.flights.effects import FlownOptions, in_words, without_effect
 from colibri.flights.fleet_spec import PLANT_PORT, FleetSpec
 from colibri.flights.fleet_status import StatusLines
 from colibri.flights.folder import LOGS, occupied, prepare
@@ -99,7 +99,7 @@ def _check(spec: FleetSpec) -> str:
             open_link(_plant_url(spec, instance)).close()
     except LinkError as error:
         fail(str(error))
-    return in_words(without_effect(Setting(spec, name, assumed, vehicle, whole)).items())
+    return in_words(without_effect(FlownOptions(spec, name, assumed, vehicle, whole)).items())
 
 
 def _taken_by_one(url: str) -> bool:

@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
-from colibri.flights.effects import Setting, without_effect
+from colibri.flights.effects import FlownOptions, without_effect
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
@@ -144,7 +144,7 @@ class FlightPlan:
     def without_effect(self) -> dict[str, str]:
         """The options without effect on this flight, and the reason of each."""
         name, whole = self.plant_vehicle_name, self.contents.whole
-        return without_effect(Setting(self.spec, name, self.vehicle, self.plant_vehicle, whole))
+        return without_effect(FlownOptions(self.spec, name, self.vehicle, self.plant_vehicle, whole))
 
     @property
     def integrator(self) -> Any:

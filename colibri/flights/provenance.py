@@ -69,7 +69,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
     nameless = {
         "profile": msgspec.structs.replace(plan.profile, name="", file=""),
         "options": options,
-        "track": with_file(plan.spec.track, Path()),
+        "track": with_file(str(plan.spec.track), Path()),
     }
     colibri = version("colibri-sitl")
     hashes = {name: _hash(content) for name, content in (contents | nameless).items() if content is not None}
@@ -80,6 +80,7 @@ def _named(plan: FlightPlan) -> FlightSpec:
     """Name objects and resolve defaults."""
     return replace(
         plan.spec,
+        track=str(plan.spec.track),
         profile=name_of(plan.spec.profile),
         controller=plan.profile.controller if plan.spec.controller else None,
         vehicle=plan.vehicle_name,

@@ -5,7 +5,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from colibri.autopilot.spec import GroundSpec, LawSpec
+from colibri.autopilot.spec import GroundSpec, LawSpec, Trajectory
 from colibri.common.errors import Error
 from colibri.common.spec import Option, from_values
 from colibri.plant.spec import WorldSpec
@@ -37,7 +37,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
 class FlightSpec(VehiclesSpec, GroundSpec):
     """A flight: each attribute is an option of `colibri fly` and a keyword of `colibri.fly`."""
 
-    track: Annotated[str, Option(TRACK_HELP, "TRACK")]
+    track: Annotated[Any, Option(TRACK_HELP, "TRACK")]
     integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
     link: Annotated[
         Literal["udp", "memory", "direct"],
@@ -51,8 +51,15 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     out: Annotated[Path, Option("folder for logs and figures", "DIR", keyword=False)] = Path("out")
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False
 
+    def __post_init__(self) -> None:
+        """Sample a track that is an object or a function."""
+        if not isinstance(self.track, str | Trajectory):
+            from colibri.autopilot.guidance.trajectories.sampling import sampled_track  # slow to load
+
+            object.__setattr__(self, "track", sampled_track(self.track, self.duration))
+
     @classmethod
-    def of(cls, track: str, **options: Any) -> "FlightSpec":
+    def of(cls, track: Any, **options: Any) -> "FlightSpec":
         """Return a flight with options as Python values or as texts of the command line."""
         return from_values(cls, {"track": track, **options}, OptionError)
 

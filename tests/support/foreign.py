@@ -45,7 +45,7 @@ TRACK = Package("their_track", "colibri.tracks", ("helix = Helix",))
 
 
 def example(page: str) -> str:
-    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
+    code, *_ = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
     return str(code)
 
 

@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.trajectories.registry import TrackError, read_op
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, FileOptions, Track
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
+from colibri.autopilot.spec import Trajectory
 from colibri.common.files import read_text
 from colibri.plant.vehicle.description import Vehicle
 
@@ -24,19 +25,24 @@ class LoadedTrack(NamedTuple):
 
 
 def load_track(
-    name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None, text: str | None = None
+    given: str | Trajectory,
+    vehicle: Vehicle,
+    profile: Profile,
+    floor_m: float | None = None,
+    text: str | None = None,
 ) -> LoadedTrack:
     """Load a track for a vehicle; waypoint tracks are adapted to its limits, others are flown unchanged.
 
     Args:
-        name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
+        given: `NAME[:KEY=VALUE[,KEY=VALUE…]]`, or samples.
         floor_m: Lowest height, m, ENU; by default the ground.
         text: Content of the track's file, instead of reading it.
 
     Raises:
         TrackError: The track is unknown, infeasible, or below the floor.
     """
-    found = track(name, text)
+    name = str(given)
+    found = track(name, given.text if isinstance(given, Trajectory) else text)
     if found.waypoints is not None:
         return track_through(found.waypoints, vehicle, profile, floor_m)
     reach, floor = Reach(vehicle, profile, exact_drag=False), _floor(vehicle, floor_m)
@@ -44,7 +50,8 @@ def load_track(
         raise TrackError(f"track {name} is at {height_m:.2f} m after {time_s:.2f} s, below the floor of {floor:g} m")
     demands = reach.demands(exact_motion(found), reach.charge_of_hover(min(found.duration_s, DURATION_S)))
     beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
-    return LoadedTrack(found, f"track {name} asks for more than there is: {'; '.join(beyond)}" if beyond else "")
+    notes = [f"track {name} asks for more than there is: {'; '.join(beyond)}"] if beyond else []
+    return LoadedTrack(found, "; ".join(filter(None, (getattr(given, "note", found.note), *notes))))
 
 
 def track_through(
@@ -63,8 +70,10 @@ def _floor(vehicle: Vehicle, floor_m: float | None) -> float:
     return (-inf if vehicle.ground is None else 0.0) if floor_m is None else floor_m
 
 
-def file_text(name: str) -> str | None:
-    """Return the content of a track's file, if it has one."""
+def file_text(name: str | Trajectory) -> str | None:
+    """Return the content of a track's file, or its samples, if it has any."""
+    if isinstance(name, Trajectory):
+        return name.text
     path = _file(name)
     if path is None:
         return None

@@ -1,5 +1,6 @@
 """Tracks by name: Colibri's own, and entry points."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import entry_points
 from math import isfinite
@@ -51,7 +52,7 @@ def track(name: str, text: str | None = None) -> Track:
         raise TrackError(unknown("track", base, track_names()))
     if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
         raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
-    return _tried(base, read_options(base, kind, given if colon else None))
+    return tried(base, read_options(base, kind, given if colon else None).track, kind.__name__)
 
 
 def track_names() -> list[str]:
@@ -69,10 +70,10 @@ def _load_installed(name: str) -> Any:
     return None
 
 
-def _tried(name: str, options: TrackOptions) -> Track:
-    """Return the track of another package, checked for finite coordinates at the start."""
+def tried(name: str, make: Callable[[], Track], kind: str) -> Track:
+    """Return the track of a user's options, checked for finite coordinates at the start."""
     try:
-        given = options.track()
+        given = make()
         found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
         start = found.clock(np.zeros(1), 1)
         starts = [axis.derivative(0).item() for axis in found.position(start)]
@@ -80,9 +81,9 @@ def _tried(name: str, options: TrackOptions) -> Track:
     except Error:
         raise
     except Exception as error:
-        raise TrackError(f"track {name}: {type(options).__name__}: {type(error).__name__}: {error}") from error
+        raise TrackError(f"track {name}: {kind}: {type(error).__name__}: {error}") from error
     if len(starts) != 3 or not all(map(isfinite, (*starts, yaw_rad))):
-        raise TrackError(f"track {name}: {type(options).__name__} gives no colibri.Track of three finite coordinates")
+        raise TrackError(f"track {name}: {kind} gives no colibri.Track of three finite coordinates")
     return found
 
 

@@ -1,7 +1,7 @@
 """The tracks: position and yaw as formulas of time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi, radians
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
@@ -45,12 +45,14 @@ class Track:
             An endless track requires it, so that yaw depends on time alone.
         duration_s: Then the track rests at its last point; infinite for an endless track.
         waypoints: Waypoints, if the track between them may be changed.
+        note: What was derived from samples, for the user.
     """
 
     position: Callable[[TaylorSeries], Place]
     yaw: Callable[[TaylorSeries], TaylorSeries] | None = None
     duration_s: float = DURATION_S
     waypoints: Waypoints | None = None
+    note: str = ""
 
     def __post_init__(self) -> None:
         if self.yaw is None and self.duration_s == inf:
@@ -248,7 +250,7 @@ def sampled(samples: SampledTrack) -> Track:
         x, y, z = places(t)
         return x, y, z
 
-    return _looking(position, samples.times_s, samples.yaw_rad)
+    return replace(_looking(position, samples.times_s, samples.yaw_rad), note=samples.note)
 
 
 def _looking(

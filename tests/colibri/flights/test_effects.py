@@ -6,7 +6,7 @@ import pytest
 
 import colibri
 from colibri.campaigns.run import fly_campaign
-from colibri.flights.effects import NEEDS, NoEffectWarning
+from colibri.flights.effects import RULES, NoEffectWarning
 from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from tests.support.campaigns import Here, planned
@@ -43,7 +43,7 @@ def test_what_has_no_effect_is_named(option: str, value: Any, others: dict[str, 
 
 
 def test_every_row_is_tried() -> None:
-    assert {need.option for need in NEEDS} == {case[0] for case in CASES} | set(NOT_KEYWORDS)
+    assert {need.option for need in RULES} == {case[0] for case in CASES} | set(NOT_KEYWORDS)
 
 
 @pytest.mark.parametrize(
