@@ -93,7 +93,7 @@ def command_name(number: int) -> str:
 
 
 class CommandService:
-    """Passes commands to their handlers and acknowledges each to its sender; denies all while `closed` for a reason."""
+    """Dispatches and acknowledges commands; denies all while the vehicle is `closed`."""
 
     handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 

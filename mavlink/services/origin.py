@@ -23,7 +23,7 @@ class Setters(NamedTuple):
 
 
 class OriginService:
-    """Obeys SET_GPS_GLOBAL_ORIGIN, SET_HOME_POSITION and SET_MODE."""
+    """Sets origin, home and mode."""
 
     handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 

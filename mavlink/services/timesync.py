@@ -13,7 +13,7 @@ INT64_MAX = 2**63 - 1
 
 
 class TimeService:
-    """Answers requests for the vehicle's time and for its presence; the clock cannot be set."""
+    """Answers time and ping requests; the clock cannot be set."""
 
     handles = frozenset({"TIMESYNC", "PING", "SYSTEM_TIME"})
 

@@ -26,7 +26,7 @@ _DEG = 1e-7
 
 
 class Follow(StreamedService[TargetState]):
-    """Keeps each tracker's latest target; see `arbitration` for the one that is obeyed."""
+    """Keeps each tracker's latest target."""
 
     handles = frozenset({"FOLLOW_TARGET"})
 

@@ -34,7 +34,7 @@ class Controls(NamedTuple):
 
 
 class Manual(StreamedService[Controls]):
-    """Keeps each client's latest sticks; see `arbitration` for the one that is obeyed."""
+    """Keeps each client's latest sticks."""
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 

@@ -242,7 +242,7 @@ _DECODERS: dict[str, Callable[[Any, Whereabouts, int], OffboardSetpoint]] = {
 
 
 class Offboard(StreamedService[OffboardSetpoint]):
-    """Keeps each client's latest offboard setpoint; see `arbitration` for the one that is obeyed."""
+    """Keeps each client's latest offboard setpoint."""
 
     handles = frozenset(_DECODERS)
 

@@ -15,7 +15,7 @@ MAVLINK_VERSION = 3
 
 
 class HeartbeatService:
-    """Sends the vehicle's HEARTBEAT, at once when its mode changes; receives those of ground stations."""
+    """Sends the vehicle's HEARTBEAT, at once after mode changes; tracks ground stations."""
 
     handles = frozenset({"HEARTBEAT"})
 

@@ -29,14 +29,14 @@ def attitude_target(s: TelemetrySnapshot) -> Fields:
 
 
 def position_target_local_ned(s: TelemetrySnapshot) -> Fields:
-    """POSITION_TARGET_LOCAL_NED (85): nan, and a bit of the mask, where there is no setpoint."""
+    """POSITION_TARGET_LOCAL_NED (85): m, m/s, m/s², rad; unused fields are NaN and masked."""
     position = ned_from_enu(s.setpoint.position_enu_m)
     moving = _moving_ned(s.setpoint)
     return (boot_ms(s), mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
 
 
 def position_target_global_int(s: TelemetrySnapshot) -> Fields:
-    """POSITION_TARGET_GLOBAL_INT (87): degE7 and m above the sea; the rest as POSITION_TARGET_LOCAL_NED."""
+    """POSITION_TARGET_GLOBAL_INT (87): degE7, m above sea level; else as POSITION_TARGET_LOCAL_NED."""
     moving = _moving_ned(s.setpoint)
     mask = _ignored((*ned_from_enu(s.setpoint.position_enu_m), *moving))
     east, north, up = s.setpoint.position_enu_m
@@ -49,7 +49,7 @@ def position_target_global_int(s: TelemetrySnapshot) -> Fields:
 
 
 def nav_controller_output(s: TelemetrySnapshot) -> Fields:
-    """NAV_CONTROLLER_OUTPUT (62): degrees and m to the destination; distance zero without one."""
+    """NAV_CONTROLLER_OUTPUT (62): degrees and m to the destination; 0 m without one."""
     roll, pitch, yaw = euler_from_quaternion(s.setpoint.attitude)
     target = s.setpoint.position_enu_m if any(map(isnan, s.target_enu_m)) else s.target_enu_m
     east, north, up = (0.0, 0.0, 0.0) if any(map(isnan, target)) else minus(target, s.position_enu_m)
@@ -61,7 +61,7 @@ def nav_controller_output(s: TelemetrySnapshot) -> Fields:
 
 
 def trajectory_representation_waypoints(s: TelemetrySnapshot) -> Fields | None:
-    """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon up to its end; local NED."""
+    """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon, local NED."""
     points = _spread(s.solver.horizon)
     if not points:
         return None
@@ -71,11 +71,10 @@ def trajectory_representation_waypoints(s: TelemetrySnapshot) -> Fields | None:
 
 
 def debug_float_array(s: TelemetrySnapshot) -> Fields:
-    """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: eleven figures of the solver, then its plan.
+    """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: solver figures, then the plan.
 
-    The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and the numbers of active bounds on
-    rotors, increments, angles, rates (codes are those of `SolverState`). The plan: squared rotor speeds as parts of the
-    largest, four a step.
+    Figures: status, fallback, iterations, solve_us, step_us, cost, slack; active bounds on rotors, increments, angles,
+    rates (codes: `SolverState`). Plan: squared rotor speeds over the maximum, four a step.
     """
     solver = s.solver
     times_us = (1e6 * solver.solve_time_s, 1e6 * solver.step_time_s)
@@ -87,7 +86,7 @@ def debug_float_array(s: TelemetrySnapshot) -> Fields:
 
 
 def named_value_float(s: TelemetrySnapshot) -> list[Fields]:
-    """NAMED_VALUE_FLOAT (251), one a figure: of the law, and the delay compensated; names of at most ten letters."""
+    """NAMED_VALUE_FLOAT (251): a message for each figure of the law, and the compensated delay."""
     solver = s.solver
     figures: dict[bytes, float] = {
         b"mpc_status": solver.status,

@@ -41,7 +41,7 @@ def local_position_ned(s: TelemetrySnapshot) -> Fields:
 
 
 def home_position(s: TelemetrySnapshot) -> Fields | None:
-    """HOME_POSITION (242): its ground level, its heading in q, and an approach straight from above."""
+    """HOME_POSITION (242): ground level, heading in q, vertical approach."""
     if s.home is None:
         return None
     place = geodetic_of(s.home.position_enu_m, s.origin)
@@ -57,7 +57,7 @@ def gps_global_origin(s: TelemetrySnapshot) -> Fields:
 
 
 def gps_raw_int(s: TelemetrySnapshot) -> Fields:
-    """GPS_RAW_INT (24): the receiver's fix, or a simulated good one; or no fix. Course is unknown at rest."""
+    """GPS_RAW_INT (24): the receiver's fix; a simulated one under state feedback. Course is unknown at rest."""
     if not s.gps_ok:
         nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
         return (s.time_us, mav.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *nothing, 0)
@@ -72,7 +72,7 @@ def gps_raw_int(s: TelemetrySnapshot) -> Fields:
 
 
 def altitude(s: TelemetrySnapshot) -> Fields:
-    """ALTITUDE (141), m: monotonic, above the sea, the origin, home, the terrain; clearance below."""
+    """ALTITUDE (141), m: monotonic, above sea level, origin, home, terrain; bottom clearance."""
     above_origin = s.position_enu_m[2]
     above_sea, above_ground = above_origin + s.origin.altitude_m, above_origin - s.ground_m
     clearance = max(0.0, above_ground) if isfinite(above_ground) else -1.0
@@ -90,14 +90,14 @@ def vfr_hud(s: TelemetrySnapshot) -> Fields:
 
 
 def distance_sensor(s: TelemetrySnapshot) -> Fields:
-    """DISTANCE_SENSOR (132): height above the ground, cm, as measured by a downward sensor."""
+    """DISTANCE_SENSOR (132): height above ground, cm, of a downward sensor."""
     height_cm = max(0.0, 100.0 * (s.position_enu_m[2] - s.ground_m))
     sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, 0)
     return (boot_ms(s), *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
 
 
 def wind_cov(s: TelemetrySnapshot) -> Fields | None:
-    """WIND_COV (231): direction of the wind's motion, NED, m/s; sent once it is known."""
+    """WIND_COV (231): velocity of the air, NED, m/s; sent once estimated."""
     if not all(map(isfinite, s.wind_enu_m_s)):
         return None
     altitude_m = s.position_enu_m[2] + s.origin.altitude_m

@@ -35,7 +35,7 @@ def battery_status(s: TelemetrySnapshot) -> Fields | None:
 
 
 def esc_status(s: TelemetrySnapshot) -> Fields:
-    """ESC_STATUS (291): rpm, V, A; the current is shared in proportion to a rotor's power, the cube of its speed."""
+    """ESC_STATUS (291): rpm, V, A; current shared by rotor power, the cube of its speed."""
     cubes = [speed * speed * speed for speed in s.rotor_speeds_rad_s]
     total = sum(cubes) or 1.0
     voltage, current = (s.battery.voltage_v, s.battery.current_a) if s.battery else (0.0, 0.0)
@@ -44,26 +44,26 @@ def esc_status(s: TelemetrySnapshot) -> Fields:
 
 
 def esc_info(s: TelemetrySnapshot) -> Fields:
-    """ESC_INFO (290): four healthy controllers of unknown temperature."""
+    """ESC_INFO (290): four healthy controllers, temperature unknown."""
     packets = s.time_us // 1_000_000 % 2**16
     healthy = ((0,) * ROTORS, (0,) * ROTORS, (UNKNOWN_I16,) * ROTORS)
     return (0, s.time_us, packets, ROTORS, ESC_CONNECTION_TYPE_DSHOT, ALL_ROTORS, *healthy)
 
 
 def servo_output_raw(s: TelemetrySnapshot) -> Fields:
-    """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; its time is in µs and wraps after 71 minutes."""
+    """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; time in µs, wraps after 71 minutes."""
     return (s.time_us % 2**32, 0, *_pulses_us(s.controls), *(0,) * 12)
 
 
 def actuator_output_status(s: TelemetrySnapshot) -> Fields:
-    """ACTUATOR_OUTPUT_STATUS (375): the pulses of SERVO_OUTPUT_RAW."""
+    """ACTUATOR_OUTPUT_STATUS (375): pulses as in SERVO_OUTPUT_RAW."""
     return (s.time_us, ALL_ROTORS, (*_pulses_us(s.controls), *(0.0,) * (OUTPUTS - ROTORS)))
 
 
 def actuator_control_target(s: TelemetrySnapshot) -> Fields:
-    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotors' controls.
+    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotor controls.
 
-    The rotors are those of a plus: front, right, rear, left. The first turns counter-clockwise, the body so clockwise.
+    Rotors of a plus frame: front (counter-clockwise), right, rear, left.
     """
     front, right, rear, left = s.controls
     moments = (0.5 * (left - right), 0.5 * (front - rear), 0.5 * (front - right + rear - left))
@@ -71,7 +71,7 @@ def actuator_control_target(s: TelemetrySnapshot) -> Fields:
 
 
 def rc_channels(s: TelemetrySnapshot) -> Fields:
-    """RC_CHANNELS (65): the sticks of MANUAL_CONTROL as roll, pitch, throttle and yaw of a radio, 1000 to 2000 µs."""
+    """RC_CHANNELS (65): MANUAL_CONTROL as roll, pitch, throttle and yaw, 1000 to 2000 µs."""
     from_boot_ms = s.time_us // 1000 % 2**32
     if s.sticks is None:
         return (from_boot_ms, 0, *(UNKNOWN_U16,) * 18, UNKNOWN_U8)

@@ -36,7 +36,7 @@ def scaled_imu(s: TelemetrySnapshot) -> Fields:
 
 
 def raw_imu(s: TelemetrySnapshot) -> Fields:
-    """RAW_IMU (27): the counts equal SCALED_IMU's units."""
+    """RAW_IMU (27): in SCALED_IMU's units."""
     m = _measured(s)
     return (s.time_us, *_thousandths(m), 0, _temperature_cdeg(m))
 

@@ -25,7 +25,7 @@ ESTIMATED = bits(
 def sys_status(s: TelemetrySnapshot) -> Fields:
     """SYS_STATUS (1): present, enabled and healthy parts; load in thousandths, mV, cA, percent.
 
-    The geofence is healthy until breached, even if disabled: consoles alarm at this bit alone.
+    The geofence bit is healthy until a breach, even if disabled: consoles alarm at this bit.
     """
     parts = SENSORS | CONTROLS | mav.MAV_SYS_STATUS_PREARM_CHECK
     if s.battery:
@@ -47,7 +47,7 @@ def sys_status(s: TelemetrySnapshot) -> Fields:
 
 
 def extended_sys_state(s: TelemetrySnapshot) -> Fields:
-    """EXTENDED_SYS_STATE (245): no VTOL; landed, taking off, in the air or landing."""
+    """EXTENDED_SYS_STATE (245): landed, taking off, in the air or landing."""
     return (mav.MAV_VTOL_STATE_UNDEFINED, s.landed_state)
 
 
@@ -62,12 +62,12 @@ def system_time(s: TelemetrySnapshot, boot_unix_us: int = 0) -> Fields:
 
 
 def flight_information(s: TelemetrySnapshot) -> Fields:
-    """FLIGHT_INFORMATION (264): times since the start in µs (despite their names) and ms; the number of the flight."""
+    """FLIGHT_INFORMATION (264): times since the start, µs (despite their names) and ms; flight number."""
     return (boot_ms(s), s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
 
 
 def estimator_status(s: TelemetrySnapshot) -> Fields:
-    """ESTIMATOR_STATUS (230). Under state feedback all states are known, and test ratios are 0."""
+    """ESTIMATOR_STATUS (230). Under state feedback all flags are set and test ratios 0."""
     if s.estimator is not None:
         e = s.estimator
         return (

@@ -28,8 +28,8 @@ _HANDLERS = (commands, motion_commands, stations, streaming_service, standard_mo
 def tables() -> list[str]:
     commands = [(f"`{command}`", str(getattr(mav, command))) for command in sorted(obeyed())]
     return [
-        markdown(("message", "SDK", "GCS", "what is in it"), list(_streamed()), names=4),
-        markdown(("messages", "what takes them"), list(_taken()), names=2),
+        markdown(("message", "SDK", "GCS", "content"), list(_streamed()), names=4),
+        markdown(("messages", "effect"), list(_taken()), names=2),
         markdown(("command", "number"), commands, names=1),
     ]
 
