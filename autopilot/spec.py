@@ -55,8 +55,8 @@ class LawSpec:
     delay: Annotated[
         float | None,
         Option(
-            "compensate this delay from a frame until its command takes effect; 0: none (default: the profile's, or "
-            "the one that the plant measures)",
+            "delay to compensate, from a frame until its command takes effect; 0: no compensation "
+            "(default: the profile's, or as measured by the plant)",
             "MS",
             "ms",
             least=0.0,
@@ -71,7 +71,7 @@ class LawSpec:
     ] = None
     feedback: Annotated[
         Feedback,
-        Option("what the autopilot flies by: the true state (default), or what sensors measure", "state|sensors"),
+        Option("input of the autopilot: the true state (default) or simulated sensors", "state|sensors"),
     ] = Feedback.STATE
 
     @property
@@ -123,7 +123,7 @@ class GroundSpec:
     ] = ()
     signing_key: Annotated[
         Path | None,
-        Option("sign what is sent, refuse what is not signed with this key", "FILE", keyword=False),
+        Option("sign messages, and refuse messages without a signature of this key", "FILE", keyword=False),
     ] = None
     insecure: Annotated[bool, Option("let links leave this computer without a key", keyword=False)] = False
 
@@ -136,7 +136,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     simulator: Annotated[
         str | None,
         Option(
-            "fly a simulator that speaks PX4's interface instead, jMAVSim say: tcp:127.0.0.1:4560; on its sensors",
+            "fly a simulator with PX4's interface on its sensors, for example jMAVSim: tcp:127.0.0.1:4560",
             "URL",
         ),
     ] = None
@@ -149,8 +149,8 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     ] = None
     home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
     identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
-    state: Annotated[Path | None, Option("keeps parameters, logs, files (default: nothing is kept)", "DIR")] = None
-    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
+    state: Annotated[Path | None, Option("folder of parameters, logs and files (default: not kept)", "DIR")] = None
+    strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
     params: Annotated[Mapping[str, int | float], Option("initial values of parameters", on_command_line=False)] = field(
         default_factory=dict
     )

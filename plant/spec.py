@@ -95,14 +95,16 @@ class PlantSpec(WorldSpec, ProcessSpec):
         Option("rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9"),
     ] = "rk4"
     home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
-    rate: Annotated[float, Option("frames, if the autopilot asks for no other rate", "HZ", "Hz", above=0.0)] = 250.0
+    rate: Annotated[float, Option("rate of frames, unless the autopilot requests another", "HZ", "Hz", above=0.0)] = (
+        250.0
+    )
     realtime: Annotated[
         bool,
         Option("run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command"),
     ] = False
     cut_after: Annotated[
         float,
-        Option("with --realtime: stop the rotors where no command comes for so long", "S", "s", above=0.0),
+        Option("with --realtime: stop the rotors after this time without a command", "S", "s", above=0.0),
     ] = 0.5
     duration: Annotated[
         float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)

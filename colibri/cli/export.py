@@ -13,7 +13,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--mcap", action="store_true", help="write flight.mcap beside it, for Foxglove")
     add("--csv", action="store_true", help="write flight-topics/*.csv beside it, a table of each topic")
     add("--parquet", action="store_true", help="write flight-topics/*.parquet beside it, a table of each topic")
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add("--quiet", action="store_true", help="print errors only")
 
 
 def run(args: Namespace) -> int:

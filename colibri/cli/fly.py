@@ -22,8 +22,8 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="[KEY=]VALUE",
-        help="exit with 1 if a number of report.json is larger: of rmse_after_20s_m (m), or another by its KEY, "
-        "ground_contact_s=0 say; may be repeated",
+        help="exit with 1 if a number of report.json is larger: rmse_after_20s_m (m), or another by its "
+        "KEY, for example ground_contact_s=0; may be repeated",
     )
     add("--no-figures", action="store_true", help="draw no PNG figures")
 

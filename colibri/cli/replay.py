@@ -14,7 +14,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="DIR|FLIGHT.ULG",
         help="folder of a flight, or its flight.ulg",
     )
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add("--quiet", action="store_true", help="print errors only")
 
 
 def run(args: Namespace) -> int:

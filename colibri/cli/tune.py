@@ -22,25 +22,25 @@ def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("file", type=Path, metavar="FILE.toml", help="the tuning; options take precedence over it")
     add("--trials", type=int, default=SUPPRESS, metavar="N", help="how many, the profile as it is among them")
-    add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="by which each trial flies")
+    add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="seeds of each trial")
     add(
         "--check-seeds",
         default=SUPPRESS,
         metavar="FIRST-LAST",
-        help="by which no trial flies: the check",
+        help="seeds of the validation, which no trial flies",
     )
-    add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="of what is tried, and of draws")
+    add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="seed of the search and of draws")
     add(
         "--prune-after",
         type=int,
         default=SUPPRESS,
         metavar="N",
-        help="seeds between judgements of a trial; 0: none",
+        help="seeds between two decisions to stop a trial; 0: never stop",
     )
     add("--name", default=SUPPRESS, help="in titles (default: the file's)")
     add_engine(add)
-    add("--resume", action="store_true", help="go on with what --out has of this tuning, or join those who are at it")
-    add_out(add, "out/tune", "profile, tables, figures, and what it takes to go on")
+    add("--resume", action="store_true", help="continue the tuning in --out, or join running processes")
+    add_out(add, "out/tune", "profile, tables, figures and journal")
 
 
 def run(args: Namespace) -> int:

@@ -33,7 +33,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
     out: Annotated[
         Path | None,
-        Option("record in DIR/N what `colibri replay` flies again: both processes' logs (default: not)", "DIR"),
+        Option("record the logs of both processes in DIR/N, for `colibri replay` (default: no record)", "DIR"),
     ] = None
     plant_port: Annotated[
         int | None, Option("the plant's (default: 14560 + N; 0: any that is free)", "PORT", least=0, most=65535)
@@ -42,7 +42,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     duration: Annotated[
         float, Option("end after this simulated time (default: never)", "S", "s", above=0.0, endless=True)
     ] = inf
-    strict: Annotated[bool, Option("end by what a part raises in flight; default: it is replaced, flown on")] = False
+    strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
 
     def folder(self, instance: int) -> Path | None:
         return None if self.out is None else self.out / str(instance)

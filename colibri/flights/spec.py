@@ -29,7 +29,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
 
     plant_vehicle: Annotated[
         str | Vehicle | None,
-        Option("another vehicle for the plant alone, to fly what was not planned for", "NAME"),
+        Option("another vehicle for the plant, to test the law with a wrong model", "NAME"),
     ] = None
 
 

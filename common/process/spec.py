@@ -22,7 +22,7 @@ class ProcessSpec:
     boot_unix_us: Annotated[
         int,
         Option(
-            "Unix time at simulated time 0, by which telemetry logs are dated; the same for plant and autopilot",
+            "Unix time at simulated time 0, for the dates of telemetry logs; the same for plant and autopilot",
             "N",
             "µs",
             least=0,

@@ -29,20 +29,20 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=DISTRIBUTION",
-        help="a factor drawn anew for each flight: uniform:LOW:HIGH, log-uniform:LOW:HIGH, normal:MEAN:DEVIATION or "
+        help="a factor drawn for each flight: uniform:LOW:HIGH, log-uniform:LOW:HIGH, normal:MEAN:DEVIATION or "
         "choice:A,B,C; may be repeated",
     )
     add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="every combination is flown by each (default 0)")
     add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="of the draws (default 0)")
     add("--name", default=SUPPRESS, help="in titles (default: the file's)")
     add("--metrics", default=SUPPRESS, metavar="A,B", help="numbers of report.json to keep (default: the usual)")
-    add("--logs", default=SUPPRESS, choices=("none", "lost", "all"), help="of which flights to keep the logs (none)")
+    add("--logs", default=SUPPRESS, choices=("none", "lost", "all"), help="flights whose logs are kept (default none)")
     add_engine(add)
-    add("--resume", action="store_true", help="go on with what --out has of this campaign")
+    add("--resume", action="store_true", help="continue the campaign in --out")
     add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")
     add_spec(parser, FlightSpec, leave_out=("track", "seed", "speed"), given_only=True, keywords_only=True)
-    add_out(add, "out/campaign", "table, summary, figure, and what it takes to go on")
+    add_out(add, "out/campaign", "table, summary, figure and journal")
 
 
 def run(args: Namespace) -> int:

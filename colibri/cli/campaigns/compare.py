@@ -22,15 +22,15 @@ def add_options(parser: ArgumentParser) -> None:
         "--controller",
         action="append",
         metavar="NAME",
-        help="fly every profile that names none with this controller; may be repeated (default: its own)",
+        help="control law of every profile given without one; may be repeated (default: its own)",
     )
     add(
         "--seeds",
         type=seeds,
         metavar="FIRST-LAST",
-        help="fly each by all of these in place of --seed, and show how errors spread",
+        help="fly each with all of these seeds, and show the spread of errors",
     )
-    add("--resume", action="store_true", help="do not fly again what --out has already by the same contents")
+    add("--resume", action="store_true", help="reuse flights in --out with the same contents")
     add_spec(parser, FlightSpec, leave_out=("track", "profile", "controller", "speed"), keywords_only=True)
     add_out(add, "out/compare", "the tables")
 

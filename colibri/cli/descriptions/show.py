@@ -11,7 +11,7 @@ from colibri.common.process.lifecycle import fail
 def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("what", choices=("profile", "vehicle"), help="what to show")
-    add("name", metavar="NAME", help="of those that come with Colibri; any other for a list of them")
+    add("name", metavar="NAME", help="name of one that comes with Colibri; any other name lists them")
 
 
 def run(args: Namespace) -> int:

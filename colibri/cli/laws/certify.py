@@ -41,7 +41,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="refuse a law without Lyapunov function over this part of the profile's ranges (default %(default)s)",
     )
     add("--flights", type=some, default=1000, metavar="N", help="flights from the set's border (default %(default)s)")
-    add("--seed", type=natural, default=0, metavar="N", help="of what is random in them (default %(default)s)")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of the flights (default %(default)s)")
     add_out(add, "out/certify", "certificate, table and figure")
 
 

@@ -26,7 +26,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="AREA",
         help="try only this: interface, memory, limits, optional, time, flights or restart; may be repeated",
     )
-    add("--quiet", action="store_true", help="print only what failed")
+    add("--quiet", action="store_true", help="print failed checks only")
 
 
 def run(args: Namespace) -> int:

@@ -59,7 +59,7 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "replay": CommandEntry(
-            "feed a recorded flight to the autopilot: are its answers the same?", "", "colibri replay out/spiral"
+            "replay a recorded flight, and compare the autopilot's answers", "", "colibri replay out/spiral"
         ),
     },
     "many flights": {
@@ -73,7 +73,7 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "tune": CommandEntry(
-            "find better numbers of a profile, and what they are worth on seeds never seen",
+            "tune numbers of a profile, and validate them on other seeds",
             "",
             """
             colibri tune weights.toml --out out/tune
@@ -89,12 +89,12 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "study": CommandEntry(
-            "fly what shows how far profile flight reaches, and draw it",
+            "fly the studies of profile flight, and draw them",
             "campaigns",
             "colibri study speed robustness    # two of the studies; without a name all",
         ),
         "figures": CommandEntry(
-            "fly all that the thesis shows and draw its figures", "campaigns", "colibri figures --only 4.9"
+            "fly the thesis's flights and draw its figures", "campaigns", "colibri figures --only 4.9"
         ),
     },
     "vehicles of others": {
@@ -114,7 +114,7 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
     },
     "control laws": {
         "check-controller": CommandEntry(
-            "try on a control law of your own what every one must satisfy",
+            "check a control law against the requirements on all of them",
             "laws",
             """
             colibri check-controller geometric-se3
@@ -122,7 +122,7 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "certify": CommandEntry(
-            "prove what can be proven of a profile's attitude law",
+            "certify a profile's attitude law",
             "laws",
             "colibri certify flight --controller lpv-mpc",
         ),
@@ -160,7 +160,7 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             "colibri verify --link memory",
         ),
         "completion": CommandEntry(
-            "print what makes a shell complete these commands",
+            "print a script that completes these commands in a shell",
             "computer",
             """
             colibri completion bash > ~/.local/share/bash-completion/completions/colibri

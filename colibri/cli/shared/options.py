@@ -5,7 +5,12 @@ from pathlib import Path
 
 
 def add_signing(add: Callable[..., object]) -> None:
-    add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
+    add(
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="sign messages, and refuse messages without a signature of this key",
+    )
     add("--insecure", action="store_true", help="let links leave this computer without a key")
 
 
@@ -14,10 +19,10 @@ def add_engine(add: Callable[..., object]) -> None:
     add(
         "--dask",
         metavar="ADDRESS",
-        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
+        help="fly on a cluster: address of its Dask scheduler, for example tcp://HOST:8786",
     )
 
 
 def add_out(add: Callable[..., object], folder: str, what: str) -> None:
     add("--out", type=Path, default=Path(folder), metavar="DIR", help=f"folder for {what} (default %(default)s)")
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add("--quiet", action="store_true", help="print errors only")

@@ -32,12 +32,16 @@ def add_options(parser: ArgumentParser) -> None:
         help="hover, and measure in small steps how body rates follow commands",
     )
     add("--response", metavar="FILE", help="companion.toml of an earlier --identify")
-    add("--stack", choices=("px4", "ardupilot", "colibri"), help="what flies the vehicle (default: as it says)")
+    add(
+        "--stack",
+        choices=("px4", "ardupilot", "colibri"),
+        help="autopilot of the vehicle (default: as in its heartbeat)",
+    )
     add(
         "--setpoints",
         default="rates",
         choices=("rates", "attitude", "velocity", "position"),
-        help="what it is sent; the last three for vehicles that take no body rates (default %(default)s)",
+        help="setpoints to send; the last three for vehicles that accept no body rates (default %(default)s)",
     )
     add("--duration", type=positive, default=inf, metavar="S", help="time along the track (default: all of it)")
     add("--height", type=positive, metavar="M", help="of the take-off (default: that of the track's first point)")

@@ -16,8 +16,8 @@ def add_options(parser: ArgumentParser) -> None:
         "what",
         nargs="+",
         metavar="FOLDER|LINK",
-        help="flights by their folders, as `colibri fly` leaves them: several are shown over each other; or one link "
-        "that a MAVLink vehicle is on, udpin:127.0.0.1:14550 say",
+        help="flights by their folders, written by `colibri fly` (several are shown together); or a link to a "
+        "MAVLink vehicle, for example udpin:127.0.0.1:14550",
     )
     add("--port", type=natural, default=0, metavar="N", help="of the page, on loopback (default: any that is free)")
     add("--export", type=Path, metavar="FILE.html", help="write flights as one file that plays them, and end")

@@ -32,7 +32,7 @@ MESSAGES = [
         "campaign --track hover --seeds 3-1 --out out",
         "seeds: expected 1-20, a seed, or several different ones, not 3-1",
     ),
-    ("campaign --track hover --workers 0 --out out", "workers: must be at least 1, not 0"),
+    ("campaign --track hover --workers 0 --out out", "workers: must be a whole number of at least 1, not 0"),
     ("campaign --track hover --workers 2 --dask tcp://127.0.0.1:1 --out out", "workers: a cluster has its own"),
     ("campaign --track hover --seeds 1-1000001 --out out", "1000001 flights are many: say --yes if you mean it"),
     ("campaign --track hovr --out out", "hovr"),
