@@ -153,7 +153,7 @@ class Commands:
         del command
         self._judge_fence()
         reasons = self._pilot.readiness.refusals()
-        return Refusal("not ready: " + "; ".join(reasons), FAILED) if reasons else None
+        return Refusal("Preflight Fail: " + "; ".join(reasons), FAILED) if reasons else None
 
     def _judge_fence(self) -> None:
         """Have readiness know the fence of this frame."""

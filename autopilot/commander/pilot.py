@@ -45,6 +45,15 @@ _SAVED_BY = {
 _ENDS = {Mode.TAKEOFF: Event.ARRIVED, Mode.MISSION: Event.FINISHED, Mode.TRACK: Event.FINISHED}
 """Event when the task of a mode has arrived."""
 NOTHING_MISSING: Mapping[Need, str] = MappingProxyType({})
+_TEXTS = {
+    Event.ARRIVED: "Takeoff altitude reached: {mode}",
+    Event.FINISHED: "{before} finished: {mode}",
+    Event.RETURN_ITEM: "Mission RTL item: {mode}",
+    Event.TOUCHED_DOWN: "Disarmed by landing",
+    Event.LEFT_STANDING: "Disarmed by auto preflight disarming",
+}
+"""Status texts, as far as possible PX4's."""
+_IMPACT = "Disarmed by impact"
 
 
 class Sensed(NamedTuple):
@@ -208,11 +217,11 @@ class Pilot:
         forced = force and self.sensed.vehicle is not None and not self.readiness.only_lands
         reasons = [] if forced else self.readiness.refusals()
         if reasons:
-            return Refusal("not armed: " + "; ".join(reasons))
+            return Refusal("Arming denied: " + "; ".join(reasons))
         unmet: dict[Need, str] = {
             need: why for need, why in missing.items() if need is not Need.POSITION
         }  # a check of its own, and by force
-        refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
+        refusal = self._follow(Event.ARM, "Armed", missing=unmet)
         if refusal is None:
             now_us, vehicle, *_ = self.sensed
             self.ground.arm(now_us)
@@ -228,8 +237,8 @@ class Pilot:
             return None
         standing = self.ground.standing
         if not standing and not force:
-            return Refusal("not disarmed: the vehicle is flying")
-        return self._stop_rotors(Event.DISARM, "rotors stopped" if standing else "rotors stopped in the air")
+            return Refusal("Disarming denied: not landed")
+        return self._stop_rotors(Event.DISARM, "Disarmed" if standing else "Disarmed in flight")
 
     def select(self, mode: Mode, missing: Mapping[Need, str]) -> Refusal | None:
         if mode is self.state.mode and mode is not Mode.HOLD:
@@ -264,13 +273,13 @@ class Pilot:
     def happened(self, event: Event) -> None:
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led
-        if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
+        if self._follow(event, _TEXTS[event]) is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
     def touch_down(self) -> None:
         """Register a landing reported by another detector, and stop the rotors."""
         self.ground.land(self.sensed.now_us)
-        self._stop_rotors(Event.TOUCHED_DOWN, f"{self._end(Event.TOUCHED_DOWN)}, rotors stopped")
+        self._stop_rotors(Event.TOUCHED_DOWN, self._end(Event.TOUCHED_DOWN))
 
     def step(self) -> Guidance:
         if not self.state.armed:
@@ -309,7 +318,7 @@ class Pilot:
         return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
 
     def _fallen(self) -> Guidance:
-        self._stop_rotors(Event.TOUCHED_DOWN, "impact, rotors stopped")
+        self._stop_rotors(Event.TOUCHED_DOWN, _IMPACT)
         return self._rest()
 
     @property
@@ -327,11 +336,11 @@ class Pilot:
         self._rest()
         event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
         if event is not None:
-            self._stop_rotors(event, f"{self._end(event)}, rotors stopped")
+            self._stop_rotors(event, self._end(event))
         return RESTS
 
     def _end(self, event: Event) -> str:
-        return "impact" if event is Event.TOUCHED_DOWN and self.ground.impact else str(event)
+        return _IMPACT if event is Event.TOUCHED_DOWN and self.ground.impact else _TEXTS[event]
 
     def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
         refusal = self._follow(event, text)
@@ -362,6 +371,6 @@ class Pilot:
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:
-            self._lines.say(INFO, text.format(mode=after.mode))
+            self._lines.say(INFO, text.format(before=self.state.mode.capitalize(), mode=after.mode))
         self.state = after
         return None

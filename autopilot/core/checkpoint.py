@@ -88,8 +88,8 @@ def fingerprint_of(profile: Profile, vehicle: Vehicle) -> int:
 
 def goes_on(mode: Mode, seq: int) -> str:
     """Return the status text of a flight that goes on."""
-    what = f"mission goes on at item {seq}" if mode is Mode.MISSION else f"{mode} goes on"
-    return f"restarted in flight: {what}"
+    what = f"mission continues at item {seq}" if mode is Mode.MISSION else f"{mode} continues"
+    return f"Restarted in flight: {what}"
 
 
 Again: TypeAlias = Callable[[TaskRecord, Mode, TaskContext], FlightTask]

@@ -247,7 +247,7 @@ class Copter:
         """Deny commands while nothing is known of the vehicle yet."""
         if self._waiting_us is None:
             return []
-        self.stations.refuse_commands("not ready: attitude and position are not known yet")
+        self.stations.refuse_commands("Not ready: no attitude and position estimate yet")
         self._receive_from_stations(inbox, self._waiting_us)
         self.stations.refuse_commands("")
         return self.stations.take_outbox()

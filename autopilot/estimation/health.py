@@ -38,11 +38,11 @@ _MATTERS = (
 
 _UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
     (lambda health: health.gyroscope and health.accelerometer, "inertial sensors failed"),
-    (lambda health: health.attitude, "attitude not known"),
-    (lambda health: health.heading, "heading not known"),
-    (lambda health: health.horizontal_velocity and health.vertical_velocity, "velocity not known"),
-    (lambda health: health.horizontal_position and not health.dead_reckoning, "position not known"),
-    (lambda health: health.height, "height not known"),
+    (lambda health: health.attitude, "no attitude estimate"),
+    (lambda health: health.heading, "no heading estimate"),
+    (lambda health: health.horizontal_velocity and health.vertical_velocity, "no velocity estimate"),
+    (lambda health: health.horizontal_position and not health.dead_reckoning, "no position estimate"),
+    (lambda health: health.height, "no height estimate"),
 )
 
 _SENSORS: tuple[tuple[Callable[[Health], bool], int], ...] = (

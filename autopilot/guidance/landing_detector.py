@@ -114,7 +114,7 @@ class Hardest(NamedTuple):
         if not self.is_recent(now_us):
             return ""
         tilt_deg = degrees(acos(max(self.up, -1.0)))
-        return f"impact at {self.speed_m_s:.1f} m/s" + (f", tilted {tilt_deg:.0f} degrees" if self.up < HARD_UP else "")
+        return f"Impact at {self.speed_m_s:.1f} m/s" + (f", tilted {tilt_deg:.0f} degrees" if self.up < HARD_UP else "")
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:

@@ -83,7 +83,7 @@ def test_mavproxy(tmp_path: Path) -> None:
     ):
         proxy.type(arm, "COMPONENT_ARM_DISARM: ACCEPTED")
         proxy.type(take_off, "NAV_TAKEOFF: ACCEPTED")
-        proxy.expect("AP: height reached: hold")
+        proxy.expect("AP: Takeoff altitude reached: hold")
         proxy.type(go, "DO_REPOSITION: ACCEPTED")
         flown.seen.wait(lambda sight: sight.height_m > 6.9 and hypot(*sight.velocity_enu_m_s) < 0.05, "the place")
         proxy.type(return_home, "NAV_RETURN_TO_LAUNCH: ACCEPTED")

@@ -31,7 +31,7 @@ def test_it_arms_takes_off_goes_somewhere_and_lands(tmp_path: Path) -> None:
         assert lines[1].startswith("parameters ")
         assert lines[2] == "set 4.5"
         assert [line for line in lines[3:] if not line.startswith("text")] == ["armed", "up", "there", "landed"]
-        assert "text landed, rotors stopped" in lines
+        assert "text Disarmed by landing" in lines
 
         seen = flown.seen.wait_until_disarmed()
         assert flown.seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.LAND]

@@ -57,7 +57,7 @@ def test_a_flight(tmp_path: Path) -> None:
         seen.wait(lambda s: s.mode is Mode.HOLD and abs(s.height_m - 5.0) < 0.05, "the height")
 
         proxy.type("disarm", r"COMPONENT_ARM_DISARM: DENIED")
-        proxy.expect("AP: not disarmed: the vehicle is flying")
+        proxy.expect("AP: Disarming denied: not landed")
         assert seen.now.armed
 
         proxy.type(f"guided {at(6.0, 8.0)} 7", r"Got COMMAND_ACK: DO_REPOSITION: ACCEPTED")
@@ -73,7 +73,7 @@ def test_a_flight(tmp_path: Path) -> None:
         proxy.type("long NAV_LOITER_UNLIM", r"Got COMMAND_ACK: NAV_LOITER_UNLIM: ACCEPTED")
         proxy.type("long NAV_RETURN_TO_LAUNCH", r"Got COMMAND_ACK: NAV_RETURN_TO_LAUNCH: ACCEPTED")
         proxy.expect("RTL> ")
-        proxy.expect("AP: landed, rotors stopped")
+        proxy.expect("AP: Disarmed by landing")
         landed = seen.wait(lambda s: not s.armed, "the end of the flight")
         assert hypot(*landed.position_enu_m[:2]) < 0.3
         assert seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.RETURN]

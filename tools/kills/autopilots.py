@@ -130,7 +130,7 @@ class _Killer:
 
     @property
     def _is_said(self) -> bool:
-        return any("restarted in flight" in text for text in self._station.texts)
+        return any("Restarted in flight" in text for text in self._station.texts)
 
 
 def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[AutopilotKill]:

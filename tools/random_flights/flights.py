@@ -71,7 +71,7 @@ class _Flown:
             return ""
         if self._case.lands:
             return f"{self._impact}, though at most one sensor had failed"
-        said = any(text.startswith("impact") or text.endswith(": rotors stop") for text in self.flight.texts)
+        said = any(text.startswith("Impact") or text.endswith(", terminate") for text in self.flight.texts)
         return "" if said else f"{self._impact}, unsaid"
 
     def _fly(self) -> str:

@@ -83,7 +83,7 @@ class GroundContact:
         self.standing = False
         self._landing, self._lack, self._hardest = Landing(), Lack(), Hardest()
         self.times = self.times._replace(takeoff_us=now_us)
-        self._lines.say(INFO, "take-off")
+        self._lines.say(INFO, "Takeoff detected")
 
     def land(self, now_us: int) -> None:
         self.standing = True
@@ -92,7 +92,7 @@ class GroundContact:
         if self.impact:
             self._lines.say(CRITICAL, self.impact)
         else:
-            self._lines.say(NOTICE, "landing detected")
+            self._lines.say(NOTICE, "Landing detected")
 
     def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
         """Detect ground in flight; return whether the vehicle fell to it, below the height that is wanted."""

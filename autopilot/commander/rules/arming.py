@@ -33,7 +33,7 @@ class ArmingInputs(NamedTuple):
 def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
     minimum, maximum = VOLTAGE_OF
     healthy = minimum * empty_v <= voltage_v <= maximum * full_v
-    return "" if healthy else f"battery not healthy: {voltage_v:.1f} V"
+    return "" if healthy else f"battery unhealthy: {voltage_v:.1f} V"
 
 
 def refusals(inputs: ArmingInputs) -> Iterator[str]:
@@ -47,9 +47,9 @@ def refusals(inputs: ArmingInputs) -> Iterator[str]:
     if (fastest_m_s := max(map(abs, state.velocity_enu_m_s))) > MAX_SPEED_M_S:
         yield f"moving at {fastest_m_s:.1f} m/s"
     if not inputs.standing:
-        yield "not standing on the ground"
+        yield "not on the ground"
     if inputs.charge < MIN_CHARGE:
-        yield f"battery at {inputs.charge:.0%}"
+        yield f"battery low: {inputs.charge:.0%}"
     if inputs.battery:
         yield inputs.battery
     if stick is not None and stick > MAX_THRUST_STICK:

@@ -86,7 +86,7 @@ def following(
             held_us[condition] = now_us
         elif now_us - held_us.get(condition, now_us) >= CLEAR_AFTER_US and not (row.kept and flight.armed):
             del held_us[condition]
-            cleared.append((NOTICE, f"{condition}: cleared"))
+            cleared.append((NOTICE, f"Failsafe cleared: {condition}"))
     if not begun:
         return FailsafeDecision(FailsafeMemory(held_us, flight.armed), Action.NONE, tuple(cleared))
     action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
@@ -98,13 +98,13 @@ def _begin(begun: list[tuple[FailsafeRow, Action]], flight: FlightState) -> tupl
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)
         if action is Action.WARN:
-            lines.append((WARNING, f"{row.condition}: {row.warns}" if row.warns else str(row.condition)))
+            lines.append((WARNING, f"Warning: {row.condition}" + (f", {row.warns}" if row.warns else "")))
         elif action > max(begins, flight.rank):
             begins = action
             if row.reported:
-                lines.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
+                lines.append((_SEVERITIES[action], f"Failsafe activated: {row.condition}, {NAMES[action]}"))
         elif row.reported:
-            lines.append((WARNING, f"{row.condition}: {NAMES[max(begins, flight.rank)]} goes on"))
+            lines.append((WARNING, f"Failsafe: {row.condition}, {NAMES[max(begins, flight.rank)]} continues"))
     return begins, lines
 
 

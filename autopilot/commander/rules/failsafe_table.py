@@ -24,7 +24,7 @@ NAMES: Mapping[Action, str] = {
     Action.RETURN: "return",
     Action.LAND: "land",
     Action.DESCEND: "descend",
-    Action.TERMINATE: "rotors stop",
+    Action.TERMINATE: "terminate",
 }
 MEANINGS: Mapping[Action, str] = {
     Action.NONE: "neither action nor report",
@@ -44,11 +44,11 @@ class Condition(StrEnum):
     TILTED = "tilted too far"
     ROTOR_FAILED = "rotor failed"
     POSITION_LOST = "position lost"
-    ESTIMATE_INVALID = "estimate not healthy"
+    ESTIMATE_INVALID = "estimate invalid"
     BATTERY_EMERGENCY = "battery nearly empty"
     BATTERY_CRITICAL = "battery critical"
-    PLAN_FAILED = "control law finds no plan"
-    DEADLINE_MISSED = "control deadline missed"
+    PLAN_FAILED = "no MPC solution"
+    DEADLINE_MISSED = "deadline missed"
     TELEMETRY_MISSED = "telemetry missed"
     STATION_LOST = "ground station lost"
     FENCE_BREACHED = "geofence breached"

@@ -47,13 +47,13 @@ class Event(StrEnum):
     SELECT = "selected"
     ARM = "armed"
     DISARM = "disarmed"
-    ARRIVED = "height reached"
+    ARRIVED = "take-off height reached"
     FINISHED = "finished"
     RETURN_ITEM = "return item reached"
     SAVED_BY_HOLD = "failsafe: hold"
     SAVED_BY_RETURN = "failsafe: return"
     SAVED_BY_LANDING = "failsafe: land"
-    TERMINATED = "failsafe: rotors stop"
+    TERMINATED = "failsafe: terminate"
     TOUCHED_DOWN = "landed"
     LEFT_STANDING = "no take-off"
 
@@ -188,7 +188,7 @@ def next_state(state: State, event: Event, selected: Mode | None, missing: Mappi
     if event is Event.ARM:
         need = first_missing(mode, missing)
         if need is not None or not ROWS[mode].to_arm:
-            return Refusal(f"not armed in {mode}: {missing[need] if need else 'choose another mode first'}")
+            return Refusal(f"Arming denied in {mode}: {missing[need] if need else 'choose another mode first'}")
     armed = event is Event.ARM or (state.armed and not row.disarms)
     return State(mode, armed)
 

@@ -27,7 +27,7 @@ def test_a_mission_is_flown_item_after_item_and_then_held() -> None:
     assert cockpit.missions.take_reached() == []
     assert cockpit.missions.progress().state == COMPLETE
     assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
-    assert cockpit.said("finished: hold")
+    assert cockpit.said("Mission finished: hold")
     assert cockpit.state.position_enu_m == pytest.approx((5.0, 5.0, 10.0), abs=0.3)
 
 
@@ -50,7 +50,7 @@ def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
     cockpit.pilot.select(Mode.MISSION, {})
     cockpit.fly_for(8.0)
     assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
-    assert cockpit.said("return item reached: return")
+    assert cockpit.said("Mission RTL item: return")
     assert cockpit.missions.take_reached() == [0, 1]
     assert cockpit.missions.progress().state == COMPLETE
     cockpit.fly_for(60.0)

@@ -82,7 +82,7 @@ def test_a_flying_vehicle_is_disarmed_by_force_alone(mode: Mode) -> None:
     cockpit.pilot.select(mode, {})
     refusal = cockpit.pilot.disarm()
     assert refusal is not None
-    assert refusal.reason == "not disarmed: the vehicle is flying"
+    assert refusal.reason == "Disarming denied: not landed"
     assert cockpit.pilot.disarm(force=True) is None
     assert not cockpit.pilot.state.armed
     assert ROWS[cockpit.pilot.state.mode].to_arm
@@ -99,7 +99,7 @@ def test_a_takeoff_climbs_and_holds() -> None:
     assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
     assert cockpit.state.position_enu_m[2] == pytest.approx(2.5, abs=0.1)
     assert isinstance(cockpit.pilot.task, HoldTask) is False, "the climb holds its end"
-    assert cockpit.said("height reached: hold")
+    assert cockpit.said("Takeoff altitude reached: hold")
 
 
 def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
@@ -109,7 +109,7 @@ def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
     assert cockpit.pilot.ground.standing
     assert cockpit.pilot.state == FIRST
     assert cockpit.guidance is RESTS
-    assert [text for _, text in cockpit.lines.take()][-2:] == ["landing detected", "landed, rotors stopped"]
+    assert [text for _, text in cockpit.lines.take()][-2:] == ["Landing detected", "Disarmed by landing"]
 
 
 def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
@@ -119,7 +119,7 @@ def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
     assert cockpit.pilot.state.armed
     cockpit.fly_for(0.2)
     assert cockpit.pilot.state == FIRST
-    assert cockpit.said("no take-off, rotors stopped")
+    assert cockpit.said("Disarmed by auto preflight disarming")
 
 
 def test_home_is_set_at_arming_unless_it_was_chosen() -> None:

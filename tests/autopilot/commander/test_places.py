@@ -217,4 +217,4 @@ def test_a_fence_of_this_frame_prevents_arming() -> None:
     cockpit = Cockpit((20.0, 0.0, 0.0))
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
     outcome = cockpit.do("COMPONENT_ARM_DISARM", 1.0)
-    assert (outcome.result, outcome.reason) == (DENIED, "not armed: outside the geofence")
+    assert (outcome.result, outcome.reason) == (DENIED, "Arming denied: outside the geofence")

@@ -48,7 +48,8 @@ def test_what_is_lost_begins_what_its_parameter_says(row: FailsafeRow, value: in
         assert action not in begun
     else:
         assert action in begun
-        assert not row.reported or any(text.startswith(f"{row.condition}: ") for text in texts)
+        assert not row.reported or any(f": {row.condition}, " in text for text in texts)
+    assert all(len(text) <= 50 for text in texts)  # one STATUSTEXT
     assert saves.holds(row.condition) is (action is not Action.NONE)
 
 

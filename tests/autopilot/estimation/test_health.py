@@ -22,5 +22,5 @@ def test_each_change_is_said_once() -> None:
 
 def test_what_is_not_known_is_named() -> None:
     assert not_known(WELL) == ""
-    assert not_known(WELL._replace(dead_reckoning=True)) == "position not known"
-    assert not_known(WELL._replace(heading=False, height=False)) == "heading not known, height not known"
+    assert not_known(WELL._replace(dead_reckoning=True)) == "no position estimate"
+    assert not_known(WELL._replace(heading=False, height=False)) == "no heading estimate, no height estimate"

@@ -63,11 +63,11 @@ def names(flight: Flight) -> list[str]:
 def test_there_is_one_from_arming_to_disarming(flight: Flight) -> None:
     flight.run(10, "ready", armed=False)
     assert names(flight) == []
-    flight.run(101, "rotors armed")
-    flight.run(1, "landed, rotors stopped", armed=False)
+    flight.run(101, "Armed")
+    flight.run(1, "Disarmed by landing", armed=False)
     flight.run(10, "ready again", armed=False)
     log = flight.read()
-    assert [said.message for said in log.logged_messages] == ["rotors armed", "landed, rotors stopped"]
+    assert [said.message for said in log.logged_messages] == ["Armed", "Disarmed by landing"]
     assert times_us(log) == list(range(3 * EVERY_US, 112 * SAMPLE_US, EVERY_US))
     assert log.get_dataset("vehicle_status").data["arming_state"].tolist() == [2, 1]
     flight.run(5)

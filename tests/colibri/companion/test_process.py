@@ -73,7 +73,7 @@ def test_a_flight_over_udp_is_handed_over_in_order(tmp_path: Path) -> None:
         options = f"hover:height=2 --arm --duration 3 {late}".split()
         ended = companion(tmp_path / "out", flown.port, *options)
         assert ended.returncode == 0, ended.stderr
-        assert "height reached: hold" in flown.said
+        assert "Takeoff altitude reached: hold" in flown.said
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert report["control_rmse_m"] < 0.5
     assert report["lost"] is None

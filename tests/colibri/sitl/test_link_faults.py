@@ -58,7 +58,7 @@ def flown(launcher: Launcher | None, fly: Callable[[Sitl], object], **setting: A
 def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
     in_memory = flown(None, up_and_on, feedback=feedback, **IN_WIND)
     assert flown(forked, up_and_on, feedback=feedback, **IN_WIND) == in_memory
-    assert any("take-off" in text for text in in_memory[1])
+    assert any("Takeoff" in text for text in in_memory[1])
 
 
 def test_the_same_flight_of_processes_from_scratch() -> None:

@@ -62,7 +62,7 @@ def test_a_low_voltage_counts_as_a_low_charge(sitl: Sitl) -> None:
     sitl.run(0.6)
     assert in_mode(sitl, Mode.LAND)
     assert charge_state(sitl) == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
-    assert sitl.said("battery critical: land")
+    assert sitl.said("Failsafe activated: battery critical, land")
 
 
 @pytest.mark.sitl(
@@ -71,7 +71,7 @@ def test_a_low_voltage_counts_as_a_low_charge(sitl: Sitl) -> None:
 def test_a_plant_without_battery_has_none_that_is_low(sitl: Sitl) -> None:
     sitl.run(1.5)
     assert sitl.mode is Mode.HOLD
-    assert not sitl.said("battery critical: land")
+    assert not sitl.said("Failsafe activated: battery critical, land")
 
 
 @pytest.mark.sitl(airborne=5.0, params={"COM_TEL_LOSS_ACT": 1, "COM_TEL_LOSS_T": 0.1})
@@ -84,10 +84,10 @@ def test_missed_frames_lead_to_what_is_set(sitl: Sitl) -> None:
     sitl.run(0.5)
     sitl.inside.skip(25)
     sitl.run(0.1)
-    assert sitl.said("telemetry missed: return goes on")
+    assert sitl.said("Failsafe: telemetry missed, return continues")
     sitl.select(Mode.HOLD)
     sitl.run(1.2)
-    assert sitl.said("telemetry missed: cleared")
+    assert sitl.said("Failsafe cleared: telemetry missed")
 
 
 def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[Sitl]]) -> None:
@@ -98,7 +98,7 @@ def test_a_control_law_that_finds_no_plan_stops(sitl_fleet: Callable[..., list[S
     sitl.select(Mode.TRACK)
     assert sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=1.0) == pytest.approx(0.5, abs=0.05)
     sitl.step()
-    assert sitl.said("control law finds no plan: hold")
+    assert sitl.said("Failsafe activated: no MPC solution, hold")
 
 
 @pytest.mark.sitl(airborne=8.0, params={"COM_LOW_BAT_ACT": 2, "BAT_LOW_T": 0.1})

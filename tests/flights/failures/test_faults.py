@@ -105,5 +105,5 @@ def test_a_fall_is_an_impact_in_any_mode(sitl: Sitl, mode: Mode) -> None:
         sitl.inject("motor", "off")
         sitl.wait_until(lambda: sitl.position[2] < 0.01, within=2.0)
         sitl.wait_until(lambda: not sitl.armed, within=1.0)
-    assert sitl.said("impact at 7")
-    assert sitl.texts[-1] == "impact, rotors stopped"
+    assert sitl.said("Impact at 7")
+    assert sitl.texts[-1] == "Disarmed by impact"

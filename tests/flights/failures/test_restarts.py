@@ -54,12 +54,12 @@ def test_a_mission_goes_on_as_if_nothing_had_happened(sitl_fleet: Callable[..., 
     assert len(restarts) > 15
     assert reached(sitl) == reached(wanted) == [0, 1, 2, 3, 4, 3, 4, 5, 6, 7, 8, 9, 10, 11]
     assert hypot(*wanted.position[:2]) < 0.15
-    assert wanted.said("return item reached: return")
+    assert wanted.said("Mission RTL item: return")
     frames = min(len(sitl.path), len(wanted.path))
     off_m = np.linalg.norm(sitl.path[:frames] - wanted.path[:frames], axis=1)
     assert off_m.max() < 0.6  # the circle is joined where it is nearest, which the restart finds again
-    assert sitl.said("restarted in flight: mission goes on at item 3")
-    assert sitl.said("restarted in flight: return goes on")
+    assert sitl.said("Restarted in flight: mission continues at item 3")
+    assert sitl.said("Restarted in flight: return continues")
     charges_ah = [each.inside.copter.parts.battery.charge_ah for each in (sitl, wanted)]
     assert charges_ah[0] == pytest.approx(charges_ah[1], rel=0.01)
 
@@ -114,7 +114,7 @@ def test_a_caught_vehicle_goes_on_with_its_mission(sitl: Sitl) -> None:
     restart(sitl, lambda kept: kept._replace(checkpoint=kept.checkpoint._replace(state_source=b"")))
     sitl.run(0.5)
     sitl.wait_until(lambda: state(sitl) == HOLDING, within=20.0)
-    assert sitl.said("restarted in flight: mission goes on at item 0")
+    assert sitl.said("Restarted in flight: mission continues at item 0")
     assert sitl.said("found falling")
     assert sitl.is_at((0.0, 5.0, 12.0), 3.0, slow_m_s=1.0)
 
@@ -144,7 +144,7 @@ def test_offboard_waits_for_setpoints_as_after_a_loss(sitl: Sitl) -> None:
         sitl.run(0.9)
         assert sitl.mode is Mode.OFFBOARD
     sitl.run(0.2)
-    assert sitl.said("setpoints lost: hold")
+    assert sitl.said("Failsafe activated: setpoints lost, hold")
 
 
 def test_plans_and_home_are_kept_on_the_ground_too(sitl: Sitl) -> None:

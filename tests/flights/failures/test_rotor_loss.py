@@ -42,7 +42,7 @@ def test_it_lands_upright_on_three_rotors(sitl: Sitl, rotor: int) -> None:
     sitl.run(0.4)
     fall(sitl, rotor)
     assert sitl.said(f"rotor {rotor + 1} failed: landing on three rotors")
-    assert sitl.said("landed, rotors stopped")
+    assert sitl.said("Disarmed by landing")
 
 
 @pytest.mark.sitl(feedback="sensors", seed=3)
@@ -67,7 +67,7 @@ def test_with_a_lost_rotor_only_landing_is_possible(sitl: Sitl) -> None:
     assert sitl.gcs.latest("HEARTBEAT").system_status == mav.MAV_STATE_EMERGENCY
     refused(sitl, "hold refused: rotor 2 failed", sitl.select, Mode.HOLD)
     sitl.wait_until(lambda: not sitl.armed, within=20.0)
-    refused(sitl, "not armed: rotor 2 failed", sitl.arm)
+    refused(sitl, "Arming denied: rotor 2 failed", sitl.arm)
     refused(sitl, "", sitl.arm, force=True)
     sitl.set_param("CA_FAILURE_MODE", 0)
     sitl.set_param("CA_FAILURE_MODE", 1)

@@ -27,7 +27,7 @@ OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
 def test_without_a_position_it_lands_and_does_not_hold(sitl: Sitl) -> None:
     sitl.takeoff(4.0)
     sitl.inject("gps", "off")
-    sitl.wait_until(lambda: sitl.said("position lost: descend"), within=30.0)
+    sitl.wait_until(lambda: sitl.said("Failsafe activated: position lost, descend"), within=30.0)
     assert sitl.mode is Mode.LAND
     refused(sitl, "the position is not known", sitl.select, Mode.HOLD)
     sitl.wait_until(lambda: not sitl.armed, within=30.0)
@@ -48,7 +48,7 @@ def test_gps_that_reports_zero_is_not_followed(sitl: Sitl, monkeypatch: pytest.M
 
     monkeypatch.setattr(autopilot, "step", nowhere)
     sitl.hold(lambda: hypot(*sitl.position[:2]) > 5.0, for_=10.0)
-    assert sitl.said("GPS lost: position by dead reckoning")
+    assert sitl.said("Warning: GPS lost, position by dead reckoning")
     assert dist(sitl.position, (8.0, 0.0, 5.0)) < 2.0
 
 
@@ -58,7 +58,7 @@ def test_before_the_first_estimate_commands_are_denied(sitl: Sitl) -> None:
     sitl.send("SET_MODE", SYSTEM, 1, 0)  # not heard yet
     sitl.wait_until(lambda: sitl.gcs.acks, within=1.0)
     assert [(ack.command, ack.result) for ack in sitl.gcs.acks] == [(mav.MAV_CMD_COMPONENT_ARM_DISARM, DENIED)]
-    assert sitl.said("not ready: attitude and position are not known yet")
+    assert sitl.said("Not ready: no attitude and position estimate yet")
     sitl.run(3.0)
     sitl.arm()
 
@@ -85,11 +85,11 @@ def test_a_sudden_accelerometer_bias_is_estimated(sitl: Sitl) -> None:
 @pytest.mark.parametrize(
     ("unit", "kind", "says"),
     [
-        ("accel", "stuck", "accelerometer lost: land"),
-        ("accel", "garbage", "accelerometer lost: land"),
-        ("gyro", "off", "gyroscope lost: land"),
-        ("gyro", "garbage", "gyroscope lost: land"),
-        ("baro", "off", "barometer lost"),
+        ("accel", "stuck", "Failsafe activated: accelerometer lost, land"),
+        ("accel", "garbage", "Failsafe activated: accelerometer lost, land"),
+        ("gyro", "off", "Failsafe activated: gyroscope lost, land"),
+        ("gyro", "garbage", "Failsafe activated: gyroscope lost, land"),
+        ("baro", "off", "Warning: barometer lost"),
     ],
 )
 @pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
@@ -100,7 +100,7 @@ def test_without_a_sensor_it_lands_softly(sitl: Sitl, unit: str, kind: str, says
     assert outcome.disarmed_s is not None
     assert outcome.disarmed_s < 10.0
     assert says in outcome.texts
-    assert not any("impact" in text for text in outcome.texts)
+    assert not any("mpact" in text for text in outcome.texts)
 
 
 @pytest.mark.sitl(feedback="sensors", seed=2, wind="5@270", strict=False)
@@ -109,7 +109,7 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
     sitl.select(Mode.LAND)
     sitl.wait_until(lambda: sitl.position[2] < 0.8, within=10.0)
     sitl.inject("gyro", "delayed", 0, 2.0)
-    sitl.wait_until(lambda: sitl.said("landing detected"), within=3.0)
+    sitl.wait_until(lambda: sitl.said("Landing detected"), within=3.0)
     sitl.wait_until(lambda: not sitl.armed, within=3.0)
     assert sitl.tilt_deg < 5.0
 

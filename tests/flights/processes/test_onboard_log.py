@@ -97,7 +97,7 @@ def test_the_log_that_has_all_samples_has_the_same_numbers(flown: Flown) -> None
 
 def test_both_logs_have_the_status_texts(flown: Flown) -> None:
     said = [line.message for line in flown.log.logged_messages]
-    assert "landed, rotors stopped" in said
+    assert "Disarmed by landing" in said
     assert set(said) <= set(flown.texts)
     beside = [line.message for line in flown.beside.logged_messages]
     assert [text for text in beside if text in said] == said

@@ -31,7 +31,7 @@ def test_rotors_idle_when_armed_and_stop_when_disarmed(sitl: Sitl) -> None:
     assert max(sitl.inside.world.rotor_speeds) < 1.0
     for param in (2.0, 0.5, -1.0, nan, 1e30):
         assert sitl.command(ARM, param) == DENIED
-    assert sitl.said("rotors armed")
+    assert sitl.said("Armed")
     assert sitl.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
@@ -52,17 +52,17 @@ def test_takeoff_hover_and_landing(sitl: Sitl) -> None:
     assert in_mode(sitl, Mode.HOLD)
     assert sitl.position == pytest.approx((0.0, 0.0, 2.5), abs=0.01)
     assert landed_state() == mav.MAV_LANDED_STATE_IN_AIR
-    refused(sitl, "not disarmed: the vehicle is flying", sitl.disarm)
+    refused(sitl, "Disarming denied: not landed", sitl.disarm)
     assert sitl.armed
     assert sitl.command(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan) == ACCEPTED
     sitl.wait_until(lambda: sitl.position[2] < 0.05, within=5.0)
     assert sitl.velocity[2] == pytest.approx(-0.7, abs=0.05)  # MPC_LAND_SPEED
-    sitl.wait_until(lambda: sitl.said("landing detected"), within=2.0)
+    sitl.wait_until(lambda: sitl.said("Landing detected"), within=2.0)
     stood_s = sitl.wait_until(lambda: not sitl.armed, within=5.0)
     assert stood_s == pytest.approx(2.0, abs=0.02)  # COM_DISARM_LAND
     assert sitl.inside.copter.pilot.state == FIRST
     sitl.step()
-    assert sitl.said("landed, rotors stopped")
+    assert sitl.said("Disarmed by landing")
     assert sitl.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
     sitl.arm()  # the height is forgotten
     sitl.run(1.0)
@@ -90,8 +90,8 @@ def test_a_takeoff_in_the_air_never_sinks(sitl: Sitl) -> None:
 def test_force_stops_the_rotors_in_the_air(sitl: Sitl, command: tuple[float, ...]) -> None:
     assert sitl.command(int(command[0]), *command[1:]) == ACCEPTED
     assert not sitl.armed
-    refused(sitl, "not standing on the ground", sitl.arm)
-    assert sitl.said("rotors stopped in the air")
+    refused(sitl, "not on the ground", sitl.arm)
+    assert sitl.said("Disarmed in flight")
     standing = lambda: sitl.inside.copter.pilot.ground.standing  # noqa: E731
     assert sitl.wait_until(standing, within=5.0) > 0.6
     assert not any(sitl.rotors.controls)

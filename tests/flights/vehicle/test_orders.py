@@ -147,13 +147,13 @@ def test_no_takeoff_outside_the_geofence(sitl: Sitl) -> None:
     sitl.upload_fence(items.polygon([(20.0, 20.0), (30.0, 20.0), (30.0, 30.0)]))
     assert sitl.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == DENIED
     sitl.run(0.2)
-    refused(sitl, "not armed: outside the geofence", sitl.arm)
+    refused(sitl, "Arming denied: outside the geofence", sitl.arm)
 
 
 @pytest.mark.sitl(airborne=None, params={"GF_MAX_VER_DIST": 8.0, "GF_MARGIN": 10.0})
 def test_no_takeoff_where_the_margin_leaves_no_room(sitl: Sitl) -> None:
     sitl.run(1.0)
-    refused(sitl, r"not armed: within 10 m \(GF_MARGIN\) of the geofence's edge", sitl.arm)
+    refused(sitl, r"Arming denied: within 10 m \(GF_MARGIN\) of the geofence's edge", sitl.arm)
 
 
 @pytest.mark.sitl(airborne=2.0, params={"RTL_RETURN_ALT": 2.0, "RTL_MIN_DIST": 1.0, "COM_DISARM_LAND": 0.1})

@@ -192,7 +192,7 @@ def test_takeoff_and_landing_by_hand(sitl: Sitl, mode: Mode) -> None:
     assert sitl.position[2] > 0.5
     with sitl.sticks_held(thrust=0.2):
         sitl.wait_until(lambda: not sitl.armed, within=8.0)
-    assert sitl.said("landing detected")
+    assert sitl.said("Landing detected")
 
 
 def target(sitl: Sitl, place: Vector, velocity: Vector = STILL) -> None:

@@ -66,7 +66,7 @@ SCENARIOS = (
             do.disarm(force=True),
             do.check(see.DISARMED),
             do.run(0.8),
-            do.check(see.every(see.DISARMED, see.says("rotors stopped in the air"))),
+            do.check(see.every(see.DISARMED, see.says("Disarmed in flight"))),
         ),
         setting={"airborne": 8.0},
     ),

@@ -77,7 +77,7 @@ SCENARIOS = (
             do.check(see.says("GPS lost")),
             do.inject("sensor_gps", "ok"),
             do.run(10.0),
-            do.check(see.every(see.over(0.0, 0.0, 1.5), see.says("GPS lost: cleared"))),
+            do.check(see.every(see.over(0.0, 0.0, 1.5), see.says("Failsafe cleared: GPS lost"))),
         ),
         setting=ON_SENSORS,
         seeds=(1, 2),

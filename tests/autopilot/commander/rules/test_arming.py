@@ -30,10 +30,10 @@ FAILING = [
     (INPUTS._replace(state=tilted(46.0)), "tilted by 46 degrees, more than 45"),
     (INPUTS._replace(state=tilted(180.0)), "tilted by 180 degrees"),
     (INPUTS._replace(state=moving((0.0, -0.6, 0.0))), "moving at 0.6 m/s"),
-    (INPUTS._replace(standing=False), "not standing on the ground"),
-    (INPUTS._replace(charge=0.09), "battery at 9%"),
+    (INPUTS._replace(standing=False), "not on the ground"),
+    (INPUTS._replace(charge=0.09), "battery low: 9%"),
     (INPUTS._replace(thrust_stick=0.7), "thrust stick is up"),
-    (INPUTS._replace(battery="battery not healthy: 0.0 V"), "battery not healthy: 0.0 V"),
+    (INPUTS._replace(battery="battery unhealthy: 0.0 V"), "battery unhealthy: 0.0 V"),
     (INPUTS._replace(outside_fence=Refusal("outside the geofence")), "outside the geofence"),
 ]
 
@@ -76,7 +76,7 @@ def test_every_reason_is_told_at_once() -> None:
         0.0,
         1.0,
         Refusal("outside"),
-        "height not known",
+        "no height estimate",
         "battery critical",
     )
     assert len(list(refusals(inputs))) == len(ArmingInputs._fields) + 1  # of the state, tilt and speed

@@ -64,7 +64,7 @@ def test_what_begins_is_done_and_said(action: Action) -> None:
     memory, done, said = begun({Condition.STATION_LOST: action})
     assert done is action
     severity = {Action.HOLD: WARNING, Action.TERMINATE: EMERGENCY}.get(action, CRITICAL)
-    assert said == ((severity, f"ground station lost: {NAMES[action]}"),)
+    assert said == ((severity, f"Failsafe activated: ground station lost, {NAMES[action]}"),)
     again = following(memory, NOW_US + 8000, {Condition.STATION_LOST: 0}, everything(action), IN_FLIGHT)
     assert again.action is Action.NONE
     assert again.lines == ()
@@ -76,7 +76,7 @@ def test_of_all_that_begin_the_highest_is_done_and_each_is_said(wanted: dict[Con
     highest = max(wanted.values(), default=Action.NONE)
     assert done is (highest if highest > Action.WARN else Action.NONE)
     heard = [each for each, action in wanted.items() if action is Action.WARN or (action and ROWS[each].reported)]
-    assert sorted(text.partition(":")[0] for _, text in said) == sorted(heard)
+    assert sorted(text.split(": ")[1].split(",")[0] for _, text in said) == sorted(heard)
 
 
 @given(st.lists(st.tuples(CONDITIONS, ACTIONS), max_size=12), st.sampled_from(list(Mode)))
@@ -103,7 +103,7 @@ def test_who_lands_need_not_return_and_it_is_said() -> None:
     for flight in (IN_FLIGHT._replace(mode=Mode.LAND), IN_FLIGHT._replace(saving=Action.LAND)):
         _, done, said = begun({Condition.STATION_LOST: Action.RETURN}, flight)
         assert done is Action.NONE
-        assert said == ((WARNING, "ground station lost: land goes on"),)
+        assert said == ((WARNING, "Failsafe: ground station lost, land continues"),)
     assert begun({Condition.POSITION_LOST: Action.DESCEND}, flight).action is Action.DESCEND
 
 
@@ -128,7 +128,7 @@ def run(
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
 def test_the_end_of_a_condition_is_reported_once(row: FailsafeRow) -> None:
     memory = begun({row.condition: Action.HOLD}).memory
-    assert run(memory, 3.0, {}, Action.HOLD, IN_FLIGHT) == ([] if row.kept else [f"{row.condition}: cleared"])
+    assert run(memory, 3.0, {}, Action.HOLD, IN_FLIGHT) == ([] if row.kept else [f"Failsafe cleared: {row.condition}"])
 
 
 def test_a_link_that_comes_and_goes_is_lost_once() -> None:
@@ -157,7 +157,7 @@ def test_a_pilots_choice_holds_until_another_condition_begins() -> None:
 def test_on_the_ground_the_rotors_stop(condition: Condition, action: Action) -> None:
     _, done, said = begun({condition: action}, IN_FLIGHT._replace(standing=True, mode=Mode.HOLD))
     assert done is Action.TERMINATE
-    assert said == (((EMERGENCY, f"{condition}: rotors stop"),) if ROWS[condition].reported else ())
+    assert said == (((EMERGENCY, f"Failsafe activated: {condition}, terminate"),) if ROWS[condition].reported else ())
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
@@ -186,12 +186,12 @@ def test_in_flight_conditions_end_with_the_flight() -> None:
 
 
 def test_rows_say_what_they_add_to_a_warning() -> None:
-    assert begun({Condition.GPS_LOST: Action.WARN}).lines == ((WARNING, "GPS lost: position by dead reckoning"),)
+    assert begun({Condition.GPS_LOST: Action.WARN}).lines == ((WARNING, "Warning: GPS lost, position by dead reckoning"),)
     assert ROWS[Condition.BATTERY_LOW].warns == ""
-    assert begun({Condition.BATTERY_LOW: Action.WARN}).lines == ((WARNING, "battery low"),)
+    assert begun({Condition.BATTERY_LOW: Action.WARN}).lines == ((WARNING, "Warning: battery low"),)
 
 
 def test_the_page_is_current() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert page == with_tables(page, tables())
-    assert f"cleared` once the condition has not held for {CLEAR_AFTER_US * 1e-6:g} s" in page
+    assert f"`Failsafe cleared: ground station lost` once the condition has not held for {CLEAR_AFTER_US * 1e-6:g} s" in page

@@ -43,6 +43,6 @@ def test_a_vehicle_is_armed_takes_off_goes_and_lands(tmp_path: Path, monkeypatch
         flown.seen.wait(lambda sight: sight.mode is Mode.LAND, "the descent")
         down = flown.seen.wait_until_disarmed()
         assert dist(down.position_enu_m, (east, north, 0.0)) < 2.0 * NEAR_M
-        page.get_by_text("landed, rotors stopped").wait_for()
+        page.get_by_text("Disarmed by landing").wait_for()
         page.get_by_text("disarmed").wait_for()
         assert not tab.complaints
