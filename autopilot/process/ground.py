@@ -241,9 +241,9 @@ class GroundService:
         self._reported_s, self._reported_us = now_s, pilot.context().now_us
         heard = {(link["url"], who) for link in facts for who in link["heard"]}
         for url, who in sorted(heard - self._sources):
-            self._status.say("heard", f"system {who} is heard on {url}")
+            self._status.say("heard", f"receiving from system {who} on {url}")
         for url, who in sorted(self._sources - heard):
-            self._status.say("heard", f"system {who} is heard no more on {url}")
+            self._status.say("heard", f"system {who} is silent on {url}")
         self._sources = heard
         if self._state.signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
             self._saved_s = now_s

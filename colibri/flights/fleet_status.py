@@ -118,7 +118,7 @@ def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _link_texts(link: dict[str, Any], width: int) -> tuple[str, ...]:
-    who = " ".join(link["heard"]) or "nobody"
+    source = " ".join(["from", *link["heard"]]) if link["heard"] else "no client"
     if width < _LINKS_WIDTH:
-        return (link["url"].partition(":")[2], f"hears {who}")
-    return (link["url"], f"hears {who}", f"{link['received_hz']:.0f}/s in", f"{link['sent_hz']:.0f}/s out")
+        return (link["url"].partition(":")[2], source)
+    return (link["url"], source, f"{link['received_hz']:.0f}/s in", f"{link['sent_hz']:.0f}/s out")

@@ -200,8 +200,8 @@ def test_the_status_line_fits_a_terminal() -> None:
     assert drawn(0) == [
         " id    time   real mode       rotors     east  north      up    speed solver",
         "  1 12346 s x 1.00 stabilized disarmed    0.0 -123.5  78.9 m 12.3 m/s 123 µs",
-        "  1  udpout:127.0.0.1:14550  hears 255/190  2/s in  61/s out",
-        "  1  udpout:127.0.0.1:14540  hears nobody   0/s in   0/s out",
+        "  1  udpout:127.0.0.1:14550  from 255/190  2/s in  61/s out",
+        "  1  udpout:127.0.0.1:14540  no client     0/s in   0/s out",
     ]
 
 
@@ -209,8 +209,8 @@ def test_a_narrow_terminal_shows_what_matters_most() -> None:
     assert drawn(0, width=40) == [
         " id    time mode       rotors        up",
         "  1 12346 s stabilized disarmed  78.9 m",
-        "  1  127.0.0.1:14550  hears 255/190",
-        "  1  127.0.0.1:14540  hears nobody",
+        "  1  127.0.0.1:14550  from 255/190",
+        "  1  127.0.0.1:14540  no client",
     ]
     assert drawn(0, width=20)[0].split() == ["id", "mode"]
 
@@ -220,6 +220,6 @@ def test_the_status_lines_of_a_fleet_leave_out_who_is_not_heard() -> None:
         " id    time   real mode       ",
         "  1 12346 s x 1.00 stabilized ",
         "  2 12346 s x 1.00 stabilized ",
-        "  1  udpout:127.0.0.1:14550  h",
-        "  2  udpout:127.0.0.1:14550  h",
+        "  1  udpout:127.0.0.1:14550  f",
+        "  2  udpout:127.0.0.1:14550  f",
     ]
