@@ -46,9 +46,9 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
     references: References
     """Velocity and yaw from the track's formula, or by backward differences as in the thesis."""
     delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=0.2)] | None = None
-    """From a frame to the moment at which its command takes effect, compensated; None: as the plant measures it."""
+    """Delay to compensate, from a frame until its command takes effect; None: as measured by the plant."""
     controllers: dict[str, dict[str, Any]]
-    """The numbers of each control law that the profile knows; each law reads its own table strictly."""
+    """Settings of each control law; unknown keys are refused."""
     simulation: SimulationSettings
 
 

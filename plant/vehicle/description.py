@@ -68,11 +68,11 @@ class Rotors(Table, frozen=True, kw_only=True):
     gyroscopic_term: Literal["conserving", "as-printed"]
     """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
     idle_speed: NotNegative = 0.0
-    """What an armed rotor never falls below."""
+    """Least speed of an armed rotor."""
     strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
     """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
     control: Literal["speed", "thrust"] = "speed"
-    """What a control of 0 to 1 is a part of in the interfaces of other simulators and autopilots."""
+    """Quantity that a control of 0 to 1 scales, in interfaces of other simulators and autopilots."""
     lag: RotorLag | None = None
     """Without it, rotors follow their commands at once."""
 

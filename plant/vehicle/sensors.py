@@ -15,7 +15,7 @@ class SensorPart(Table, frozen=True, kw_only=True):
     """A part that can be bought."""
 
     part: str
-    """What it is, with maker."""
+    """Maker and product."""
 
 
 class Accelerometer(SensorPart, frozen=True, kw_only=True):
@@ -60,7 +60,7 @@ class Gps(SensorPart, frozen=True, kw_only=True):
 
     rate_hz: Positive
     delay_s: NotNegative
-    """From the instant that it measures to that at which it sends, s."""
+    """Time from measurement to transmission, s."""
     fix_type: Annotated[int, msgspec.Meta(ge=3, le=6)]
     """Of GPS_FIX_TYPE: 3 on its own, 6 with carrier phase fixed (RTK)."""
     horizontal_noise_m: NotNegative
@@ -83,7 +83,7 @@ class Rangefinder(SensorPart, frozen=True, kw_only=True):
     noise_part: NotNegative
     """Of the distance: adds to that in square."""
     field_of_view_rad: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
-    """Angle of the beam's cone; what is nearest in it is measured."""
+    """Angle of the beam's cone; the nearest surface in it is measured."""
     height_m: Positive
     """Of the sensor above the ground while the vehicle stands on its feet."""
 

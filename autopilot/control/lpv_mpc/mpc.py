@@ -38,7 +38,7 @@ class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     first_correction: Positive
     next_correction: Positive
     terminal_thrust: Positive
-    """Part of the weight at which the terminal cost is taken."""
+    """Thrust at the terminal cost, part of the weight."""
 
 
 class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -47,11 +47,11 @@ class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     blocks: Annotated[tuple[Count, ...], msgspec.Meta(min_length=1)]
     """Steps that each correction is held for; the horizon is their sum."""
     count_every: Count
-    """Steps between those at which errors count."""
+    """Steps between two counted errors."""
     max_tilt_deg: Degrees
     max_rate_rad_s: tuple[Positive, Positive, Positive]
     check_every: Count
-    """Steps between those at which soft limits are held."""
+    """Steps between two checks of the soft limits."""
     slack_weight: Positive
 
 

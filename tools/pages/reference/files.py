@@ -14,7 +14,7 @@ _CODES: dict[str, Mapping[Any, int]] = {"qp_status": STATUS_CODES, "fallback": F
 
 def _tables() -> Iterator[str]:
     for topic in FLIGHT_TOPICS:
-        yield markdown((f"of `{topic.name}`", "unit", "what it is"), list(_rows(topic.columns)), names=3)
+        yield markdown((f"of `{topic.name}`", "unit", "meaning"), list(_rows(topic.columns)), names=3)
 
 
 def _rows(columns: Iterable[Columns]) -> Iterator[tuple[str, ...]]:

@@ -77,7 +77,7 @@ def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> I
         note = notes.get(field.name) or comment or (_first_line(table) if table is not None else "")
         shown = f"`{value}` ({where})" if value else ""
         rows.append((f"`{field.encode_name}`", what + _optional(field), cell(shown), cell(note)))
-    yield markdown(("key", "what may be there", "for example", "what it is"), rows, names=4)
+    yield markdown(("key", "value", "example", "meaning"), rows, names=4)
     for table, key in inner:
         yield from _sections(table, key, said)
 
