@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Clock, Decision, Horizon, Preview, VehicleState
+from colibri.autopilot.control.scaling import scaled
 from colibri.autopilot.control.settings import ControlInterval, interval_us
 from colibri.autopilot.control.vehicle_model.mixer import Mixer
 from colibri.common.compiled_rotations import quaternion_from_euler
@@ -47,7 +48,7 @@ class GeometricController:
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         del clock
-        settings = read_settings(table, GeometricSettings)
+        settings = read_settings(scaled("geometric-se3", table, vehicle), GeometricSettings)
         self.control_interval_us = interval_us(settings.control_interval_s)
         self.preview = Preview(self.control_interval_us, 1)
         self._mass_kg = vehicle.body.mass_kg

@@ -6,10 +6,11 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 
 from colibri.autopilot.control.law_files import table_of
+from colibri.autopilot.control.scaling import formulas, scaled
 from colibri.autopilot.control.settings import ControlInterval, current_name
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.config import Table, named_text, plain, read_named, replaced, toml_names
-from colibri.plant.vehicle.description import Vehicle
+from colibri.common.config import SettingsError, Table, named_text, plain, read_named, replaced, toml_names, value_at
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -66,6 +67,40 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """Return the settings of a control law; empty for an unknown one."""
         return self.controllers.get(table_of(controller), {})
 
+    def of(self, vehicle: Vehicle) -> "Profile":
+        """Return the profile with the numbers of the laws that follow from a vehicle.
+
+        Raises:
+            ProfileError: The vehicle is too heavy for its rotors, or a ratio is invalid.
+        """
+        name = self.controller
+        try:
+            table = scaled(name, self.table(name), vehicle)
+        except SettingsError as error:
+            raise ProfileError(f"{self.where}: controllers.{name}: {error}") from error
+        if "scaling" not in self.table(name):
+            return self
+        return msgspec.structs.replace(self, controllers={**self.controllers, name: table})
+
+    def value(self, key: str) -> Any:
+        """Return the value at a dotted key: of the profile's own vehicle, if it follows from one."""
+        return value_at(self._with(key), key, ProfileError)
+
+    def _with(self, key: str) -> "Profile":
+        """Return the profile with a number that follows from the vehicle; for an unknown key, with all of them."""
+        law, _, number = key.partition(".")[2].partition(".")
+        room, _, name = number.partition(".")
+        table = self.table(law)
+        if "scaling" not in table or number in table or name.partition(".")[0] in table.get(room, ()):
+            return self
+        found = scaled(law, table, load_vehicle(self.simulation.vehicle))
+        known = [row for row in formulas(law) if number == row or number.startswith(f"{row}.")]
+        for row in known or formulas(law):
+            room, _, name = row.rpartition(".")
+            one = {room: {**table[room], name: found[room][name]}} if room else {name: found[name]}
+            table = {**table, **one}
+        return msgspec.structs.replace(self, controllers={**self.controllers, law: table})
+
     def replace(self, key: str, value: Any) -> "Profile":
         """Return the profile with another value at a dotted key; a star marks its name.
 
@@ -80,7 +115,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         changed = (
             replaced(self, above, {**self.controllers, law: value}, ProfileError)
             if whole
-            else replaced(self, key, value, ProfileError)
+            else replaced(self._with(str(key)), key, value, ProfileError)
         )
         changed = msgspec.structs.replace(changed, name=f"{self.name.rstrip('*')}*", file="")
         _check_frames(changed)

@@ -27,7 +27,7 @@ class Numbers:
     """Parameters of a control law and a vehicle model."""
 
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
-        self._profile = profile
+        self._profile = profile = profile.of(vehicle)
         self._vehicle = vehicle
         self._table = profile.table(profile.controller)
         self._tree: dict[str, Any] = msgspec.to_builtins(vehicle)

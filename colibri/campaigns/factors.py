@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
+from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.campaigns.values import CampaignError, is_number
 from colibri.common.config import value_at
 from colibri.common.errors import unknown
@@ -53,14 +53,17 @@ def key_of(factor: str) -> Key | None:
 
 
 def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> Any:
-    error = ProfileError if isinstance(of, Profile) else VehicleError
     changed: Any = of
     for factor, value in factors.items():
         key = key_of(factor)
         if key is not None and key.table == table:
-            to = _scaled(value_at(changed, key.key, error), value, factor) if key.scaled else value
+            to = _scaled(_had(changed, key.key), value, factor) if key.scaled else value
             changed = changed.replace(key.key, to)
     return changed
+
+
+def _had(of: Profile | Vehicle, key: str) -> Any:
+    return of.value(key) if isinstance(of, Profile) else value_at(of, key, VehicleError)
 
 
 def _scaled(had: Any, by: Any, factor: str) -> Any:

@@ -16,6 +16,7 @@ from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
 from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc, LpvMpcSettings
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan
 from colibri.autopilot.control.qp import QpSolver
+from colibri.autopilot.control.scaling import scaled
 from colibri.certification.attitude import (
     ANGLES,
     INPUTS,
@@ -68,7 +69,8 @@ class PlannedAttitude(AttitudeLaw):
     thrust_part = 0.5  # the rest is the rotors' for moments
 
     def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: CertifiedConditions) -> None:
-        self._settings, self._vehicle, self.conditions = read_settings(table, LpvMpcSettings), vehicle, conditions
+        self._settings = read_settings(scaled("lpv-mpc", table, vehicle), LpvMpcSettings)
+        self._vehicle, self.conditions = vehicle, conditions
         self._law = LpvMpc(table, vehicle, lambda: 0.0)
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
         solver = QpSolver(qp.solver, qp.tolerance, qp.max_iterations)

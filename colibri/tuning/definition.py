@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import msgspec
 
-from colibri.autopilot.control.profile import Profile, ProfileError, profile_text
+from colibri.autopilot.control.profile import Profile, profile_text
 from colibri.campaigns.definition import (
     MAX_UNASKED,
     Campaign,
@@ -19,7 +19,6 @@ from colibri.campaigns.definition import (
 )
 from colibri.campaigns.factors import SCALED, factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
-from colibri.common.config import value_at
 from colibri.common.errors import Error
 from colibri.common.files import read_text
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
@@ -139,7 +138,7 @@ def _had(base: Profile, name: str) -> Any:
     key = key_of(name)
     if key is None:
         raise KeyError(name)
-    had = value_at(base, key.key, ProfileError)
+    had = base.value(key.key)
     return 1.0 if key.scaled else had
 
 

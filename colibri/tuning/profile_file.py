@@ -5,9 +5,8 @@ from typing import Any
 
 import msgspec
 
-from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
+from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.campaigns.factors import key_of
-from colibri.common.config import value_at
 
 
 def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Sequence[str], origin: Sequence[str]) -> str:
@@ -32,7 +31,7 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
         key = key_of(factor)
         if key is None:
             raise KeyError(factor)
-        was, now = (value_at(profile, key.key, ProfileError) for profile in (base, tuned))
+        was, now = (profile.value(key.key) for profile in (base, tuned))
         _set(document, key.key, now)
         lines.append(f"  {key.key} = {now}  # {was}")
     written = "".join(f"# {line}\n" for line in lines) + tomlkit.dumps(document)

@@ -30,6 +30,7 @@ from colibri.autopilot.control.parts.recovery import RecoverySettings
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked
+from colibri.autopilot.control.scaling import scaled
 from colibri.common.config import Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import opened, packed
@@ -99,7 +100,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
     plan_columns = PlanColumns(6, 7, 8, 11)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
-        settings = read_settings(table, LpvMpcSettings)
+        settings = read_settings(scaled("lpv-mpc", table, vehicle), LpvMpcSettings)
         super().__init__(settings, settings.fallback, vehicle)
         h = self._interval_s
         self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock)

@@ -92,7 +92,7 @@ class Reach:
         self._airframe = airframe_of(vehicle)
         self._battery = BatteryModel(vehicle)
         self._mixed = np.abs(inverse(vehicle.allocation())) * vehicle.rotors.thrust_coefficient
-        law = profile.table(profile.controller)
+        law = profile.of(vehicle).table(profile.controller)
         try:
             self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))
             predicted = law.get("plan", law.get("attitude", {}))

@@ -10,8 +10,11 @@ from colibri.common.process.lifecycle import fail
 
 def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("what", choices=("profile", "vehicle"), help="what to show")
-    add("name", metavar="NAME", help="name of one that comes with Colibri; any other name lists them")
+    add("what", choices=("profile", "vehicle", "law"), help="what to show")
+    add("name", metavar="NAME", nargs="?", help="name of one that comes with Colibri; any other name lists them")
+    add("--vehicle", metavar="NAME", help="of law: the vehicle from which its numbers follow (default: the profile's)")
+    add("--profile", metavar="NAME", default="flight", help="of law: the profile (default %(default)s)")
+    add("--controller", metavar="NAME", help="of law: the control law (default: the profile's)")
 
 
 def run(args: Namespace) -> int:
@@ -19,7 +22,32 @@ def run(args: Namespace) -> int:
     from colibri.plant.vehicle.description import vehicle_text
 
     try:
-        sys.stdout.write(profile_text(args.name) if args.what == "profile" else vehicle_text(args.name))
+        if args.what == "law":
+            _show_law(args)
+        elif args.name is None:
+            fail(f"show {args.what}: a name is required")
+        else:
+            sys.stdout.write(profile_text(args.name) if args.what == "profile" else vehicle_text(args.name))
     except Error as error:
         fail(str(error))
     return 0
+
+
+def _show_law(args: Namespace) -> None:
+    """Print what the vehicle can do, and the numbers that follow, with their formulas."""
+    from colibri.autopilot.control.profile import load_profile
+    from colibri.autopilot.control.scaling import capability_of, formulas
+    from colibri.plant.vehicle.description import load_vehicle
+
+    profile = load_profile(args.profile).with_choices(args.controller or args.name, None)
+    vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
+    law, found = profile.controller, profile.of(vehicle)
+    rows = [(name, value, "") for name, value in capability_of(vehicle)._asdict().items()]
+    for key, formula in formulas(law).items():
+        room, _, name = key.rpartition(".")
+        table = profile.table(law)[room] if room else profile.table(law)
+        value = found.value(f"controllers.{law}.{key}")
+        rows.append((key, value, "given by the profile" if name in table else f"= {formula}"))
+    for name, value, formula in rows:
+        numbers = ", ".join(f"{each:.4g}" for each in (value if isinstance(value, (list, tuple)) else [value]))
+        sys.stdout.write(f"{name:<34}{numbers:<22}{formula}".rstrip() + "\n")

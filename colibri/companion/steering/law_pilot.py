@@ -105,7 +105,9 @@ class LawPilot:
         """Build the law for a response."""
         self._response = response
         self._vehicle = turning_no_faster(self._airframe, response)
-        self._loop = ControlLoop(slowed(self._profile, response), self._vehicle, self._clock, self._law)
+        self._loop = ControlLoop(
+            slowed(self._profile.of(self._vehicle), response), self._vehicle, self._clock, self._law
+        )
         self._motion = packed(motion.motion_model(self._vehicle))
         self._lags = max(response.acceleration_lag_s[:2]) > 0.0
 

@@ -22,7 +22,8 @@ from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import ParamError, Parameters, ParamType
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
+HUMMINGBIRD = load_vehicle("hummingbird")
+FLIGHT = load_profile("flight").of(HUMMINGBIRD)
 NOT_IN_FLIGHT = {
     "lpv-mpc": {
         *("control_interval_s", "qp.tolerance", "plan.check_every", "plan.count_every", "path.max_speed"),
@@ -90,7 +91,7 @@ def test_each_parameter_of_the_law_changes_its_own_number(controller: str) -> No
         assert vehicle is HUMMINGBIRD
         assert differences(table, changed.table(controller)) == {described(number.path)}
         assert read(changed.table(controller), number.path) == pytest.approx(bound, rel=1e-6)
-    assert load_profile("flight") == FLIGHT
+    assert load_profile("flight").of(HUMMINGBIRD) == FLIGHT
 
 
 def test_each_parameter_of_the_vehicle_changes_its_own_number() -> None:

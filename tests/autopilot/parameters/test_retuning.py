@@ -67,7 +67,9 @@ def test_a_retuned_law_keeps_the_memory_of_the_old_one(flight: Flight) -> None:
     flight.law, flight.memory = tuned.controller, memory
     after = flight.step()
     assert after.diagnostics.fallback is None
-    assert not np.allclose(after.rotor_speeds, before.rotor_speeds)
+    assert after.diagnostics.planned_squared is not None
+    assert before.diagnostics.planned_squared is not None
+    assert not np.allclose(after.diagnostics.planned_squared, before.diagnostics.planned_squared)
     flight.law, flight.memory = flight.build(tuned.profile, tuned.vehicle), memory
     np.testing.assert_array_equal(flight.step().rotor_speeds, after.rotor_speeds)
 

@@ -10,6 +10,7 @@ from typing import Any
 from msgspec import inspect as kinds
 
 from colibri.analysis.tables import markdown
+from colibri.autopilot.control import scaling
 from colibri.autopilot.control.geometric import GeometricSettings
 from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
 from colibri.autopilot.control.profile import ProfileTables, profile_names, profile_text
@@ -34,6 +35,8 @@ def profiles() -> Iterator[str]:
     yield from _sections(ProfileTables, "", said)
     for law, settings in LAWS.items():
         yield from _sections(settings, f"controllers.{law}", said)
+        if law in scaling.LAWS:
+            yield from _sections(scaling.LAWS[law][0], f"controllers.{law}.scaling", said)
 
 
 def vehicles() -> Iterator[str]:
