@@ -92,18 +92,20 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def __post_init__(self) -> None:
         for key in self.__struct_fields__:
-            for number in _numbers(getattr(self, key)):
-                if number and not 1.0 / _MOST <= abs(number) <= _MOST:
+            for number, in_vector in _numbers(getattr(self, key)):
+                least = 0.0 if in_vector else 1.0 / _MOST  # a place may have the rounding error of a cosine
+                if number and not least <= abs(number) <= _MOST:
                     limits = "be finite" if not isfinite(number) else f"be 0, or from {1.0 / _MOST:g} to {_MOST:g}"
                     raise ValueError(f"{key}: must {limits}")
 
 
-def _numbers(value: Any) -> Iterator[float]:
+def _numbers(value: Any, depth: int = 0) -> Iterator[tuple[float, bool]]:
+    """Yield each number, and whether it is in a vector of a list of vectors."""
     if isinstance(value, tuple):
         for part in value:
-            yield from _numbers(part)
+            yield from _numbers(part, depth + 1)
     elif isinstance(value, float):
-        yield value
+        yield value, depth > 1
 
 
 def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
