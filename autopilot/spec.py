@@ -1,4 +1,4 @@
-"""What flies a vehicle, and whom it serves: options of every command that flies, and of `colibri autopilot`."""
+"""Options of the control law and of the ground stations, for every command that flies."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,9 +25,9 @@ class Trajectory(msgspec.Struct, frozen=True):
     """Samples of a track.
 
     Attributes:
-        name: `samples:NAME`, by which its text can be flown again.
-        text: As in a file of `samples:FILE`.
-        note: What was derived, for the user.
+        name: `samples:NAME`, to fly its text again.
+        text: Content of a file of `samples:FILE`.
+        note: Text on derived columns, for the user.
     """
 
     name: str
@@ -76,12 +76,12 @@ class LawSpec:
 
     @property
     def law(self) -> Any:
-        """What makes the control law, where that is an object; None where it goes by a name."""
+        """Factory of a control law given as an object; None for a name."""
         return None if isinstance(self.controller, str | None) else factory_of(self.controller)
 
     @property
     def law_name(self) -> str | None:
-        """The control law's name, that of its class or function for an object; None for the profile's law."""
+        """Name of the control law, or of its class or function; None for the profile's law."""
         return self.controller if self.law is None else getattr(self.law, "__name__", type(self.law).__name__)
 
     @property
@@ -162,5 +162,5 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
 
     @property
     def flown(self) -> str | Trajectory | None:
-        """The track that is flown from the start; None where ground stations say what to fly."""
+        """Track flown from the start; None if ground stations command the flight."""
         return self.track if self.served else self.track or TRACK

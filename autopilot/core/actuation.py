@@ -13,13 +13,12 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class SolveTime:
-    """A slow control law, simulated: a decision takes effect a declared time after its sample.
+    """Simulates a slow control law: a decision takes effect a declared time after its sample.
 
-    While it solves, the command before is held, and samples that fall due meanwhile are skipped, as a real overrun
-    would skip them. Nothing here is measured: the same declared time gives the same flight.
+    Until then the last command is held, and due samples are skipped. The same declared time gives the same flight.
 
     Attributes:
-        missed: How many decisions took longer than a control interval.
+        missed: Number of decisions that took longer than a control interval.
     """
 
     def __init__(self, interval_us: int) -> None:
@@ -56,11 +55,10 @@ class Actuation:
 
     Attributes:
         sent: The last command, parts of the largest speed.
-        decision: The decision that is flown; None while the rotors stand or idle.
-        solve_time_s: Of the last QP.
-        plain: The plain law.
-        by_plain_law: Whether that flies, in place of the control law.
-        descent: The last resort; None as long as it is not needed.
+        decision: The present decision; None while the rotors stand or idle.
+        solve_time_s: Time of the last QP.
+        by_plain_law: Whether the plain law has replaced the control law.
+        descent: The last resort, once needed.
     """
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss) -> None:
@@ -109,7 +107,7 @@ class Actuation:
         `charge_ah` was taken from the battery; `solve_time_s` is the declared solve time of the control law.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
+            DecisionError: The decision is outside the limits of the rotors.
         """
         decision = self._decide(now_us, state, guidance, charge_ah, solve_time_s)
         if decision is not None or not self._solving.busy(now_us):

@@ -27,9 +27,7 @@ class ControlSample(NamedTuple):
 
     Attributes:
         now_us: Time of its frame.
-        state: At that time.
-        guidance: The references it was decided by.
-        decision: Of this sample; None while the rotors stand or idle, or an earlier decision is being made.
+        decision: None while the rotors stand or idle, or an earlier decision is being solved.
     """
 
     now_us: int
@@ -39,13 +37,10 @@ class ControlSample(NamedTuple):
 
 
 class Stages(Protocol):
-    """The stages of a frame: what differs between a vehicle that flies a track and one that ground stations fly.
+    """The stages of a frame, which differ between a vehicle on a track and one with ground stations.
 
     Attributes:
-        loop: The control law.
-        delay: Compensates the delay of commands.
-        state_source: The estimate.
-        time_us: Of the last frame whose state was known; None where the next one begins a flight.
+        time_us: Time of the last frame with a known state; None if the next one begins a flight.
     """
 
     loop: ControlLoop
@@ -58,25 +53,25 @@ class Stages(Protocol):
         """The flight mode."""
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return what `call` returns; where it raises, what `otherwise` does, or raise."""
+        """Return the result of `call`; after an exception raise, or return the result of `otherwise`."""
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
-        """Take in a frame, and the plant status beside it, before anything else."""
+        """Take in a frame and the plant status."""
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
-        """Return the state at a frame, or unless `now` the one before; None as long as nothing is known."""
+        """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
 
     def wait(self, now_us: int) -> None:
-        """Take in that nothing is known of the vehicle yet."""
+        """Take in a frame without a known state."""
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
-        """Take in the time of a frame whose state is known; `begins`: it does not follow the one before."""
+        """Take in a frame with a known state; `begins`: of a new flight."""
 
     def ahead(self, known: StateFrame) -> StateFrame:
-        """Return the state at which a command of now takes effect."""
+        """Predict the state at the time when a command sent now takes effect."""
 
     def supervise(self, now_us: int, state: VehicleState) -> None:
-        """Take in a control sample, and have the failsafe executed that is due."""
+        """Execute the failsafe that is due at a control sample."""
 
     def guide(self, now_us: int, state: VehicleState) -> Guidance:
         """Return the references of a control sample."""
@@ -85,19 +80,19 @@ class Stages(Protocol):
         """Return the decision of a control sample."""
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
-        """Return the decision in place of a sample that has raised."""
+        """Return a decision after an exception in the sample."""
 
     def actuate(self, now_us: int) -> ActuatorCommand:
         """Return the command to send."""
 
     def faults(self) -> tuple[Fault, ...]:
-        """Return the faults to request of the plant."""
+        """Return the faults to request from the plant."""
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None:
-        """Take in a control sample that was flown, and the time of its computation, to report it in `serve`."""
+        """Take in a completed control sample and its computation time."""
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
-        """Do the work that needs no answer in time; serve ground stations, and return what to send them."""
+        """Do work without a deadline: serve ground stations, and return the datagrams for them."""
 
 
 StagesT = TypeVar("StagesT", bound=Stages)
@@ -107,24 +102,22 @@ class Autopilot(Generic[StagesT]):
     """Flies one vehicle: estimate, observe, supervise, guide, decide, actuate.
 
     Attributes:
-        stages: What it does at each of these stages.
-        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+        frame_interval_us: Requested interval of frames: the control interval or a fraction of it.
     """
 
     def __init__(self, stages: StagesT, clock: Clock) -> None:
-        """Fly by `stages`; `clock`, in seconds, only measures: it decides nothing."""
+        """Fly by `stages`; `clock`, in seconds, only measures computation times."""
         self.stages = stages
         self.frame_interval_us = stages.loop.frame_interval_us
         self._clock = clock
 
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
-        """Answer a frame and the plant status beside it.
+        """Answer a frame.
 
-        A plant that runs freely may lose a few frames; a frame that comes much later, or earlier, begins a new flight.
-        On sensors the rotors stand before the first estimate.
+        A few frames may be lost; after a long gap, or a step back in time, a new flight begins.
 
         Raises:
-            Exception: What a stage raises that is not guarded.
+            Exception: Of a stage without a guard.
         """
         started_s = self._clock()
         stages, now_us = self.stages, frame.time_us
@@ -155,7 +148,7 @@ class Autopilot(Generic[StagesT]):
         return Step(command, decision, duration_s, estimate, faults, True, delay_us, asked, references)
 
     def serve(self, inbox: Iterable[Received] = ()) -> "list[Outgoing]":
-        """Do what waits until a frame is answered, while the plant integrates; return what to send ground stations."""
+        """Do work without a deadline, while the plant integrates; return the datagrams for ground stations."""
         return self.stages.serve(inbox)
 
     def _sample(self, known: StateFrame, now_us: int) -> ControlSample:
@@ -167,12 +160,11 @@ class Autopilot(Generic[StagesT]):
         return ControlSample(now_us, state, guidance, stages.decide(now_us, ahead, guidance))
 
     def _ahead(self, known: StateFrame, state: VehicleState) -> VehicleState:
-        """Return the state at which a command of now takes effect; that of now where nothing delays it."""
+        """Predict the state at the time when a command sent now takes effect."""
         stages = self.stages
         if stages.delay.delay_us == 0:
             return state
         return stages.guard(DELAY, lambda: stages.loop.observe(stages.ahead(known)), lambda: state)
 
 
-def _nothing() -> None:
-    """Replace what raised by nothing."""
+def _nothing() -> None: ...

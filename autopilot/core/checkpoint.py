@@ -1,8 +1,8 @@
-"""Checkpoint: the state of a flight as plain data, from which it goes on after the autopilot was killed.
+"""The checkpoint of a flight: plain data to continue it after the autopilot was killed.
 
-One is recorded at each control sample. It is of the same flight if the time of the first frame follows its own. Within
-`CLOSE_US` everything is restored: references, the control law's memory, the estimator. Later, mode and task are
-restored, and go on from where the vehicle is. Open transactions of ground stations are not recorded.
+It is recorded at each control sample, and belongs to the flight whose next frame follows it in time. Within `CLOSE_US`
+references, the control law's memory and the estimator are restored; later only mode and task, from the present place.
+Open transactions of ground stations are not recorded.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,14 +39,14 @@ class Checkpoint(NamedTuple):
     """A flight at one control sample.
 
     Attributes:
-        fingerprint: Of profile and vehicle: the memory of another law is of no use.
-        origin: Of the ENU frame.
-        plan_ids: Opaque ids of mission, geofence and rally points, which are kept by themselves.
-        charge_ah: Taken from the battery, like the energy.
-        state_source: Of the estimator; empty where frames are states.
-        rotor_lost: 0..3; None while all turn.
-        rotor_speeds: By the model of their lag, parts of the largest, (4,).
-        had_station: Whether a ground station was ever connected: its loss counts from the restart.
+        fingerprint: Hash of profile and vehicle; the memory of another law is not restored.
+        origin: Origin of the ENU frame.
+        plan_ids: Opaque ids of mission, geofence and rally points, which are stored separately.
+        charge_ah: Charge taken from the battery.
+        state_source: State of the estimator; empty on state feedback.
+        rotor_lost: 0..3; None if all rotors turn.
+        rotor_speeds: Modelled speeds, parts of the largest, (4,).
+        had_station: Whether a ground station was ever connected; the link-loss timer starts at the restart.
     """
 
     fingerprint: int

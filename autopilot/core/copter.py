@@ -1,4 +1,4 @@
-"""The stages of a vehicle that ground stations fly, and that flies on whatever raises: see `core.defence`."""
+"""The stages of a vehicle with ground stations; after an exception it flies on (see `core.defence`)."""
 
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
@@ -77,10 +77,8 @@ class Copter:
     """Flies a vehicle by its pilot, under supervision, and serves ground stations.
 
     Attributes:
-        parts: Of the vehicle.
-        loop, delay, state_source, pilot, parameters, stations, defence: Some of them.
-        guard: Catches what they raise.
-        time_us: Of the last frame whose state was known; None before the first.
+        guard: Catches exceptions of the parts.
+        time_us: Time of the last frame with a known state; None before the first.
     """
 
     def __init__(
@@ -105,7 +103,6 @@ class Copter:
 
     @property
     def mode(self) -> str:
-        """The flight mode."""
         return str(self.pilot.state.mode)
 
     @property
@@ -115,11 +112,10 @@ class Copter:
 
     @property
     def resumed(self) -> str:
-        """What goes on of a flight in which an autopilot was killed, in words; empty where none does."""
+        """Text on the continued flight after a restart; empty without one."""
         return self._start.resumed
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
-        """Take in charge and delay as the plant reports them; resume the estimator before its first frame."""
         self._plant_status, self.defence.frame = plant_status, frame
         battery = plant_status.battery
         if battery is not None:
@@ -135,20 +131,15 @@ class Copter:
         self.parts.battery.receive(battery)
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
-        """Return the state at a frame, or unless `now` the one before, whatever the estimator does."""
         return self._estimates.state(frame, now=now)
 
     def wait(self, now_us: int) -> None:
-        """Deny commands, as nothing is known of the vehicle yet; where it flew before, restart for another flight."""
+        """Deny commands before the first estimate; after a flight, prepare the next one."""
         self._waiting_us = now_us
         if self.time_us is not None:
             self.stations.system.reboot()
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
-        """Take in the time of a frame; start a flight where it `begins` one.
-
-        Where the start raises, start once more without the past, and then descend.
-        """
         if begins and not any(self.guard(part, self._begin, bool, known) for part in (table.RESTART, table.START)):
             self._flying.descend(now_us)
         self.time_us = now_us
@@ -159,42 +150,33 @@ class Copter:
         return True
 
     def ahead(self, known: StateFrame) -> StateFrame:
-        """Return the state at which a command of now takes effect."""
         return self.delay.ahead(known, self.parts.battery.charge_ah, standing=self.pilot.ground.standing)
 
     def supervise(self, now_us: int, state: VehicleState) -> None:
-        """Watch the rotors, take in setpoints, and have the pilot execute the failsafe that is due."""
         if self._estimates.blind:
             self._flying.go_blind()
         self._supervision.step(now_us, state)
 
     def guide(self, now_us: int, state: VehicleState) -> Guidance:
-        """Return the pilot's references."""
         del state
         return self._flying.guide(now_us)
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        """Return the decision of the control law, or of what flies in its place."""
         return self._flying.decide(now_us, state, guidance)
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
-        """Fly the last resort."""
         return self._flying.rescue(now_us, known)
 
     def actuate(self, now_us: int) -> ActuatorCommand:
-        """Return the command that holds now."""
         return ActuatorCommand(now_us, self.parts.actuation.send(now_us), armed=self._flying.armed)
 
     def faults(self) -> tuple[Fault, ...]:
-        """Return the faults that ground stations have injected."""
         return self.guard(table.FAULTS, self.stations.failures.take, tuple)
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None:
-        """Take in a sample, with the decision that is flown, to report it in `serve`."""
         self._sampled = sample, self.parts.actuation.decision, duration_s
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
-        """Serve ground stations, and return what to send them; after each step, while the plant integrates."""
         now_us = self.time_us
         if now_us is None:
             return self._refuse(inbox)
@@ -210,7 +192,7 @@ class Copter:
         return self.stations.poll(now_us)
 
     def record(self) -> Checkpoint | None:
-        """Return the checkpoint for a restart; None as long as nothing is known of the vehicle, or where it raises."""
+        """Return the checkpoint for a restart; None before the first estimate, or after an exception."""
         now_us = self.time_us
         if now_us is None:
             return None
@@ -226,7 +208,7 @@ class Copter:
             self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, *sampled)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
-        """Pass on what came, after what waits; a datagram that raises is dropped."""
+        """Handle the received datagrams; a datagram that raises is dropped."""
         if self.stations.hub.waiting:
             self.guard(table.DATAGRAM, self.stations.hub.work, _nothing, now_us)
         if not inbox:
@@ -244,7 +226,7 @@ class Copter:
         return True
 
     def _refuse(self, inbox: Iterable[Received]) -> list[Outgoing]:
-        """Deny commands while nothing is known of the vehicle yet."""
+        """Deny commands before the first estimate."""
         if self._waiting_us is None:
             return []
         self.stations.refuse_commands("Not ready: no attitude and position estimate yet")
@@ -257,5 +239,4 @@ def _true() -> bool:
     return True
 
 
-def _nothing() -> None:
-    """Replace what raised by nothing."""
+def _nothing() -> None: ...

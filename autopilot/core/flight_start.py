@@ -15,8 +15,8 @@ class FlightStart:
     """Starts the flights of one vehicle.
 
     Attributes:
-        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
-        wakes: Whether the estimator is to be resumed before the next frame.
+        resumed: Text on the continued flight after a restart; empty without one.
+        wakes: Whether to resume the estimator before the next frame.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class FlightStart:
             self._parts.state_source.resume(self._history.checkpoint.state_source, time_us)
 
     def begin(self, frame: StateFrame, before_us: int | None) -> None:
-        """Start at a frame that does not follow the one of `before_us`; None: at the first."""
+        """Start at a frame that does not follow the last one, of `before_us` (None: the first)."""
         self._supervision.miss(before_us)
         history, self._history = self._history, None
         if history is not None and history.checkpoint.is_followed_by(frame.time_us):
@@ -54,7 +54,7 @@ class FlightStart:
             self._begin(frame, again=before_us is not None)
 
     def _resume(self, history: History, frame: StateFrame) -> None:
-        """Go on with the flight in which the autopilot was killed."""
+        """Continue the flight of the killed autopilot."""
         parts, pilot, checkpoint = self._parts, self._parts.pilot, history.checkpoint
         if checkpoint.pilot.state.mode is not Mode.TRACK or checkpoint.task.began_us != 0:
             parts.tasks.forget_first()

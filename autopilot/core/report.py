@@ -66,7 +66,7 @@ class Reporter:
         )
 
     def _battery_fault(self, charge_state: int) -> str:
-        """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
+        """Return the reason against a take-off on the battery, apart from its charge; empty without one."""
         voltage_v, model = self._parts.battery.voltage_v, self._parts.battery.battery
         if model is None:
             return ""

@@ -1,4 +1,4 @@
-"""The step of any autopilot: what it takes and returns, and the answer to a datagram of the plant."""
+"""The step of an autopilot, and the answer to a datagram of the plant."""
 
 from typing import NamedTuple, Protocol
 
@@ -25,12 +25,10 @@ def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
 
 
 class Step(NamedTuple):
-    """Answer to a frame: the command to send, the decision behind it, and the computation time.
+    """Answer to a frame.
 
-    Between two control samples the last command is sent again, and there is no decision. Where frames are
-    states there is no estimate. Faults are requested of the plant with the command. Unless the vehicle is `known`, its
-    rotors stand. The delay is the one that is compensated. Of an autopilot without ground
-    stations, a decision has beside it the frame and the references that it was made from.
+    Between control samples there is no decision, and the last command is repeated. Unless the vehicle is `known`, its
+    rotors stand. Without ground stations, a decision comes with its frame and references.
     """
 
     command: ActuatorCommand
@@ -45,7 +43,7 @@ class Step(NamedTuple):
 
 
 def nothing_known(time_us: int, duration_s: float) -> Step:
-    """Return the answer to a frame of a vehicle of which nothing is known."""
+    """Return the answer to a frame before the first estimate."""
     return Step(ActuatorCommand(time_us, STILL, armed=False), None, duration_s, known=False)
 
 
@@ -58,10 +56,10 @@ class Steps(Protocol):
 
 
 def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_s: float) -> Step | None:
-    """Have `autopilot` answer a plant's datagram at its `end` of the link; None if that brings no frame to compute.
+    """Answer a plant's datagram; return None if it contains no frame.
 
     Raises:
-        DecisionError: The control law gave what no rotor can follow.
+        DecisionError: The decision is outside the limits of the rotors.
     """
     received = end.receive(datagram, now_s)
     if received is None:

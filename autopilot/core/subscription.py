@@ -14,11 +14,11 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class FlownSettings(NamedTuple):
-    """What is flown by.
+    """The active settings.
 
     Attributes:
-        values: Of all parameters.
-        tuned: Law and vehicle of them.
+        values: Values of all parameters.
+        tuned: Control law and vehicle.
     """
 
     values: Mapping[str, Value]
@@ -26,10 +26,10 @@ class FlownSettings(NamedTuple):
 
 
 class Subscribers:
-    """Callbacks that adopt a change, by what they take.
+    """Callbacks that adopt a change of parameters.
 
     Attributes:
-        revision: Of the parameters that were adopted last.
+        revision: Revision of the adopted parameters.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Subscribers:
             self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
 
     def keep(self, parameters: Parameters) -> None:
-        """Go back to what was flown before, as a subscriber could not adopt the last change."""
+        """Return to the settings before a change that a subscriber refused."""
         if self._flown is None:
             return
         parameters.load(self._flown.values)

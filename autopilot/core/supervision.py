@@ -110,8 +110,7 @@ class Supervision:
         )
 
 
-def _nothing() -> None:
-    """Replace what raised by nothing."""
+def _nothing() -> None: ...
 
 
 def _not_steered() -> tuple[ClientInputs, bool]:

@@ -1,4 +1,4 @@
-"""The stages of a vehicle that flies one track, without ground stations; what a stage raises is raised."""
+"""The stages of a vehicle on one track, without ground stations; exceptions are raised."""
 
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
@@ -40,16 +40,13 @@ def track_autopilot(
     """Return an autopilot that flies `vehicle` along `track` from time 0 on.
 
     Args:
-        profile: The control law and its numbers.
-        vehicle: The vehicle that the law assumes.
-        track: The track.
-        clock: Seconds; it only measures.
-        estimator: Makes the estimator; None: frames are states.
+        clock: Seconds, for computation times.
+        estimator: Makes the estimator; None: state feedback.
         law: Makes the control law; None: the registered one.
 
     Raises:
         ControllerError: The profile's control law cannot be used.
-        ProfileError: Its table is wrong.
+        ProfileError: Its table is invalid.
         SolverError: Its solver cannot be used.
     """
     loop = ControlLoop(profile, vehicle, clock, law)
@@ -63,15 +60,10 @@ def track_autopilot(
 class TrackStages:
     """Flies a vehicle along a track.
 
-    A flight begins with the rotors at the profile's speed at time 0, and in hover in mid-flight. On sensors it begins
-    with the first estimate, of a vehicle that stands, or falls; until then it is not armed.
+    On sensors the flight begins with the first estimate; until then the vehicle is not armed.
 
     Attributes:
-        loop: The control law.
-        delay: Compensates the delay of commands.
-        state_source: The estimate.
-        time_us: Of the last frame whose state was known; None where nothing was known of the last frame.
-        mode: The flight mode.
+        time_us: Time of the last frame with a known state; None after a frame without one.
     """
 
     mode = "track"
@@ -91,12 +83,10 @@ class TrackStages:
         self._landing, self._ground_m = Landing(), 0.0
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return what `call` returns, and let it raise."""
         del part, otherwise
         return call(*args)
 
     def receive(self, frame: Frame, plant_status: PlantStatus) -> None:
-        """Take in charge and delay as the plant reports them."""
         del frame
         if plant_status.battery is not None and plant_status.battery.exists:
             self.loop.know_charge(plant_status.battery.used_ah)
@@ -104,30 +94,24 @@ class TrackStages:
             self.delay.measure(plant_status.delay_us)
 
     def estimate(self, frame: Frame, *, now: bool) -> StateFrame | None:
-        """Return the state at a frame; unless `now`, the one before: the frame is left to `serve`."""
         self.state_source.receive(frame)
         return self.state_source.state() if now else self.state_source.last
 
     def wait(self, now_us: int) -> None:
-        """Have the next flight begin with the first estimate."""
         del now_us
         self.time_us = None
 
     def enter(self, known: StateFrame, now_us: int, *, begins: bool) -> None:
-        """Take in the time of a frame; where it `begins` a flight, begin with the law, the delay and the ground."""
         if begins:
             self._begin(known)
         self.time_us = now_us
 
     def ahead(self, known: StateFrame) -> StateFrame:
-        """Return the state at which a command of now takes effect."""
         return self.delay.ahead(known, self.loop.charge_ah)
 
-    def supervise(self, now_us: int, state: VehicleState) -> None:
-        """Do nothing: nobody is there to take over."""
+    def supervise(self, now_us: int, state: VehicleState) -> None: ...
 
     def guide(self, now_us: int, state: VehicleState) -> Guidance:
-        """Return the references at the instant at which a command of now takes effect, and watch for the ground."""
         loop = self.loop
         acts_us = self._acts_us = now_us + self.delay.delay_us
         references = self._planner.horizon_at(acts_us - loop.lag_us, loop.control_interval_us)
@@ -136,29 +120,23 @@ class TrackStages:
         return Guidance(references, pace=Pace.CATCHING_UP)
 
     def decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
-        """Return the decision of the control law."""
         assert guidance.horizon is not None, "a track has references at any time"
         felt = VehicleState(*state[:-1], airborne=is_clear(self._landing, state, self._ground_m))
         return self.loop.decide(now_us, felt, guidance.horizon, guidance.pace)
 
     def rescue(self, known: StateFrame, now_us: int) -> Decision | None:
-        """Return nothing: what a sample raises was raised."""
         del known, now_us
         return None
 
     def actuate(self, now_us: int) -> ActuatorCommand:
-        """Return the last command of the law."""
         return ActuatorCommand(now_us, self.loop.controls, armed=True)
 
     def faults(self) -> tuple[Fault, ...]:
-        """Return none."""
         return ()
 
-    def sampled(self, sample: ControlSample, duration_s: float) -> None:
-        """Report nothing."""
+    def sampled(self, sample: ControlSample, duration_s: float) -> None: ...
 
     def serve(self, inbox: Iterable[Received]) -> "list[Outgoing]":
-        """Bring the filter on, and prepare the references of the next sample."""
         del inbox
         self.state_source.settle()
         if self._acts_us is not None:

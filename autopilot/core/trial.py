@@ -1,4 +1,4 @@
-"""The trial of a change of parameters: whatever any part may build from it later is built, and tried, before."""
+"""The trial of a change of parameters: every object that depends on it is built and tried before the change."""
 
 from math import isfinite
 
@@ -21,7 +21,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class TrialError(AutopilotError):
-    """A change by which a part gives no finite numbers."""
+    """A change with which a part gives numbers that are not finite."""
 
 
 class VehicleTrial:

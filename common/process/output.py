@@ -18,9 +18,9 @@ _LEFT_OUT = "colibri: {} lines were left out, as nobody read them\n"
 
 
 class Output(io.RawIOBase):
-    """A file descriptor written without waiting for its reader; what it does not take is kept in memory.
+    """A file descriptor that never waits for its reader; unread output is buffered.
 
-    Beyond `_MOST_BYTES`, the oldest are left out, and their number is reported at the end.
+    Beyond `_MOST_BYTES` the oldest lines are dropped, and counted at the end.
     """
 
     def __init__(self, number: int, *, left_out: str = _LEFT_OUT, patient: bool = False) -> None:
@@ -79,7 +79,7 @@ class Output(io.RawIOBase):
                 return
 
     def _taken(self, data: bytes) -> int:
-        """Write what the reader takes, and return how much that is."""
+        """Write as much as the reader accepts, and return that size."""
         try:
             if self._own is not None:
                 return os.write(self._own, data)

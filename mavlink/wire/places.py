@@ -1,6 +1,6 @@
 """Places in mission items, commands, setpoints and messages, read in one way.
 
-Latitude and longitude are given together or left out together, and 0, 0 is no place. An altitude is above sea level in
+Latitude and longitude are given together or left out together; 0, 0 is invalid. An altitude is above sea level in
 MAV_FRAME_GLOBAL (and _INT), above home in every other frame: without a terrain map the ground is flat.
 """
 
@@ -24,7 +24,7 @@ _COORDINATES = (("latitude", MAX_LATITUDE_DEG), ("longitude", MAX_LONGITUDE_DEG)
 
 
 def misplaced(latitude_deg: float, longitude_deg: float) -> str:
-    """Return the coordinate that is wrong, with its value and what is valid; empty if none is."""
+    """Return the invalid coordinate, with its value and the valid range; empty without one."""
     for (name, maximum), value in zip(_COORDINATES, (latitude_deg, longitude_deg), strict=True):
         if not abs(value) <= maximum:
             return f"{name} {value:.7g} is not within {maximum:g} degrees"
@@ -36,7 +36,7 @@ def misplaced_height(altitude_m: float) -> str:
 
 
 def too_far(place: Vector) -> str:
-    """Return how far from the origin a place is, and what is valid; empty if it can be flown to."""
+    """Return the distance of a place beyond the limit, and the limit; empty within it."""
     east, north, up = place
     away_m = hypot(east, north)
     if not away_m <= MAX_DISTANCE_M:

@@ -1,1 +1,1 @@
-"""The last line of defence: what is caught in flight, and what flies on in place of a part that raised."""
+"""The last line of defence: catches exceptions in flight, and replaces the parts that raised them."""

@@ -1,6 +1,6 @@
-"""The last resort: horizontal velocity braked, a descent, and the rotors stopped once the ground holds the vehicle.
+"""The last resort: brake, descend, and stop the rotors on the ground.
 
-It depends on nothing but the state and the plain law: not on task, reference or the pilot's detector of landings.
+It depends on the state and the plain law alone: not on task, reference or the landing detector.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ class Descent:
         self.landed = standing
 
     def step(self, law: PlainLaw, now_us: int, state: VehicleState) -> Decision | None:
-        """Decide a control sample; None once it has landed: the rotors stand."""
+        """Decide a control sample; None after the landing."""
         sink_m_s = min(max(_SINK_1_S * (state.position_enu_m[2] - self._ground_m), _LEAST_M_S), _MOST_M_S)
         if now_us - self._sinks_since_us < _HELD_FOR_US or abs(state.velocity_enu_m_s[2]) > _SLOWER * sink_m_s:
             self._held_since_us = now_us

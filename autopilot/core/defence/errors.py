@@ -1,6 +1,6 @@
-"""The guard of a flight: exceptions caught, recorded with what is needed to look into them, said once, counted.
+"""The guard of a flight: catches, records, reports and counts exceptions.
 
-A part that has raised is tried again at its next turn; `table` has all parts, and says which are left out for good.
+A part that raised is tried again next time; `table` has all parts, and which are switched off for good.
 """
 
 from collections import Counter
@@ -24,18 +24,14 @@ _MAX_KEPT = 100
 
 
 class ErrorRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """An exception that was caught.
+    """A caught exception.
 
     Attributes:
         time_us: Simulated time of the frame.
-        part: What raised.
-        instead: What it is replaced by.
+        instead: Replacement of the part.
         error: The exception in one line.
-        traceback: Whole.
-        mode: Flight mode.
-        armed: Whether the rotors might turn.
-        frame: Of the plant, by `to_bytes`; empty where there was none.
-        checkpoint: The flight as it was then, by `to_bytes`; empty where it cannot be recorded.
+        frame: Frame of the plant, by `to_bytes`; empty without one.
+        checkpoint: Checkpoint of the flight, by `to_bytes`; empty if it cannot be recorded.
     """
 
     time_us: int
@@ -53,13 +49,13 @@ class Defence:
     """Catches the exceptions of one vehicle.
 
     Attributes:
-        frame: The one that is answered; None before the first.
-        counts: How often each part has raised.
-        off: Parts that raised too often.
+        frame: The present frame; None before the first.
+        counts: Exceptions by part.
+        off: Parts that are switched off.
     """
 
     def __init__(self, pilot: Pilot, say: Callable[[int, str], None], *, strict: bool) -> None:
-        """Report by `say`; `strict`: raise what is caught."""
+        """Report by `say`; `strict`: raise every exception."""
         self._pilot, self._say, self._strict = pilot, say, strict
         self._checkpoint: Callable[[], object] | None = None
         self._records: list[ErrorRecord] = []
@@ -69,14 +65,14 @@ class Defence:
         self.off: set[str] = set()
 
     def keep(self, checkpoint: Callable[[], object]) -> None:
-        """Record with each exception what `checkpoint` returns."""
+        """Record `checkpoint` with each exception."""
         self._checkpoint = checkpoint
 
     def guard(self, part: str, call: Callable[[*Ts], T], otherwise: Callable[[], T], *args: *Ts) -> T:
-        """Return what `call` returns; what `otherwise` does where that raises, or the part is left out by now.
+        """Return the result of `call`, or of `otherwise` after an exception or if the part is off.
 
         Raises:
-            Exception: What `call` raises, if strict.
+            Exception: Of `call`, if strict.
         """
         if part in self.off and PARTS[part].optional:
             return otherwise()
@@ -87,7 +83,7 @@ class Defence:
         return otherwise()
 
     def caught(self, part: str, error: Exception, instead: str = "") -> None:
-        """Take in an exception of a part; `instead`, where given, says what replaces it.
+        """Record an exception of a part; `instead` overrides the name of its replacement.
 
         Raises:
             Exception: The same one, if strict.
@@ -106,7 +102,7 @@ class Defence:
             self._records.append(self._record(part, instead, error))
 
     def take(self) -> list[ErrorRecord]:
-        """Return what was recorded since this was last asked."""
+        """Return the records since the last call."""
         records, self._records = self._records, []
         return records
 
@@ -127,7 +123,7 @@ class Defence:
 
 
 def _bytes(make: Callable[[], object] | None) -> bytes:
-    """Return what `make` returns as bytes; none where it raises: it may be what has failed."""
+    """Return the result of `make` as bytes; empty after an exception."""
     try:
         made = None if make is None else make()
         return b"" if made is None else to_bytes(made)

@@ -1,8 +1,8 @@
-"""The state carried on where the estimator has raised: gyroscope and accelerometer alone, the barometer for height.
+"""The state after an exception in the estimator: gyroscope and accelerometer, with the barometer for height.
 
 A complementary filter (R. Mahony, T. Hamel, J.-M. Pflimlin, Nonlinear complementary filters on the special orthogonal
-group, IEEE TAC 53(5), 2008): the mean specific force of a vehicle that stays level points up. It knows no place: the
-horizontal velocity is integrated, and forgotten as fast as it becomes wrong.
+group, IEEE TAC 53(5), 2008): the mean specific force of a level vehicle points up. Position is unknown; the horizontal
+velocity is integrated with a leak.
 """
 
 from math import isfinite, sqrt
@@ -60,7 +60,7 @@ class InertialEstimate:
         return self.frame
 
     def _upright(self, attitude: Quaternion) -> Vector:
-        """Return the rates, with what turns the estimated up to the measured one, rad/s."""
+        """Return the rates with the correction towards the measured vertical, rad/s."""
         p, q, r = self._rate
         if self._force is None:
             return p, q, r
@@ -73,7 +73,7 @@ class InertialEstimate:
         return p + k * (fy * uz - fz * uy), q + k * (fz * ux - fx * uz), r + k * (fx * uy - fy * ux)
 
     def _by_pressure(self, frame: SensorFrame, z: float, climb_m_s: float) -> tuple[float, float]:
-        """Return height and climb, drawn to the barometer's; the first pressure says how high it stands above."""
+        """Return height and climb, corrected by the barometer; the first pressure sets its offset."""
         if not frame.has(Updated.BAROMETER) or not 0.0 < frame.pressure_pa < 2e5:
             return z, climb_m_s
         height_m, before_us, self._pressure_us = altitude_m(frame.pressure_pa), self._pressure_us, frame.time_us
@@ -94,7 +94,7 @@ def turned(attitude: Quaternion, rate: Vector, interval_s: float) -> Quaternion:
 
 
 def _read(frame: SensorFrame, group: int, value: Vector, bias: Vector) -> Vector | None:
-    """Return what a sensor measures at a frame, less its bias; None where it measures nothing."""
+    """Return a measurement without its bias; None without one."""
     if not frame.has(group) or not all(map(isfinite, value)):
         return None
     x, y, z = value

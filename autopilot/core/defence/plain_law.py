@@ -1,7 +1,7 @@
-"""The plain law, which flies where the control law has raised: no plan, no solver, nothing that it could fail by.
+"""The plain law, which replaces a failed control law: no plan, no solver.
 
-Velocity by PI, towards a place that is near; the thrust axis turned the shortest way, yaw only damped; the mixer gives
-up what matters least. Attitude and mixer are those of the LPV-MPC's recovery, good from any attitude and at any speed.
+Velocity by PI towards a near place; the thrust axis turned the shortest way, yaw only damped. Attitude and mixer are
+those of the LPV-MPC's recovery, valid from any attitude and at any speed.
 """
 
 from math import hypot, radians
@@ -34,7 +34,7 @@ class PlainLaw:
     """The plain law of one vehicle; it remembers the acceleration that has held the velocity up to now."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Fly `vehicle`, deciding every `interval_s`; what is compiled is loaded here."""
+        """Fly `vehicle` with this control interval; load compiled code."""
         self._interval_s = interval_s
         self._max_speed = vehicle.rotors.max_speed
         self._min_squared = square(vehicle.rotors.idle_speed / self._max_speed)

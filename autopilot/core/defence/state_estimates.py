@@ -1,4 +1,4 @@
-"""The state of each frame, whatever the estimator does: where it raises, the inertial sensors carry the state on."""
+"""The state of each frame: from the estimator, or after its exception from the inertial sensors."""
 
 from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.defence.errors import Defence
@@ -18,7 +18,7 @@ class StateEstimates:
     """The states of one vehicle.
 
     Attributes:
-        blind: Whether the inertial sensors alone tell the state, and no place.
+        blind: Whether the state comes from the inertial sensors alone, without position.
     """
 
     def __init__(self, source: StateSource, defence: Defence, gravity_m_s2: float) -> None:
@@ -28,7 +28,7 @@ class StateEstimates:
         self.blind = False
 
     def state(self, frame: Frame, *, now: bool) -> StateFrame | None:
-        """Return the state at a frame, or unless `now` the one before; None as long as there never was one."""
+        """Return the state at a frame, or with `now` false at the frame before; None before the first estimate."""
         guard, source = self._defence.guard, self._source
         if not self.blind:
             worked, known = guard(table.ESTIMATOR, self._estimated, _failed, frame, now)
@@ -41,7 +41,7 @@ class StateEstimates:
         return guard(table.STANDBY, lambda: self._carry_on(frame), lambda: last)
 
     def _estimated(self, frame: Frame, now: bool) -> tuple[bool, StateFrame | None]:
-        """Have the estimator do all work of a frame within it: what it raises belongs to this frame."""
+        """Run all work of the estimator for a frame, so that its exceptions belong to this frame."""
         self._source.receive(frame)
         self._source.advance()
         return True, self._source.state() if now else self._source.last

@@ -1,4 +1,4 @@
-"""The table of the parts of a vehicle whose exceptions are caught in flight, and of what flies in place of each."""
+"""The parts whose exceptions are caught in flight, and their replacements."""
 
 from typing import Final, NamedTuple
 
@@ -7,9 +7,9 @@ class DefendedPart(NamedTuple):
     """A part.
 
     Attributes:
-        name: As it is reported.
-        instead: What replaces it while it raises, as it is reported.
-        optional: Whether it is left out for good once it has raised `TRIES` times; others are tried again each time.
+        name: Name in reports.
+        instead: Replacement, as reported.
+        optional: Whether it is switched off after `TRIES` exceptions; others are tried again each time.
     """
 
     name: str
