@@ -48,7 +48,11 @@ class Commands:
         }
 
     def select(self, mode: Mode) -> Refusal | None:
-        return self._pilot.select(mode, self._needs.missing())
+        refusal = self._pilot.select(mode, self._needs.missing())
+        remark = "" if refusal else self._needs.remark(mode)
+        if remark:
+            self._pilot.warn(remark)
+        return refusal
 
     def _select_known(self, mode: Mode | None, numbers: str) -> Refusal | None:
         unknown = Refusal(f"mode refused: {numbers} is no mode of this vehicle", UNSUPPORTED)

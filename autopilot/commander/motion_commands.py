@@ -8,7 +8,7 @@ from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
+from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit, turn_of
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.autopilot.guidance.tasks.task import FlightTask
 from colibri.common.kernels import cos, sin
@@ -37,6 +37,8 @@ class Needs(Protocol):
     """Unmet needs of modes."""
 
     def missing(self) -> Mapping[Need, str]: ...
+
+    def remark(self, mode: Mode) -> str: ...
 
     def engage(self, peer: Peer, now_us: int) -> None: ...
 
@@ -192,7 +194,7 @@ class MotionCommands:
         return self._home.refusal(z) or self.unreachable(*around)
 
     def _turn(self, command: ReceivedCommand) -> Refusal | None:
-        """Turn clockwise from north, or from the heading if p4 is 1."""
+        """Turn to an angle clockwise from north, or from the heading if p4 is 1; p3 is the way, 1 clockwise."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
         if isnan(command.p1) or abs(angle) > MAX_TURN_DEG:
             return denied("turn", f"angle {command.p1:g} is not within {MAX_TURN_DEG:g} degrees")
@@ -205,7 +207,7 @@ class MotionCommands:
         context = self._pilot.context()
         zero_rad = context.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
-        return self._fly(Mode.HOLD, GoToTask(GoTo(context.place, yaw), context))
+        return self._fly(Mode.HOLD, GoToTask(GoTo(context.place, yaw, turn=turn_of(angle, way)), context))
 
 
 def denied(what: str, reason: str) -> Refusal:

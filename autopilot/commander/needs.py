@@ -4,7 +4,7 @@ from typing import Protocol, TypeVar
 
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Need
+from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.task import ClientInputs
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
@@ -19,6 +19,8 @@ class Latest(Protocol[_T]):
     def latest(self, now_us: int, timeout_us: int) -> _T | None: ...
 
     def engage(self, peer: Peer, now_us: int) -> None: ...
+
+    def refusal(self, now_us: int) -> str: ...
 
 
 class ModeNeeds:
@@ -60,7 +62,18 @@ class ModeNeeds:
             Need.FLYING: not self._pilot.ground.standing,
             Need.POSITION: self._pilot.sensed.position_known,
         }
-        return {need: need.value for need, there in met.items() if not there} | self._missions.unmet
+        refused = {
+            Need.STICKS: self._manual.refusal(self._now_us),
+            Need.SETPOINTS: self._offboard.refusal(self._now_us),
+        }
+        unmet = {need: refused.get(need) or need.value for need, there in met.items() if not there}
+        return unmet | self._missions.unmet
+
+    def remark(self, mode: Mode) -> str:
+        """Return what a mode waits for; empty if it waits for nothing."""
+        if mode is not Mode.FOLLOW or self.steered(self._now_us).followed is not None:
+            return ""
+        return self._follow.refusal(self._now_us) or "follow: holds until a FOLLOW_TARGET is received"
 
     def steered(self, now_us: int) -> ClientInputs:
         behaviour = self._pilot.behaviour

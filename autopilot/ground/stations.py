@@ -109,7 +109,8 @@ class Stations:
         self._text = StatusText()
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
-        self.offboard, self.manual, self._follow = Offboard(), Manual(settings.system_id), Follow()
+        self.offboard, self._follow = Offboard(self._text), Follow(self._text)
+        self.manual = Manual(settings.system_id, self._text)
         self.missions, self.fence = missions, fence
         self.needs = ModeNeeds(pilot, missions, self.manual, self.offboard, self._follow, takes_attitude=takes_attitude)
         self.system = SystemCommands(

@@ -105,6 +105,8 @@ def write_provenance(plan: FlightPlan) -> None:
 
 def read_provenance(folder: Path) -> Provenance:
     path = folder / PROVENANCE
+    if folder.is_file():
+        raise ProvenanceError(f'"{folder}" is a file: expected the folder of a flight, as colibri fly --out writes it')
     try:
         return msgspec.json.decode(read_bytes(path), type=Provenance)
     except FileNotFoundError as error:

@@ -191,7 +191,7 @@ class Tree:
                 return files, names[depth:]
             target = self._aliases.get(names[:depth])
             if target is not None:
-                return self._root, (*target, *names[depth:])
+                return self._at((*target, *names[depth:]))
         return self._root, names
 
     def _fixed_in(self, folder: Names) -> Iterator[Entry]:

@@ -10,39 +10,60 @@ from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
 
 SILENT_AFTER_US = 500_000
 """Silence that ends a stream; MAVLink requires at least 2 Hz."""
+TELL_EVERY_US = 5_000_000
 MAX_CLIENTS = 16
 
 Value = TypeVar("Value")
 
 
 class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an error of this program)
-    """An invalid setpoint; its text is the reason under which it is counted."""
+    """An invalid setpoint: the reason under which it is counted, and the field with its value if senders are told."""
+
+    def __init__(self, reason: str, field: str = "") -> None:
+        super().__init__(reason)
+        self.field = field
 
 
 class StreamedService(ABC, Generic[Value]):
-    """Keeps each client's latest setpoint and obeys that of `source`; never answers."""
+    """Keeps each client's latest setpoint and obeys that of `source`; only refusals are told, with `text`."""
 
     handles: frozenset[str]
 
-    def __init__(self, silent_after_us: int = SILENT_AFTER_US) -> None:
+    def __init__(self, silent_after_us: int = SILENT_AFTER_US, text: StatusText | None = None) -> None:
         self.dropped: Counter[str] = Counter()
         self.source: Peer | None = None
         self._silent_after_us = silent_after_us
         self._received: dict[Peer, tuple[int, Value]] = {}
+        self._text, self._told_us = text, -TELL_EVERY_US
+        self._refusal: tuple[int, str] = (0, "")
+
+    def refusal(self, now_us: int) -> str:
+        """Return why the latest setpoint was refused; empty if none was of late."""
+        at_us, why = self._refusal
+        return why if now_us - at_us <= self._silent_after_us else ""
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         try:
             value = self._decode(message, peer, now_us)
         except Refused as refused:
             self.dropped[str(refused)] += 1
-            return ()
+            return self._tell(message.name, refused, now_us) if refused.field else ()
         if value is not None and not self._keep(peer, value, now_us):
             self.dropped["another client"] += 1
         return ()
+
+    def _tell(self, name: str, refused: Refused, now_us: int) -> Iterable[Send]:
+        why = f"{name} refused: {refused.field}: {refused}"
+        self._refusal = (now_us, why)
+        if self._text is None or 0 <= now_us - self._told_us < TELL_EVERY_US:
+            return ()
+        self._told_us = now_us
+        return self._text.say(WARNING, why)
 
     def engage(self, peer: Peer, now_us: int) -> None:
         if self._streams(peer, now_us):

@@ -6,16 +6,17 @@ Of `est_capabilities` only the position bit is required: clients omit the others
 from math import hypot, isfinite, isnan
 from typing import Any
 
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on_earth
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Peer
+from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import STILL, TargetState
 from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.mavlink.wire.places import MAX_DISTANCE_M, misplaced
 
 POSITION_KNOWN = 1
-MAX_DISTANCE_M = 1e6
 MAX_SPEED_M_S = 100.0
 MAX_ACCELERATION_M_S2 = 100.0
 SILENT_AFTER_US = 3_000_000
@@ -30,8 +31,8 @@ class Follow(StreamedService[TargetState]):
 
     handles = frozenset({"FOLLOW_TARGET"})
 
-    def __init__(self) -> None:
-        super().__init__(SILENT_AFTER_US)
+    def __init__(self, text: StatusText | None = None) -> None:
+        super().__init__(SILENT_AFTER_US, text)
         self._origin = DEFAULT_ORIGIN
 
     def update(self, origin: Geodetic) -> None:
@@ -44,22 +45,24 @@ class Follow(StreamedService[TargetState]):
     def _decode(self, message: Message, _peer: Peer, now_us: int) -> TargetState:
         fields = message.fields
         if not fields.est_capabilities & POSITION_KNOWN:
-            raise Refused("no position")
+            raise Refused("no position", f"est_capabilities {fields.est_capabilities}")
         latitude, longitude, altitude_m = fields.lat * _DEG, fields.lon * _DEG, fields.alt
         if not isfinite(altitude_m):
-            raise Refused("not finite")
-        if not is_on_earth(latitude, longitude):
-            raise Refused("out of range")
+            raise Refused("not finite", f"altitude {altitude_m:g}")
+        wrong = misplaced(latitude, longitude)
+        if wrong:
+            raise Refused("out of range", wrong)
         position = enu_of(Geodetic(latitude, longitude, altitude_m), self._origin)
         velocity, acceleration = _known(fields.vel), _known(fields.acc)
         if not all(map(isfinite, (*velocity, *acceleration))):
-            raise Refused("not finite")
-        if (
-            hypot(*position) > MAX_DISTANCE_M
-            or hypot(*velocity) > MAX_SPEED_M_S
-            or hypot(*acceleration) > MAX_ACCELERATION_M_S2
+            raise Refused("not finite", "velocity or acceleration")
+        for name, vector, maximum in (
+            ("distance", position, MAX_DISTANCE_M),
+            ("speed", velocity, MAX_SPEED_M_S),
+            ("acceleration", acceleration, MAX_ACCELERATION_M_S2),
         ):
-            raise Refused("out of range")
+            if hypot(*vector) > maximum:
+                raise Refused("out of range", f"{name} {hypot(*vector):g}, more than {maximum:g}")
         return TargetState(position, velocity, acceleration, now_us, now_us)
 
 

@@ -7,6 +7,7 @@ PX4 and its clients, although the message's text is counter-clockwise. Buttons a
 from typing import Any, NamedTuple
 
 from colibri.mavlink.node.service import Peer
+from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import SILENT_AFTER_US, Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import Sticks
 from colibri.mavlink.wire.dialect import Message
@@ -38,8 +39,8 @@ class Manual(StreamedService[Controls]):
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
-    def __init__(self, system_id: int) -> None:
-        super().__init__()
+    def __init__(self, system_id: int, text: StatusText | None = None) -> None:
+        super().__init__(text=text)
         self._system_id = system_id
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
@@ -54,7 +55,7 @@ class Manual(StreamedService[Controls]):
             raise Refused("another vehicle")
         axes = (fields.x, fields.y, fields.z, fields.r)
         if not all(axis == UNUSED or -FULL <= axis <= FULL for axis in axes):
-            raise Refused("out of range")
+            raise Refused("out of range", f"x, y, z, r {axes}")
         pitch, roll, yaw = (0.0 if axis == UNUSED else axis / FULL for axis in (fields.x, fields.y, fields.r))
         # "negative values are negative thrust", which no rotor of ours makes
         thrust = 0.5 if fields.z == UNUSED else max(fields.z, 0) / FULL
@@ -64,7 +65,7 @@ class Manual(StreamedService[Controls]):
         wire = (fields.chan1_raw, fields.chan2_raw, fields.chan3_raw, fields.chan4_raw)
         minimum, maximum = VALID_US
         if not all(value in (RELEASED, UNCHANGED) or minimum <= value <= maximum for value in wire):
-            raise Refused("out of range")
+            raise Refused("out of range", f"channels 1 to 4 {wire}")
         before = self._value(peer, now_us, SILENT_AFTER_US)
         held = before.channels if before else _ALL_RELEASED
         c1, c2, c3, c4 = (old if new == UNCHANGED else new for new, old in zip(wire, held, strict=True))

@@ -1,36 +1,44 @@
 """The offboard microservice: setpoints streamed by a client.
 
 Specification: https://mavlink.io/en/services/offboard_control.html, and common.xml's MAV_FRAME,
-POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. Setpoints are never answered. An invalid one is counted and
-dropped, and does not keep a stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
+POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. An invalid setpoint is counted and dropped with a STATUSTEXT, and
+does not keep a stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
 Choices left open by the specification:
 
-- A group with only NaN in its unmasked fields counts as masked, as in PX4.
+- NaN counts as masked, as in PX4: x and y of a group together, z alone.
 - Undefined bits of a type mask are ignored.
 - Body frames are level: they turn with the heading, not with roll and pitch.
 - One masked horizontal axis of a group in a body frame means: keep this position, zero velocity, zero acceleration.
-- Altitude above terrain is altitude above home: the ground is flat.
 """
 
 from collections.abc import Callable
 from math import hypot, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on_earth
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.common.kernels import cos, sin
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
+from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
-from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
+from colibri.mavlink.setpoints.setpoints import (
+    NOWHERE,
+    STILL,
+    AttitudeSetpoint,
+    OffboardSetpoint,
+    PositionSetpoint,
+    turned,
+)
 from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from colibri.mavlink.wire.places import ABOVE_SEA, MAX_DISTANCE_M, read_place
+from colibri.mavlink.wire.refusal import Refusal
 
 MAX_SPEED_M_S = 50.0
 MAX_ACCELERATION_M_S2 = 50.0
-MAX_DISTANCE_M = 1e6
 MAX_YAW_RATE_RAD_S = 35.0
 """Of body rates: 2000 degrees a second, the range of usual gyroscopes."""
 MAX_YAW_RAD = 1e3
@@ -73,7 +81,6 @@ LOCAL_FRAMES: dict[int, Frame] = {
     mav.MAV_FRAME_LOCAL_FRD: _ALONG_HEADING._replace(from_vehicle=False),
     mav.MAV_FRAME_LOCAL_FLU: _ALONG_HEADING._replace(from_vehicle=False, up=True),
 }
-AMSL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
 
 class Whereabouts(NamedTuple):
@@ -88,9 +95,10 @@ class Whereabouts(NamedTuple):
 def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
     frame = LOCAL_FRAMES.get(fields.coordinate_frame)
     if frame is None:
-        raise Refused("frame")
+        raise Refused("frame", f"frame {fields.coordinate_frame} is not local")
     velocity, acceleration = _derivatives(fields, body=frame.body, up=frame.up)
-    place = group((fields.x, fields.y, fields.z), fields.type_mask >> _POSITION, MAX_DISTANCE_M)
+    wire = (fields.x, fields.y, fields.z)
+    place = group("position", wire, fields.type_mask >> _POSITION, MAX_DISTANCE_M, by_axis=True)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, here.yaw_rad if frame.turned_yaw else 0.5 * pi, up=frame.up)
     position = _position_from(place, frame, here)
     return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us))
@@ -98,7 +106,7 @@ def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoin
 
 def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
     if fields.coordinate_frame not in GLOBAL_FRAMES:
-        raise Refused("frame")
+        raise Refused("frame", f"frame {fields.coordinate_frame} is not global")
     velocity, acceleration = _derivatives(fields, body=False, up=False)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
     return _checked(
@@ -112,13 +120,13 @@ def decode_attitude(fields: Any, _here: Whereabouts, now_us: int) -> AttitudeSet
     mask = fields.type_mask
     masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
     wire = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
-    rate = frd_from_flu(group(wire, masked, MAX_YAW_RATE_RAD_S))
+    rate = frd_from_flu(group("body rates", wire, masked, MAX_YAW_RATE_RAD_S))
     attitude = None if mask & _NO_ATTITUDE else _attitude(fields.q)
     thrust = nan if mask & _NO_THRUST else fields.thrust
     if not mask & _NO_THRUST and not 0.0 <= thrust <= 1.0:
-        raise Refused("out of range" if isfinite(thrust) else "not finite")
+        raise Refused("out of range" if isfinite(thrust) else "not finite", f"thrust {thrust:g}")
     if attitude is None and all(map(isnan, rate)):
-        raise Refused("empty")
+        raise Refused("empty", f"type_mask {mask:#x}")
     return AttitudeSetpoint(attitude, rate, thrust, now_us)
 
 
@@ -148,48 +156,53 @@ def _position_of(fields: Any, here: Whereabouts) -> Vector:
     no_latitude, no_longitude, no_altitude = (bool(fields.type_mask >> axis & 1) for axis in range(3))
     latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * DEGREES
     longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * DEGREES
-    if not is_on_earth(latitude, longitude):
-        raise Refused("out of range")
-    east, north, _ = enu_of(Geodetic(latitude, longitude, 0.0), here.origin)
-    if hypot(east, north) > MAX_DISTANCE_M:
-        raise Refused("out of range")
-    altitude_m = single(fields.alt, no_altitude, MAX_DISTANCE_M)
-    up = altitude_m if isnan(altitude_m) else altitude_m + _counted_from_m(fields.coordinate_frame, here)
-    return (nan if no_longitude else east, nan if no_latitude else north, up)
+    if no_latitude and no_longitude:
+        latitude = longitude = nan
+    altitude_m = single("altitude", fields.alt, no_altitude, MAX_DISTANCE_M)
+    frame = fields.coordinate_frame
+    if here.home is None and frame not in ABOVE_SEA and not isnan(altitude_m):
+        raise Refused("no home", f"altitude {altitude_m:g} above home")
+    home_up_m = here.home.position_enu_m[2] if here.home else 0.0
+    place = read_place(latitude, longitude, altitude_m, frame, home_up_m=home_up_m, origin=here.origin, here=STILL)
+    if isinstance(place, Refusal):
+        raise Refused("out of range", place.reason)
+    east, north, up = place
+    return (nan if no_longitude else east, nan if no_latitude else north, nan if isnan(altitude_m) else up)
 
 
-def _counted_from_m(frame: int, here: Whereabouts) -> float:
-    if frame in AMSL_FRAMES:
-        return -here.origin.altitude_m
-    if here.home is None:
-        raise Refused("no home")
-    return here.home.position_enu_m[2]
+def group(name: str, wire: Vector, masked: int, maximum: float, *, by_axis: bool = False) -> Vector:
+    """Return a group's fields, nan if masked (bit n of `masked`); the others are at most `maximum` long.
 
-
-def group(wire: Vector, masked: int, maximum: float) -> Vector:
-    """Return a group's fields, nan if masked (bit n of `masked`); the others are at most `maximum` long."""
-    given = [value for axis, value in enumerate(wire) if not masked >> axis & 1]
-    if all(map(isnan, given)):
-        return NOWHERE
-    if not all(map(isfinite, given)):
-        raise Refused("not finite")
-    if hypot(*given) > maximum:
-        raise Refused("out of range")
+    NaN masks all of a group; `by_axis` it masks x and y, or z alone.
+    """
     x, y, z = (nan if masked >> axis & 1 else value for axis, value in enumerate(wire))
+    given = [value for axis, value in enumerate(wire) if not masked >> axis & 1 and not isnan(value)]
+    if not given:
+        return NOWHERE
+    whole = isnan(x) == isnan(y) or bool(masked & 0b11) if by_axis else masked.bit_count() + len(given) == len(wire)
+    if not whole or not all(map(isfinite, given)):
+        raise Refused("not finite", _listed(name, wire, masked))
+    if hypot(*given) > maximum:
+        raise Refused("out of range", _listed(name, wire, masked))
     return (x, y, z)
 
 
-def single(wire: float, masked: int, maximum: float) -> float:
-    value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), maximum)
+def _listed(name: str, wire: Vector, masked: int) -> str:
+    return f"{name} {', '.join(f'{value:g}' for axis, value in enumerate(wire) if not masked >> axis & 1)}"
+
+
+def single(name: str, wire: float, masked: int, maximum: float) -> float:
+    value, _, _ = group(name, (wire, nan, nan), 0b110 | bool(masked), maximum)
     return value
 
 
 def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
     mask = fields.type_mask
-    velocity = group((fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, MAX_SPEED_M_S)
-    acceleration = group((fields.afx, fields.afy, fields.afz), mask >> _ACCELERATION, MAX_ACCELERATION_M_S2)
+    velocity = group("velocity", (fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, MAX_SPEED_M_S, by_axis=True)
+    wire = (fields.afx, fields.afy, fields.afz)
+    acceleration = group("acceleration", wire, mask >> _ACCELERATION, MAX_ACCELERATION_M_S2, by_axis=True)
     if mask & _FORCE and not all(map(isnan, acceleration)):
-        raise Refused("force")
+        raise Refused("force", f"type_mask {mask:#x}")
     if not body:
         return ned_from_enu(velocity), ned_from_enu(acceleration)
     if not up:
@@ -205,8 +218,8 @@ def _whole(flu: Vector) -> Vector:
 
 
 def _yaw(fields: Any, zero_rad: float, *, up: bool) -> tuple[float, float]:
-    yaw = single(fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
-    rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
+    yaw = single("yaw", fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
+    rate = single("yaw rate", fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
     turn = 1.0 if up else -1.0
     return (nan if isnan(yaw) else nearest_turn(zero_rad + turn * yaw, 0.0), turn * rate)
 
@@ -215,9 +228,9 @@ def _attitude(q: Any) -> Quaternion:
     w, x, y, z = q
     length = sqrt(w * w + x * x + y * y + z * z)
     if not isfinite(length):
-        raise Refused("not finite")
+        raise Refused("not finite", _listed("quaternion", q, 0))
     if abs(length - 1.0) > UNIT_WITHIN:
-        raise Refused("not a unit quaternion")
+        raise Refused("not a unit quaternion", _listed("quaternion", q, 0))
     return ned_frd_from_enu_flu((w / length, x / length, y / length, z / length))
 
 
@@ -230,7 +243,7 @@ def _checked(setpoint: PositionSetpoint) -> PositionSetpoint:
         setpoint.yaw_rate_rad_s,
     )
     if all(map(isnan, asked)):
-        raise Refused("empty")
+        raise Refused("empty", "nothing in it is given")
     return setpoint
 
 
@@ -246,8 +259,8 @@ class Offboard(StreamedService[OffboardSetpoint]):
 
     handles = frozenset(_DECODERS)
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, text: StatusText | None = None) -> None:
+        super().__init__(text=text)
         self._here = Whereabouts()
 
     def update(self, position_enu_m: Vector, yaw_rad: float, origin: Geodetic, home: HomePosition | None) -> None:

@@ -90,6 +90,9 @@ class Cockpit:
     def missing(self) -> dict[Need, str]:
         return {need: need.value for need in self.unmet}
 
+    def remark(self, mode: Mode) -> str:
+        return f"{mode} has no target" if mode is Mode.FOLLOW and self.steered.followed is None else ""
+
     def engage(self, peer: Peer, now_us: int) -> None:
         self.engaged.append((peer, now_us))
 

@@ -5,7 +5,7 @@ from math import dist, inf, isfinite, isnan, nan, pi, radians, remainder, tau
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.guidance.mission.items import height_of, is_here, place_of
-from colibri.autopilot.guidance.tasks.orders import GoTo, Land, Orbit, Order, Return, TakeOff
+from colibri.autopilot.guidance.tasks.orders import GoTo, Land, Orbit, Order, Return, TakeOff, turn_of
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
@@ -118,7 +118,7 @@ def _delay(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
 
 
 def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
-    """Turn clockwise from north, or from the heading if p4 is 1."""
+    """Turn to an angle clockwise from north, or from the heading if p4 is 1; p3 is the way, 1 clockwise."""
     mission_context = context.mission_context
     if mission_context.landed:
         return ()
@@ -129,9 +129,10 @@ def _turn(item: MissionItem, context: ItemContext) -> tuple[LegPhase, ...]:
     place = context.order.position_enu_m if isinstance(context.order, GoTo) else mission_context.position_enu_m
 
     def turned(now: MissionContext, since_s: float) -> bool:
-        return abs(remainder(now.yaw_rad - yaw, tau)) <= _TURNED_RAD or now.arrived or since_s >= _TURN_WITHIN_S
+        return abs(remainder(now.yaw_rad - yaw, tau)) <= _TURNED_RAD or since_s >= _TURN_WITHIN_S
 
-    return (LegPhase(GoTo(place, yaw, context.speed_m_s), turned, reaches=True),)
+    turn = turn_of(item.p1, _or_zero(item.p3))
+    return (LegPhase(GoTo(place, yaw, context.speed_m_s, turn), turned, reaches=True),)
 
 
 _LEGS: Mapping[int, Leg] = {

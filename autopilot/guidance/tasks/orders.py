@@ -9,11 +9,20 @@ from colibri.common.types import Vector
 
 
 class GoTo(NamedTuple):
-    """Fly to a place and stay; yaw None is along the way, speed None the cruise speed."""
+    """Fly to a place and stay; yaw None is along the way, speed None the cruise speed.
+
+    `turn` is the way to turn: 1 counter-clockwise, -1 clockwise, 0 the shorter one.
+    """
 
     position_enu_m: Vector
     yaw_rad: float | None = None
     speed_m_s: float | None = None
+    turn: int = 0
+
+
+def turn_of(angle: float, way: float) -> int:
+    """Return the turn of CONDITION_YAW's angle and direction; a negative angle has none."""
+    return -int(way) if angle >= 0.0 else 0
 
 
 class Orbit(NamedTuple):

@@ -1,7 +1,7 @@
 """Flight tasks by position."""
 
 from collections.abc import Callable
-from math import dist, hypot
+from math import dist, hypot, pi, radians, remainder, tau
 from typing import TypeAlias
 
 from colibri.autopilot.control.interface import Pace
@@ -29,6 +29,7 @@ _THERE_M, _THERE_M_S = 0.3, 0.5
 """Distance and speed at arrival; the reference settles the rest."""
 _REST_M_S = 0.05
 _REST_RAD_S = 0.05
+_FACING_RAD, _LEAD_RAD = radians(5.0), 0.5 * pi
 _BELOW_FENCE = 0.9
 """Part of the height fence that a return climbs to."""
 _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
@@ -45,16 +46,25 @@ class GoToTask:
         along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else context.yaw_rad
         self._yaw_rad = along if order.yaw_rad is None else order.yaw_rad
         self._target = still_target(self._place, self._yaw_rad, context.samples)
+        there = abs(remainder(self._yaw_rad - context.yaw_rad, tau)) < _FACING_RAD
+        self._turn = 0 if there else order.turn
 
     @property
     def order(self) -> GoTo:
-        return GoTo(self._place, self._yaw_rad, self._speed_m_s)
+        return GoTo(self._place, self._yaw_rad, self._speed_m_s, self._turn)
 
     def update(self, context: TaskContext) -> PositionMotion:
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = at_speed(limits, min(self._speed_m_s, context.behaviour.max_speed_m_s))
-        return PositionMotion(self._target, limits, Pace.WAITING)
+        return PositionMotion(self._turning(context) if self._turn else self._target, limits, Pace.WAITING)
+
+    def _turning(self, context: TaskContext) -> Target:
+        """Lead the heading a quarter turn ahead, until the way that was ordered is the shorter one."""
+        if (self._turn * (self._yaw_rad - context.yaw_rad)) % tau < _LEAD_RAD:
+            self._turn = 0
+            return self._target
+        return still_target(self._place, context.yaw_rad + self._turn * _LEAD_RAD, context.samples)
 
     def arrived(self, context: TaskContext) -> bool:
         return dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S

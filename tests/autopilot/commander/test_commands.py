@@ -1,6 +1,6 @@
 """Commands alone: what each does with good numbers, and that bad ones are denied and change nothing."""
 
-from math import inf, nan, radians
+from math import degrees, inf, nan, radians, remainder, tau
 
 import pytest
 from hypothesis import given, settings
@@ -68,6 +68,20 @@ def test_do_set_mode_takes_every_number_of_the_table(flying: Cockpit, mode: Mode
     assert flying.pilot.state.mode is mode
     assert flying.commands.set_custom_mode(int(CUSTOM), custom_mode(Mode.LAND)) is None
     assert flying.pilot.state.mode is Mode.LAND
+
+
+@pytest.mark.parametrize(
+    ("params", "first"), [((), 1), ((-1.0, 0.0), 1), ((0.0,), 0), ((2.0, 2.0), 2), ((3.0,), None), ((0.0, 1.0), None)]
+)
+def test_a_mission_starts_at_its_first_item(flying: Cockpit, params: tuple[float, ...], first: int | None) -> None:
+    flying.load(MISSION, *[item("NAV_WAYPOINT", place=(20.0, north, 10.0)) for north in (0.0, 5.0, 10.0)])
+    flying.missions.set_current(1, False)
+    outcome = flying.do("MISSION_START", *params)
+    assert outcome.result == (DENIED if first is None else ACCEPTED)
+    assert ("item" in outcome.reason) is (first is None)
+    assert flying.missions.progress().seq == (1 if first is None else first)
+    flying.load(MISSION)
+    assert flying.do("MISSION_START").reason == "mission refused: there is no mission"
 
 
 @pytest.mark.parametrize(
@@ -187,6 +201,38 @@ def test_places_heights_and_headings_of_a_reposition(flying: Cockpit) -> None:
     assert flying.do("DO_REPOSITION", z=15.0 + flying.home.origin.altitude_m).result == ACCEPTED
     assert isinstance(flying.pilot.task, GoToTask)
     assert flying.pilot.task.order.position_enu_m == pytest.approx((0.0, 0.0, 15.0), abs=0.01)
+
+
+@pytest.mark.parametrize("by", ["command", "item"])
+@pytest.mark.parametrize(
+    ("angle", "way", "relative", "turned"),
+    [
+        (180.0, 0.0, 0.0, 90.0),
+        (180.0, 1.0, 0.0, 90.0),
+        (180.0, -1.0, 0.0, -270.0),
+        (80.0, 1.0, 0.0, 350.0),
+        (90.0, -1.0, 0.0, 0.0),
+        (350.0, 1.0, 1.0, 350.0),
+        (200.0, -1.0, 1.0, -200.0),
+        (-90.0, 1.0, 1.0, -90.0),
+    ],
+)
+def test_turns_go_the_way_that_is_asked_for(by: str, angle: float, way: float, relative: float, turned: float) -> None:
+    """The vehicle heads east; clockwise is positive."""
+    cockpit = Cockpit(FLYING)
+    cockpit.step()
+    if by == "command":
+        assert cockpit.do("CONDITION_YAW", angle, 0.0, way, relative).result == ACCEPTED
+    else:
+        turn = item("CONDITION_YAW", angle, 0.0, way, relative)
+        cockpit.load(MISSION, turn, item("NAV_LOITER_UNLIM", 0.0, 0.0, 0.0, nan, place=FLYING))
+        cockpit.pilot.select(Mode.MISSION, {})
+    yaw, total = cockpit.state.euler[2], 0.0
+    for _ in range(500):
+        cockpit.step()
+        before, yaw = yaw, cockpit.state.euler[2]
+        total -= degrees(remainder(yaw - before, tau))
+    assert total == pytest.approx(turned, abs=6.0 if by == "item" else 1.0)
 
 
 def test_the_speed_that_is_asked_for(flying: Cockpit) -> None:

@@ -65,22 +65,26 @@ def test_a_track_from_time_0_is_flown_once() -> None:
 
 
 class Nobody:
+    def __init__(self, refusal: str = "") -> None:
+        self._refusal = refusal
+
     def latest(self, now_us: int, timeout_us: int) -> None:
         """Return nothing."""
 
+    def refusal(self, _now_us: int) -> str:
+        return self._refusal
+
     def engage(self, peer: Peer, now_us: int) -> None:
         """Take no note of who steers."""
 
 
-class Somebody:
+class Somebody(Nobody):
     def __init__(self, time_us: int) -> None:
+        super().__init__()
         self.sticks = Sticks(0.0, 0.0, 0.5, 0.0, time_us)
 
-    def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
+    def latest(self, now_us: int, timeout_us: int) -> Sticks | None:  # type: ignore[override]
         return self.sticks if now_us - self.sticks.time_us <= timeout_us else None
-
-    def engage(self, peer: Peer, now_us: int) -> None:
-        """Take no note of who steers."""
 
 
 def needs_of(
@@ -98,6 +102,14 @@ def test_most_needs_are_missing_at_first() -> None:
     cockpit = Cockpit()
     missing = needs_of(cockpit).missing()
     assert set(missing) == {Need.STICKS, Need.SETPOINTS, Need.MISSION, Need.CIRCLE, Need.FLYING}
+
+
+def test_needs_name_what_is_received_and_refused() -> None:
+    needs = needs_of(Cockpit(), Nobody("roll 2"), Nobody("frame 99"), Nobody("no position"))
+    missing = needs.missing()
+    assert (missing[Need.STICKS], missing[Need.SETPOINTS]) == ("roll 2", "frame 99")
+    assert (needs.remark(Mode.FOLLOW), needs.remark(Mode.HOLD)) == ("no position", "")
+    assert "FOLLOW_TARGET" in needs_of(Cockpit()).remark(Mode.FOLLOW)
 
 
 def test_needs_are_met_one_by_one() -> None:

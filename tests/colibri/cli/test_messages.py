@@ -152,3 +152,12 @@ def test_a_refusal_is_one_line(
     monkeypatch.chdir(tmp_path)
     assert message in refused(*shlex.split(command))
     assert command.startswith(("certify", "compare")) or not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["view", "plot"])
+def test_a_file_in_place_of_a_flight_is_refused(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.tlog").touch()
+    assert refused(command, "flight.tlog").startswith('"flight.tlog" is a file: expected the folder of a flight')

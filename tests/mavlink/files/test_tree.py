@@ -203,7 +203,7 @@ def tree() -> Tree:
     root.make_folder(("logs",))  # hidden behind the mount
     root.create(("logs", "hidden"))
     generated = {"general.json": lambda _: b"{}", "@PARAM/param.pck": lambda query: b"<" + query.encode() + b">"}
-    return Tree(root, {"logs": logs, "@MAV_LOG": logs}, generated)
+    return Tree(root, {"logs": logs}, generated, {"@MAV_LOG": "logs"})
 
 
 def test_a_tree_shows_everything(tree: Tree) -> None:

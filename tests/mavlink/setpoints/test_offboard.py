@@ -8,6 +8,7 @@ from hypothesis import given
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler
+from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.offboard import Offboard
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoint, PositionSetpoint
 from colibri.mavlink.telemetry.snapshot import HomePosition
@@ -177,6 +178,14 @@ def test_without_home_nothing_is_relative_to_it(offboard: Offboard) -> None:
     assert taken(offboard, GLOBAL, coordinate_frame=5, **wire) is not None
 
 
+def test_refusals_are_told_every_five_seconds() -> None:
+    service, bad = Offboard(StatusText()), message(LOCAL, coordinate_frame=1, type_mask=VELOCITY, vx=80.0)
+    told = [len(list(service.receive(bad, FIRST, 20_000 * frame))) for frame in range(500)]
+    assert [frame for frame, sends in enumerate(told) if sends] == [0, 250]
+    text, *_ = service.receive(bad, FIRST, 10_000_000)
+    assert text.fields[1].startswith(b"SET_POSITION_TARGET_LOCAL_NED refused: velocity")
+
+
 def attitude(service: Offboard, mask: int, **fields: Any) -> AttitudeSetpoint:
     setpoint = taken(service, ATTITUDE, type_mask=mask, **fields)
     assert isinstance(setpoint, AttitudeSetpoint)
@@ -201,6 +210,19 @@ def test_body_rates_with_thrust(offboard: Offboard) -> None:
     assert setpoint.rate_flu_rad_s == approximately(0.1, -0.2, -0.3)
     assert attitude(offboard, 0x82, **rates).rate_flu_rad_s == approximately(0.1, nan, -0.3)
     assert isnan(attitude(offboard, 0xC0, **rates, thrust=nan).thrust)
+
+
+@pytest.mark.parametrize(
+    ("fields", "position", "velocity"),
+    [
+        ({"x": nan, "y": nan, "z": -8.0, "vx": 2.0, "vz": nan}, (nan, nan, 8.0), (0.0, 2.0, nan)),
+        ({"x": 1.0, "y": 2.0, "z": nan, "vx": nan, "vy": nan, "vz": nan}, (2.0, 1.0, nan), NO),
+    ],
+)
+def test_nan_masks_axes_as_in_px4(offboard: Offboard, fields: dict[str, float], position: Any, velocity: Any) -> None:
+    setpoint = local(offboard, 1, 0xDC0, **fields)
+    assert setpoint.position_enu_m == approximately(*position)
+    assert setpoint.velocity_m_s == approximately(*velocity)
 
 
 @pytest.mark.parametrize(
@@ -241,6 +263,9 @@ def test_what_cannot_be_flown_is_dropped_and_keeps_nothing_alive(
     offboard.receive(good, FIRST, 0)
     offboard.receive(message(name, **fields), FIRST, 400_000)
     assert offboard.dropped == {reason: 1}
+    assert offboard.refusal(500_000).startswith(f"{name} refused: ")
+    assert offboard.refusal(500_000).endswith(f": {reason}")
+    assert offboard.refusal(2_000_000) == ""
     assert offboard.latest(400_000, 300_000) is None
     before = offboard.latest(400_000, 400_000)
     assert isinstance(before, PositionSetpoint)
