@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from colibri.conformance import check_controller as check_controller
     from colibri.experiments import Flight as Flight
     from colibri.experiments import fly as fly
+    from colibri.experiments import load_flight as load_flight
     from colibri.flights import FlightPlan as FlightPlan
     from colibri.flights import FlightSpec as FlightSpec
     from colibri.flights import NoEffectWarning as NoEffectWarning

@@ -46,6 +46,8 @@ class AttitudeTarget(NamedTuple):
 class GeometricController:
     """The control law."""
 
+    reads_motion = False
+
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         del clock
         settings = read_settings(scaled("geometric-se3", table, vehicle), GeometricSettings)

@@ -13,7 +13,8 @@ from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 import numpy as np
 
 from colibri.autopilot.control.qp import QpStatus
-from colibri.common.types import Array, Quaternion, Vector
+from colibri.common.rotations import earth_from_body
+from colibri.common.types import Array, FourRotors, Quaternion, Vector
 
 Clock: TypeAlias = Callable[[], float]  # seconds, to measure durations; a decision must not depend on it
 Memory = TypeVar("Memory")
@@ -65,6 +66,9 @@ class AttitudeDemand(NamedTuple):
     thrust_n: Array
 
 
+_ZERO = (0.0, 0.0, 0.0)
+
+
 class VehicleState(NamedTuple):
     """The state of the vehicle.
 
@@ -73,6 +77,8 @@ class VehicleState(NamedTuple):
         attitude: Unit quaternion wxyz, FLU body to ENU earth.
         euler: phi, theta, psi in rad, psi unwrapped.
         rate_flu_rad_s: Body rates p, q, r, FLU.
+        acceleration_enu_m_s2: Mean since the previous control sample, or over a compensated delay, ENU; first zero.
+        rotor_speeds: Of the model: the law's commands after the rotor lag, in the vehicle's unit and rotor order.
         airborne: Clear of the ground: only air and rotors act on the vehicle.
     """
 
@@ -81,10 +87,17 @@ class VehicleState(NamedTuple):
     attitude: Quaternion
     euler: Vector
     rate_flu_rad_s: Vector
+    acceleration_enu_m_s2: Vector = _ZERO
+    rotor_speeds: FourRotors = (0.0, 0.0, 0.0, 0.0)
     airborne: bool = True
 
+    @property
+    def acceleration_flu_m_s2(self) -> Vector:
+        """The acceleration in the body's axes, FLU."""
+        w, x, y, z = self.attitude
+        return earth_from_body((w, -x, -y, -z), self.acceleration_enu_m_s2)
 
-_ZERO = (0.0, 0.0, 0.0)
+
 AT_REST = VehicleState(_ZERO, _ZERO, (1.0, 0.0, 0.0, 0.0), _ZERO, _ZERO)  # hovering at the origin, level, heading east
 
 

@@ -34,14 +34,26 @@ from colibri.autopilot.control.registry import (
     load_controller,
 )
 from colibri.autopilot.control.vehicle_model.battery import estimated
+from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.config import SettingsError
 from colibri.common.errors import Error
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
-from colibri.common.types import Array
+from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
+
+
+class Seen(NamedTuple):
+    """Motion at the last observation."""
+
+    time_us: int
+    velocity_enu_m_s: Vector
+    acceleration_enu_m_s2: Vector
+
+
+_UNSEEN = Seen(-1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class LoopRecord(NamedTuple):
@@ -50,6 +62,8 @@ class LoopRecord(NamedTuple):
     yaw_rad: float  # unwrapped
     controls: tuple[float, float, float, float]  # rotor speeds, in parts of the largest
     memory: bytes  # the control law's, serialised; empty if it is not plain data
+    seen: Seen
+    rotor_speeds: FourRotors  # of the model, vehicle's unit
 
 
 class ControlLoop:
@@ -73,6 +87,8 @@ class ControlLoop:
         self._reported_ah = 0.0
         self._is_plain = True
         self._yaw_rad = 0.0
+        self._seen = _UNSEEN
+        self._speeds: FourRotors = (0.0, 0.0, 0.0, 0.0)  # of the rotors' model at the next control sample
         self.controls = (0.0, 0.0, 0.0, 0.0)  # rotor speeds now, in parts of the largest
 
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
@@ -81,7 +97,8 @@ class ControlLoop:
         if self._charged is not None:
             charge_ah = self._reported_ah if afresh or before is None else self._charged.charge_ah(before)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
-        self._yaw_rad = yaw_rad
+        self._yaw_rad, self._seen = yaw_rad, _UNSEEN
+        self._speeds = (rotor_speed, rotor_speed, rotor_speed, rotor_speed)
         self._command(np.full(4, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
@@ -128,7 +145,7 @@ class ControlLoop:
                 memory = to_bytes(self._memory)
             except TypeError:
                 self._is_plain = False
-        return LoopRecord(self._yaw_rad, self.controls, memory)
+        return LoopRecord(self._yaw_rad, self.controls, memory, self._seen, self._speeds)
 
     def resume(self, record: LoopRecord, *, seamless: bool) -> None:
         first = self.controller.initial(self.vehicle.hover_speed)
@@ -136,6 +153,7 @@ class ControlLoop:
         self._memory = first if kept is None else kept
         if seamless and kept is not None:
             self._yaw_rad, self.controls = record.yaw_rad, record.controls
+            self._seen, self._speeds = record.seen, record.rotor_speeds
         else:
             self.begin_in_flight(record.yaw_rad)
 
@@ -147,7 +165,17 @@ class ControlLoop:
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
-        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+        time_us, position, velocity, attitude, rate = frame
+        if not self._reads_motion:
+            return VehicleState(position, velocity, attitude, euler, rate)
+        before_us, (vx, vy, vz), acceleration = self._seen
+        if time_us != before_us:
+            if before_us >= 0:
+                x, y, z = velocity
+                per_s = 1e6 / (time_us - before_us)
+                acceleration = ((x - vx) * per_s, (y - vy) * per_s, (z - vz) * per_s)
+            self._seen = Seen(time_us, velocity, acceleration)
+        return VehicleState(position, velocity, attitude, euler, rate, acceleration, self._speeds)
 
     def decide(self, time_us: int, state: VehicleState, references: Horizon, pace: Pace = Pace.CLOCK) -> Decision:
         """Decide the rotor speeds to hold until the next control sample.
@@ -185,11 +213,14 @@ class ControlLoop:
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Switch to a law of the same kind and interval; keep the memory."""
-        self._take_in(controller)
         self.vehicle = vehicle
+        self._take_in(controller)
 
     def _take_in(self, controller: Controller[Any]) -> None:
         self.controller = controller
+        self._reads_motion = vars(type(controller)).get("reads_motion", True)  # not that of a base class
+        lag = rotor_lag(self.vehicle, controller.control_interval_us * 1e-6)
+        self._lag = (lag.up, lag.down)
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
         on_path = controller if isinstance(controller, PathController) else None
@@ -208,6 +239,14 @@ class ControlLoop:
         maximum = self.vehicle.rotors.max_speed
         a, b, c, d = check_rotor_speeds(self._name, rotor_speeds, maximum, time_us)
         self.controls = (a / maximum, b / maximum, c / maximum, d / maximum)
+        if self._reads_motion:
+            (up, down), (i, j, k, m) = self._lag, self._speeds
+            self._speeds = (
+                i + (a - i) * (up if a > i else down),
+                j + (b - j) * (up if b > j else down),
+                k + (c - k) * (up if c > k else down),
+                m + (d - m) * (up if d > m else down),
+            )
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

@@ -73,7 +73,7 @@ def write_mcap(log: "ULog", path: Path) -> Path:
     with path.open("wb") as file:
         writer: Any = Writer(file)  # partly untyped
         writer.start(library="colibri")
-        streams = [_messages(topic, _channel(writer, name, name, schema)) for name, topic, schema in _topics(log)]
+        streams = [_messages(topic, _channel(writer, name, name, schema)) for name, topic, schema in topics_of(log)]
         streams.append(_texts(log, _channel(writer, "logged_messages", "foxglove.Log", _LOG_SCHEMA)))
         for time_us, channel, message in merge(*streams, key=lambda each: each[0]):
             writer.add_message(channel, time_us * _NS_PER_US, msgspec.json.encode(message), time_us * _NS_PER_US)
@@ -108,7 +108,7 @@ def write_flight_tables(path: Path, folder: Path) -> bool:
 def write_csv(log: "ULog", folder: Path) -> Path:
     """Write a table of each topic but Colibri's own."""
     own = {topic.name for topic in FLIGHT_TOPICS}
-    for name, topic, _ in _topics(log):
+    for name, topic, _ in topics_of(log):
         if name in own:
             continue
         with _table(folder, f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
@@ -122,7 +122,7 @@ def write_parquet(log: "ULog", folder: Path) -> Path:
     with _needed("pyarrow", "parquet"):
         from pyarrow import table
         from pyarrow.parquet import write_table
-    for name, topic, _ in _topics(log):
+    for name, topic, _ in topics_of(log):
         write_table(table(topic.data), _table(folder, f"{name}.parquet"))
     return folder
 
@@ -140,7 +140,7 @@ def _table(folder: Path, name: str) -> Path:
     return folder / name
 
 
-def _topics(log: "ULog") -> Iterator[tuple[str, Any, dict[str, Any]]]:
+def topics_of(log: "ULog") -> Iterator[tuple[str, Any, dict[str, Any]]]:
     for topic in log.data_list:
         name = f"{topic.name}_{topic.multi_id}" if topic.multi_id else topic.name
         yield name, topic, _schema(_tree(topic.data), [column.dtype for column in topic.data.values()])

@@ -12,6 +12,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("log", type=Path, metavar="DIR|FILE.ulg", help="a flight by its folder, or any ULog, PX4's too")
     add("--mcap", action="store_true", help="write flight.mcap beside it, for Foxglove")
     add("--csv", action="store_true", help="write flight-topics/*.csv beside it, a table of each topic")
+    add("--mat", action="store_true", help="write flight.mat beside it, a struct of each topic, for MATLAB and Octave")
     add("--parquet", action="store_true", help="write flight-topics/*.parquet beside it, a table of each topic")
     add("--quiet", action="store_true", help="print errors only")
 
@@ -20,8 +21,8 @@ def run(args: Namespace) -> int:
     from colibri.analysis.export import log_file, read_log, write_csv, write_flight_tables, write_mcap, write_parquet
     from colibri.common.errors import Error
 
-    if not (args.mcap or args.csv or args.parquet):
-        fail("export to what? --mcap, --csv, --parquet, or several of them")
+    if not (args.mcap or args.csv or args.mat or args.parquet):
+        fail("export to what? --mcap, --csv, --mat, --parquet, or several of them")
     written = []
     try:
         path = log_file(args.log)
@@ -33,6 +34,10 @@ def run(args: Namespace) -> int:
             written.append(write_mcap(log, path.with_suffix(".mcap")))
         if args.csv:
             written.append(write_csv(log, tables))
+        if args.mat:
+            from colibri.analysis.mat import write_mat
+
+            written.append(write_mat(log, path, path.with_suffix(".mat")))
         if args.parquet:
             written.append(write_parquet(log, tables))
     except Error as error:

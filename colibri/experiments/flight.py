@@ -5,16 +5,22 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 from warnings import warn
 
-from colibri.analysis.outcome import files_of, fly_to_its_end
+import msgspec
+
+from colibri.analysis.logs import log_of
+from colibri.analysis.outcome import REPORT, files_of, fly_to_its_end, report_of
 from colibri.analysis.recording import COLUMNS, FlightReader
 from colibri.analysis.report import Report, report_rows
 from colibri.analysis.series.figure_series import FigureSeries
+from colibri.common.config import UNREADABLE
 from colibri.common.errors import checked, unknown
+from colibri.common.files import read_bytes
 from colibri.common.spec import from_values, keywords_of
 from colibri.experiments.notebook import figure_html, table_html
 from colibri.experiments.table import SampleTable, table_of
 from colibri.flights.effects import NoEffectWarning, in_words
 from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import plan_of
 from colibri.flights.spec import FlightSpec, OptionError
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.ulog.flight_topics import ESTIMATE, TRUTH
@@ -110,6 +116,28 @@ class Flight:
     def _repr_html_(self) -> str:
         title = f"{self.plan.spec.track}, {self.plan.flown_by}"
         return table_html(title, report_rows(self.report).items()) + figure_html(self.plot())
+
+
+def load_flight(folder: str | PurePath) -> Flight:
+    """Return a recorded flight by its folder, as `fly` or `save` left it.
+
+    The flight's log is read as it is needed. A flight that ended early has the report of what there is.
+
+    Raises:
+        Error: The folder has no flight, or one of another version.
+    """
+    checked("folder", folder, (str, PurePath), "the folder of a flight", OptionError)
+    path = Path(folder)
+    plan, log = plan_of(path), log_of(path)
+    try:
+        report = msgspec.json.decode(read_bytes(path / REPORT), type=dict[str, Any])
+    except FileNotFoundError:
+        report = report_of(plan, log, None)
+    except OSError as error:
+        raise OptionError(f"cannot read {path / REPORT}: {error.strerror}") from error
+    except UNREADABLE as error:
+        raise OptionError(f"{path / REPORT}: {error}") from error
+    return Flight(plan, report, log)
 
 
 def fly(track: Any, **options: Any) -> Flight:

@@ -97,6 +97,7 @@ class LawInputs(NamedTuple):
 class LpvMpc(TrackingLaw[LawMemory]):
     """The control law; its predicted outputs are `condensing.PREDICTED`."""
 
+    reads_motion = False
     plan_columns = PlanColumns(6, 7, 8, 11)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:

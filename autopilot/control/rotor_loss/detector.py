@@ -137,7 +137,7 @@ class RotorWatch:
     def _take_in(
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, counts: bool
     ) -> tuple[int, float]:
-        _, velocity, attitude, _, rate, _ = state
+        _, velocity, attitude, _, rate, *_ = state
         battery = self._battery
         found: tuple[int, float] = _take_in(
             velocity,

@@ -34,6 +34,8 @@ class CascadeMemory(NamedTuple):
 class Cascade:
     """The control law; its predicted outputs are phi, theta, psi in rad."""
 
+    reads_motion = False
+
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(table, CascadeSettings)
         self._samples = settings.position.samples

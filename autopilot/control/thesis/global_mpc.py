@@ -55,6 +55,8 @@ class GlobalMemory(NamedTuple):
 class GlobalMpc:
     """The control law; its predicted outputs are x, y, z in m and psi in rad."""
 
+    reads_motion = False
+
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         self._settings = read_settings(table, GlobalSettings)
         self.control_interval_us = interval_us(self._settings.control_interval_s)

@@ -11,6 +11,7 @@ import pytest
 from mcap.reader import make_reader
 from pyarrow.parquet import read_table
 from pyulog import ULog
+from scipy.io import loadmat
 
 import colibri
 from colibri.cli.main import main
@@ -25,7 +26,7 @@ FLIGHT = ["fly", "spiral", "--quiet", "--no-figures", "--duration", "2", "--feed
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("flight")
     assert main([*FLIGHT, "--out", str(out)]) == 0
-    assert main(["export", str(out), "--mcap", "--csv", "--parquet", "--quiet"]) == 0
+    assert main(["export", str(out), "--mcap", "--csv", "--mat", "--parquet", "--quiet"]) == 0
     return out
 
 
@@ -101,6 +102,24 @@ def test_own_topics_are_tables_with_every_bit(folder: Path) -> None:
         assert read.tobytes() == np.concatenate(list(log.blocks(topic))).tobytes()
 
 
+def test_each_topic_is_a_struct_of_the_mat_file(folder: Path, log: ULog) -> None:
+    structs = loadmat(folder / "flight.mat", simplify_cells=True)
+    own = {topic.name: topic for topic in FLIGHT_TOPICS}
+    flight = FlightFile(folder / "flight.ulg")
+    for topic in log.data_list:
+        if topic.name in own:
+            mine = own[topic.name]
+            columns = structs[mine.table.removesuffix(".csv")]
+            assert tuple(columns) == mine.names
+            rows = np.concatenate(list(flight.blocks(mine)))
+            assert np.stack(list(columns.values()), axis=1).tobytes() == rows.tobytes()
+        else:
+            columns = structs[topic.name]
+            assert all(name.isidentifier() and len(name) < 64 for name in columns)
+            for column, logged in zip(columns.values(), topic.data.values(), strict=True):
+                np.testing.assert_array_equal(np.atleast_1d(column), logged)
+
+
 def test_the_table_of_the_filter_has_what_the_vehicle_measures(tmp_path: Path) -> None:
     colibri.fly("hover", feedback="sensors", duration=1.5).save(tmp_path / "flight")
     assert main(["export", str(tmp_path / "flight"), "--csv", "--quiet"]) == 0
@@ -112,7 +131,7 @@ def test_the_table_of_the_filter_has_what_the_vehicle_measures(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "options", "said"),
     [
-        (b"", [], "export to what? --mcap, --csv, --parquet, or several of them"),
+        (b"", [], "export to what? --mcap, --csv, --mat, --parquet, or several of them"),
         (b"no log", ["--csv"], "is no ULog"),
         (None, ["--csv"], "No such file or directory"),
     ],

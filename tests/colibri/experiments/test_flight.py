@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -144,3 +144,65 @@ def test_a_notebook_shows_table_and_figure(hover: colibri.Flight) -> None:
     page = hover._repr_html_()
     assert "position error, RMS" in page
     assert '<img src="data:image/png;base64,iVBOR' in page
+
+
+def test_a_recorded_flight_is_loaded_as_it_flew(hover: colibri.Flight, tmp_path: Path) -> None:
+    saved = hover.save(tmp_path / "kept")
+    loaded = colibri.load_flight(saved)
+    assert (loaded.sha256, loaded.report) == (hover.sha256, hover.report)
+    assert loaded.samples.tobytes() == hover.samples.tobytes()
+    assert loaded.frames.tobytes() == hover.frames.tobytes()
+    assert loaded.plot("error")
+    (saved / "report.json").unlink()
+    assert colibri.load_flight(str(saved)).sha256 == hover.sha256
+
+
+def _with(content: bytes | None) -> Any:
+    def spoil(folder: Path) -> None:
+        (folder / "report.json").write_bytes(content) if content is not None else (folder / "flight.ulg").unlink()
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (_with(b"{"), "report.json: "),
+        (_with(b"[1]"), "report.json: Expected `object`"),
+        (_with(None), "flight.ulg is missing"),
+        (lambda folder: (folder / "flight.ulg").write_bytes(b""), "flight.ulg: not a ULog"),
+        (lambda folder: (folder / "provenance.json").unlink(), "is no folder of a flight of this version"),
+    ],
+)
+def test_a_folder_without_flight_is_refused(hover: colibri.Flight, spoil: Any, said: str, tmp_path: Path) -> None:
+    spoil(hover.save(tmp_path / "kept"))
+    with pytest.raises(colibri.Error) as refused:
+        colibri.load_flight(tmp_path / "kept")
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+class Accelerates(Hovers):
+    """Record the states that a law receives."""
+
+    states: ClassVar[list[colibri.VehicleState]] = []
+
+    def step(self, memory: Any, time_us: int, state: colibri.VehicleState, references: Any) -> Any:
+        self.states.append(state)
+        return super().step(memory, time_us, state, references)
+
+
+@pytest.mark.parametrize("options", [{}, {"feedback": "sensors", "duration": 2.0}, {"delay": 20.0}])
+def test_laws_receive_acceleration_and_rotor_speeds(options: dict[str, Any]) -> None:
+    Accelerates.states.clear()
+    profile = colibri.load_profile("flight").replace("controllers.Accelerates", {"part": 1.05})
+    flight = colibri.fly("hover", profile=profile, controller=Accelerates, **{"duration": 1.0, **options})
+    states, hover = Accelerates.states, flight.plan.vehicle.hover_speed
+    assert states[-1].rotor_speeds == pytest.approx([1.05 * hover] * 4, rel=1e-6)
+    assert states[-1].acceleration_enu_m_s2[2] == pytest.approx((1.05**2 - 1.0) * 9.81, abs=0.3)
+    assert states[-1].acceleration_flu_m_s2 == pytest.approx(states[-1].acceleration_enu_m_s2, abs=0.3)
+    if not options:
+        omega = flight.samples["omega1"]
+        assert [state.rotor_speeds[0] for state in states] == pytest.approx(omega[: len(states)], rel=1e-6)
+        vz = [state.velocity_enu_m_s[2] for state in states]
+        assert [state.acceleration_enu_m_s2[2] for state in states[1:]] == pytest.approx(np.diff(vz) / 0.01, abs=1e-6)
