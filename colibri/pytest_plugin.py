@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from colibri.sitl.errors import SitlError
+from colibri.sitl.junit import SAID, attachments, in_system_out
+from colibri.sitl.marks import MARKS, arguments, described, setting_values, signature, without_effect, written
 from colibri.sitl.summary import FLOWN, Summary
 
 if TYPE_CHECKING:
@@ -25,20 +27,17 @@ if TYPE_CHECKING:
     from colibri.sitl.vehicle import Sitl
 
 LINKS = ("memory", "udp")
-MARKS = {
-    "sitl": "sitl(vehicle=..., feedback=..., wind=..., seed=..., start=..., params=...): what the flight begins with",
-    "vehicle": "vehicle(name): what is flown",
-    "feedback": 'feedback(kind): what the plant sends to the autopilot, "state" or "sensors"',
-    "wind": 'wind(wind, turbulence=None): "5@270" blows from the west with 5 m/s; "light", "moderate" or "severe"',
-    "seed": "seed(number): of everything random",
-    "seeds": "seeds(first, last): one flight for each seed",
-}
 _MAX_NAME = 120
 """Characters of a folder's name; a longer one is shortened, with a hash."""
+_PLAIN = re.compile(r"[\w./]+(::\w+)*(\[[\w.-]+\])?", re.ASCII)
+"""Names of tests that differ as folders, too; others get a hash."""
 _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
+_SAID = pytest.StashKey[str]()
 _UNWRITTEN = pytest.StashKey[str]()
+_REGISTERED = pytest.StashKey[list[str]]()
+"""Names of registered marks, once for each that registers it."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -71,8 +70,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    for line in MARKS.values():
-        config.addinivalue_line("markers", line)
+    for name in MARKS:
+        config.addinivalue_line("markers", described(name) if config.getoption("markers") else signature(name))
     config.stash[_SUMMARY] = Summary(perf_counter())
 
 
@@ -80,10 +79,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     mark = metafunc.definition.get_closest_marker("seeds")
     if mark is None or "sitl_seed" not in metafunc.fixturenames:
         return
-    values = _values(mark, f"{metafunc.definition.name}: ")
+    values = arguments(mark, f"{metafunc.definition.name}: ")
     first, last = values["first"], values["last"]
     if not (isinstance(first, int) and isinstance(last, int) and first <= last):
-        wrong = f"{metafunc.definition.name}: {_written(mark)}"
+        wrong = f"{metafunc.definition.name}: {written(mark)}"
         pytest.fail(f"{wrong}: give the first and the last seed, whole numbers", pytrace=False)
     metafunc.parametrize("sitl_seed", range(first, last + 1), indirect=True, ids=lambda seed: f"seed{seed}")
 
@@ -92,7 +91,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def sitl_seed(request: pytest.FixtureRequest) -> int | None:
     """Return the seed of mark `seeds` or `seed`."""
     mark = request.node.get_closest_marker("seed")
-    seed: int | None = getattr(request, "param", None if mark is None else _values(mark)["number"])
+    seed: int | None = getattr(request, "param", None if mark is None else arguments(mark)["number"])
     return seed
 
 
@@ -121,6 +120,16 @@ def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl
         yield begun
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    registered = item.config.stash.get(_REGISTERED, None)
+    if registered is None:
+        lines: list[str] = item.config.getini("markers")
+        registered = item.config.stash[_REGISTERED] = [re.split(r"[:(]", line)[0].strip() for line in lines]
+    wrong = without_effect(item, getattr(item, "fixturenames", ()), registered)
+    if wrong is not None:
+        pytest.fail(wrong, pytrace=False)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
@@ -129,6 +138,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         return report
     if report.when == "teardown":
         del item.stash[_FLIGHTS]
+        setattr(report, SAID, item.stash.get(_SAID, ""))
         return report
     if report.when == "setup" and report.passed:
         return report
@@ -139,6 +149,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         places, said = _kept(item, report, flights)
         properties += [("sitl_kept", place.as_posix()) for place in places]
         report.sections.append(("sitl", said))
+        item.stash[_SAID] = said + attachments(places, item.config.invocation_params.dir)
     report.user_properties += properties
     item.user_properties += properties  # JUnit XML has those of the report on the teardown
     return report
@@ -160,7 +171,7 @@ def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tup
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    session.config.pluginmanager.register(_Collector(session.config.stash[_SUMMARY]), "sitl-collector")
+    session.config.pluginmanager.register(_Collector(session.config), "sitl-collector")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -192,11 +203,14 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 class _Collector:
     """Adds up the reports of all workers."""
 
-    def __init__(self, summary: Summary) -> None:
-        self._summary = summary
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._summary.add(report.nodeid, report.outcome, getattr(report, FLOWN, None))
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> Generator[None]:
+        self._config.stash[_SUMMARY].add(report.nodeid, report.outcome, getattr(report, FLOWN, None))
+        with in_system_out(self._config, report):
+            yield
 
 
 def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack) -> Flights:
@@ -242,41 +256,14 @@ def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
 
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
-    said: list[Mapping[str, Any]] = [_values(mark) for mark in reversed(list(node.iter_markers("sitl")))]
-    for name, key in (("vehicle", "name"), ("feedback", "kind")):
-        mark = node.get_closest_marker(name)
-        if mark is not None:
-            said.append({name: _values(mark)[key]})
-    mark = node.get_closest_marker("wind")
-    if mark is not None:
-        said.append(_values(mark))
-    if seed is not None:
-        said.append({"seed": seed})
-    return said
-
-
-def _values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
-    """Return the values of a mark by name; fail in one line, which begins with `of`."""
-    names = [name.strip() for name in MARKS[mark.name].partition("(")[2].partition(")")[0].split(",")]
-    if mark.name == "sitl":
-        needed, names = set(), []
-    else:
-        needed = {name for name in names if "=" not in name}
-        names = [name.partition("=")[0] for name in names]
-    values = {**dict(zip(names, mark.args, strict=False)), **mark.kwargs}
-    wrong = len(mark.args) > len(names) or not needed <= set(values) or (names and not set(values) <= set(names))
-    if wrong:
-        pytest.fail(f"{of}mark is {MARKS[mark.name]}; not {_written(mark)}", pytrace=False)
-    return values
-
-
-def _written(mark: pytest.Mark) -> str:
-    return f"{mark.name}({', '.join([*map(repr, mark.args), *(f'{k}={v!r}' for k, v in mark.kwargs.items())])})"
+    marks = [*reversed(list(node.iter_markers("sitl"))), *map(node.get_closest_marker, ("vehicle", "feedback", "wind"))]
+    said: list[Mapping[str, Any]] = [setting_values(mark) for mark in marks if mark is not None]
+    return said if seed is None else [*said, {"seed": seed}]
 
 
 def _folder(item: pytest.Item) -> Path:
-    name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"))
-    if len(name) > _MAX_NAME:
+    name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"), flags=re.ASCII)
+    if len(name) > _MAX_NAME or not _PLAIN.fullmatch(item.nodeid):
         name = f"{name[9 - _MAX_NAME :]}-{sha256(item.nodeid.encode()).hexdigest()[:8]}"
     keep: str = item.config.getoption("--sitl-keep")
     return item.config.invocation_params.dir / keep / name

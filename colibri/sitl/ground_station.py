@@ -17,6 +17,8 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 from colibri.sitl.stepping import NotInTimeError, Stepped
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 AGAIN_AFTER_S = 0.5
 """Interval of repeated requests, as in ground stations."""
 ANSWER_WITHIN_S = 15.0

@@ -8,6 +8,8 @@ from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.wire.dialect import mav
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 Place: TypeAlias = tuple[float, float, float]
 Corner: TypeAlias = tuple[float, float]
 

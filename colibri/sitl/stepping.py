@@ -9,6 +9,8 @@ from colibri.mavlink.client.setpoints import manual_control, position_target
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 from colibri.sitl.errors import SitlError
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 
 class NotInTimeError(SitlError, AssertionError):
     """A condition was not met in time."""

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.errors import unknown
 from colibri.mavlink.hil.conductor import Parcel
+from colibri.mavlink.hil.faults import SENSORS, TABLE, Equipment, Fault, judged, kind_name, unit_name
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.inside import Inside
@@ -26,6 +30,8 @@ from colibri.sitl.mission_items import Item, on_wire
 from colibri.sitl.status_texts import StatusTexts
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
+
+__tracebackhide__ = True  # a failed test shows its own lines, not these
 
 FORCE = 21196.0
 """Parameter of arming and disarming that overrides all checks."""
@@ -52,7 +58,7 @@ class Links(NamedTuple):
 
     def __getattr__(self, name: str) -> Any:
         """Name the valid links in the error."""
-        raise AttributeError(f"there is no link {name}: choose {', '.join(self._fields)}")
+        raise AttributeError(unknown("link", name, self._fields))
 
 
 class Sitl(View, Stepped, Steered):
@@ -93,7 +99,7 @@ class Sitl(View, Stepped, Steered):
         def __setattr__(self, name: str, value: Any) -> None:
             """Reject unknown attributes, so that a typo is an error."""
             if name[0] != "_" and "fleet" in self.__dict__ and not hasattr(self, name):
-                raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
+                raise AttributeError(unknown("attribute to set", name, _SETTABLE))
             super().__setattr__(name, value)
 
     def begin(self) -> None:
@@ -287,7 +293,20 @@ class Sitl(View, Stepped, Steered):
         results = [result for number, result in self._lockstep.acks[before:] if number == mav.MAV_CMD_INJECT_FAILURE]
         if results != [mav.MAV_RESULT_ACCEPTED]:
             result = results[0] if results else mav.MAV_RESULT_FAILED
-            raise RefusedError(f"failure {unit} {kind}", result, "this plant cannot fail so")
+            raise RefusedError(f"failure {unit} {kind}", result, self._why_not(Fault(*numbers, instance), values))
+
+    def _why_not(self, fault: Fault, values: Sequence[float]) -> str:
+        """Return why the plant refuses a fault."""
+        kinds = [kind_name(kind).lower() for unit, kind in TABLE if unit == fault.unit]
+        if not kinds:
+            return f"choose one of {', '.join(dict.fromkeys(_unit(unit) for unit, _ in TABLE))}"
+        if (fault.unit, fault.kind) not in TABLE:
+            return f"choose one of {', '.join(kinds)}"
+        if fault.unit in SENSORS and self.setting.feedback is not Feedback.SENSORS:
+            return f'feedback is "{self.setting.feedback}", and sensors are not used: set feedback="sensors"'
+        p4, p5, p6, p7 = (*map(float, values), *(0.0,) * 4)[:4]
+        judgement = judged(fault._replace(values=(p4, p5, p6, p7)), tuple(Equipment))
+        return judgement.reason if isinstance(judgement, Refusal) else f"the vehicle has no {_unit(fault.unit)}"
 
     @property
     def wind(self) -> str:
@@ -339,7 +358,7 @@ class Sitl(View, Stepped, Steered):
 
 def _chosen(what: str, name: str, names: Sequence[str]) -> str:
     if name not in names:
-        raise ValueError(f"there is no {what} {name}: choose {', '.join(names)}")
+        raise ValueError(unknown(what, name, names))
     return name
 
 
@@ -348,7 +367,11 @@ def _number(kind: str, of: str | int) -> int:
         return of
     of = _without_kind(of)
     numbers = {_without_kind(each.name.removeprefix(f"{kind}_")): number for number, each in mav.enums[kind].items()}
-    return int(numbers[_chosen(kind, of, sorted(numbers.keys() - {"enum_end"}))])
+    return int(numbers[_chosen(f"{kind[8:].lower()} of a failure", of, sorted(numbers.keys() - {"enum_end"}))])
+
+
+def _unit(number: int) -> str:
+    return _without_kind(unit_name(number))
 
 
 def _without_kind(unit: str) -> str:

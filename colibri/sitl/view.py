@@ -18,6 +18,8 @@ from colibri.sitl.flight_record import Columns, Record
 from colibri.sitl.ground_station import Station
 from colibri.sitl.status_texts import StatusTexts
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 _NEAR_M = {"state": 0.3, "sensors": 2.0}
 _SLOW_M_S = 0.3
 

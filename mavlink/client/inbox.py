@@ -1,10 +1,12 @@
 """Storage of received messages for later inspection."""
 
 from collections import Counter
-from difflib import get_close_matches
 from typing import Any
 
+from colibri.common.errors import unknown
 from colibri.mavlink.wire.dialect import Message, mav
+
+__tracebackhide__ = True  # a failed test shows its own lines, not these
 
 
 class Heard(dict[str, list[Any]]):
@@ -14,8 +16,7 @@ class Heard(dict[str, list[Any]]):
         """Return an empty list, or raise `ValueError` for a name outside the dialect."""
         names = [it.msgname for it in mav.mavlink_map.values()]
         if name not in names:
-            near = get_close_matches(name, names)
-            raise ValueError(f"there is no message {name}" + (f": {' or '.join(near)}?" if near else ""))
+            raise ValueError(unknown("message", name, names))
         messages = self[name] = []
         return messages
 

@@ -5,6 +5,10 @@ from heapq import heappop, heappush
 from math import inf
 from random import Random
 
+from colibri.common.errors import unknown
+
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 _HELD_BACK_S = 0.05
 """Largest delay of a reordered datagram."""
 
@@ -36,7 +40,7 @@ class Trouble:
 
     def __setattr__(self, name: str, value: float) -> None:
         if name not in _MAX:
-            raise AttributeError(f"a link has no {name}: choose {', '.join(sorted(_MAX))}")
+            raise AttributeError(unknown("fault of a link", name, sorted(_MAX)))
         if not isinstance(value, int | float) or not 0.0 <= value <= _MAX[name] or value == inf:
             limits = "from 0 on, in s" if _MAX[name] == inf else f"from 0 to {_MAX[name]:g}"
             raise ValueError(f"{name} of a link must be {limits}, not {value!r}")

@@ -29,6 +29,8 @@ from colibri.sitl.backends.link_clocks import LinkClock
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
 _ANSWER = int(mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS).to_bytes(3, "little")
 _GLANCE_S = 0.002

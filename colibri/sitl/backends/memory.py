@@ -22,6 +22,8 @@ from colibri.sitl.backends.link_clocks import LinkClock, StoppedClock
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import SettingError
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 NEVER_LATE_S = 0.0
 _ADDRESS: Address = ("memory", 0)
 

@@ -17,6 +17,8 @@ from colibri.sitl.backends.launcher import Launcher, LoggedChild
 from colibri.sitl.backends.link_clocks import QuickClock
 from colibri.sitl.backends.lockstep import SessionError, answers, parted
 
+__tracebackhide__ = True  # a failed test shows its own lines, not these
+
 SILENCE_S = 60.0
 """Wall-clock time after which a silent process counts as dead. Flights are independent of it."""
 _LOOK_EVERY_S = 0.1

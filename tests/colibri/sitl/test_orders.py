@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
+from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.session import Flights
 
 
@@ -36,27 +37,44 @@ def test_an_assertion_shows_the_vehicle() -> None:
 def test_what_there_is_not_is_refused_with_what_there_is() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         sitl = flights.begin()
-        with pytest.raises(ValueError, match=r"^there is no mode holdd: choose stabilized, .*hold, "):
+        with pytest.raises(ValueError, match=r'^unknown mode "holdd" \(did you mean "hold"\?\)$'):
             sitl.select("holdd")
-        with pytest.raises(ValueError, match=r"^there is no track wavy: choose spiral, .*wave, "):
+        with pytest.raises(ValueError, match=r'^unknown track "wavy" \(did you mean "wave"\?\)$'):
             sitl.fly_track("wavy")
-        with pytest.raises(ValueError, match=r"^there is no FAILURE_UNIT motorr: choose accel, .*motor, "):
+        with pytest.raises(ValueError, match=r'^unknown unit of a failure "motorr" \(did you mean "motor"'):
             sitl.inject("motorr", "off")
-        with pytest.raises(ValueError, match=r"^there is no message COLISION: COLLISION\?$"):
+        with pytest.raises(ValueError, match=r'^unknown message "COLISION" \(did you mean "COLLISION"'):
             sitl.heard("COLISION")
         with pytest.raises(sitl.Refused, match=r"^parameter MPC_CRUISE was refused: does not exist \(result 1\)$"):
             sitl.set_param("MPC_CRUISE", 3.0)
         with pytest.raises(ValueError, match=r"^seconds to fly must be from 0 on, not -1$"):
             sitl.run(-1)
-        with pytest.raises(AttributeError, match=r"^a vehicle has no wimd to set: choose payload_kg, wind$"):
+        with pytest.raises(AttributeError, match=r'^unknown attribute to set "wimd" .*"wind"'):
             setattr(sitl, "wimd", "5@270")  # noqa: B010 - a checker refuses it, too
-        with pytest.raises(AttributeError, match="there is no link grund: choose ground, plant"):
+        with pytest.raises(AttributeError, match=r'unknown link "grund" .did you mean "ground"'):
             sitl.link.grund.loss = 0.1
-        with pytest.raises(AttributeError, match="a link has no lost: choose corrupt, delay_s, down, "):
+        with pytest.raises(AttributeError, match=r'unknown fault of a link "lost" .did you mean "loss"'):
             sitl.link.ground.lost = 0.1
         for name, value in {"loss": 3, "delay_s": -1.0, "jitter_s": "1"}.items():
             with pytest.raises(ValueError, match=f"^{name} of a link must be from 0 .*, not {value!r}"):
                 setattr(sitl.link.ground, name, value)
+
+
+@pytest.mark.parametrize(
+    ("failure", "reason"),
+    [
+        (("gps", "off"), 'feedback is "state", and sensors are not used: set feedback="sensors"'),
+        (("accel", "stuck", 1), 'feedback is "state"'),
+        (("airspeed", "off"), "choose one of gyro, accel, mag, baro, gps, distance_sensor, battery, motor"),
+        (("motor", "garbage"), "choose one of ok, off, stuck, wrong"),
+        (("motor", "off", 7), "instance must be 0 to 4"),
+        (("motor", "wrong", 1, 3.0), "remaining fraction must be 0.001 to 1"),
+    ],
+)
+def test_a_refused_failure_says_what_is_possible(failure: tuple[Any, ...], reason: str) -> None:
+    with Flights(Setting(airborne=3.0), None) as flights, pytest.raises(RefusedError) as refused:
+        flights.begin().inject(*failure)
+    assert f"was refused: {reason}" in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ pytest_plugins = ["pytester"]
 
 DOCS = ROOT / "docs" / "scenarios.md"
 MODULE = "colibri.pytest_plugin"
+KNOWN = ("-W", "ignore::pytest.PytestUnknownMarkWarning")
+"""Lets a test have an unregistered mark."""
 HOVER = """
     import pytest
 
@@ -169,12 +171,16 @@ def test_a_failure_is_reported_even_if_its_flight_is_not_kept(
 @pytest.mark.parametrize(
     ("mark", "line"),
     [
-        ("seeds(3)", "test: mark is seeds(first, last): one flight for each seed; not seeds(3)"),
+        ("seeds(3)", "test: mark is seeds(first, last), not seeds(3)"),
         ("seeds(3, 1)", "test: seeds(3, 1): give the first and the last seed, whole numbers"),
-        ("seed()", "mark is seed(number): of everything random; not seed()"),
-        ("vehicle(model='iris')", "mark is vehicle(name): what is flown; not vehicle(model='iris')"),
-        ("wind('5@270', 'light', 3)", "mark is wind(wind, turbulence=None): *; not wind('5@270', 'light', 3)"),
-        ("sitl('iris')", "mark is sitl(*): what the flight begins with; not sitl('iris')"),
+        ("seed()", "mark is seed(number), not seed()"),
+        ("vehicle(model='iris')", 'mark vehicle: unknown argument "model" (choose name)'),
+        ("wind('5@270', turbulance='light')", 'mark wind: unknown argument "turbulance" (did you mean "turbulence"?)'),
+        ("wind('5@270', 'light', 3)", "mark is wind(wind, turbulence=None), not wind('5@270', 'light', 3)"),
+        ("wind('5@270', turbulence='heavy')", 'turbulence: unknown value "heavy" (choose light, moderate, severe)'),
+        ("vehicel('iris')", 'unknown mark "vehicel" (did you mean "vehicle"?)'),
+        ("turbulence('light')", 'unknown mark "turbulence" (did you mean "sitl(turbulence=...)"?)'),
+        ("sitl('iris')", "mark is sitl(NAME=VALUE, ...), not sitl('iris')"),
         ("sitl(winds='3@0')", 'unknown option "winds" (did you mean "wind"?)'),
         ("wind('three')", "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three"),
         ("sitl(params={'NO_SUCH': 1.0})", 'unknown parameter "NO_SUCH" (choose *'),
@@ -182,10 +188,64 @@ def test_a_failure_is_reported_even_if_its_flight_is_not_kept(
     ],
 )
 def test_a_mark_that_is_not_written_so_is_refused_in_one_line(pytester: pytest.Pytester, mark: str, line: str) -> None:
-    result = run(pytester, f"import pytest\n\n@pytest.mark.{mark}\ndef test(sitl): pass\n")
+    result = run(pytester, f"import pytest\n\n@pytest.mark.{mark}\ndef test(sitl): pass\n", *KNOWN)
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines([line.replace("[", "[[]")])
     result.stdout.no_fnmatch_line("*Error*")
+
+
+@pytest.mark.parametrize("mark", ["seeds(1, 3)", "seed(1)", "wind('5@270')", "vehicle('iris')", "sitl(airborne=3.0)"])
+def test_a_mark_without_its_fixture_is_refused(pytester: pytest.Pytester, mark: str) -> None:
+    text = f"import pytest\n\n@pytest.mark.{mark}\ndef test(): pass\n"
+    result = run(pytester, text)
+    result.assert_outcomes(errors=1)
+    name = mark.partition("(")[0]
+    result.stdout.fnmatch_lines([f"mark {name} has no effect: test uses neither fixture sitl nor sitl_fleet"])
+    pytester.makeini(f"[pytest]\nmarkers =\n    {name}: of another plugin\n")
+    run(pytester, text).assert_outcomes(passed=1)
+
+
+def test_failed_tests_of_similar_names_keep_their_flights(pytester: pytest.Pytester) -> None:
+    source = """
+        import pytest
+
+        @pytest.mark.sitl(airborne=3.0)
+        @pytest.mark.parametrize("name", ["a/b", "a-b", "a b", "a:b", "a::b"])
+        def test_one(sitl, name):
+            sitl.run(0.01)
+            assert not name
+        """
+    run(pytester, source).assert_outcomes(failed=5)
+    folders = list((pytester.path / "sitl-failures").iterdir())
+    tests = {json.loads((folder / "flight.json").read_text(encoding="utf-8"))["test"] for folder in folders}
+    assert len(tests) == len(folders) == 5
+
+
+@pytest.mark.parametrize("logging", ["no", "all"])
+def test_junit_has_folder_replay_and_picture_in_one_text(pytester: pytest.Pytester, logging: str) -> None:
+    source = """
+        import pytest
+
+        @pytest.mark.sitl(airborne=3.0)
+        def test_up(sitl):
+            print("mine")
+            sitl.hold(lambda: sitl.position[2] > 4.0, for_=0.3)
+        """
+    result = run(pytester, source, "--junitxml=junit.xml", "-o", f"junit_logging={logging}", "-n", "1")
+    result.assert_outcomes(failed=1)
+    (case,) = ElementTree.parse(pytester.path / "junit.xml").iter("testcase")
+    (out,) = case.findall("system-out")
+    assert out.text is not None
+    kept, replay, *pictures = out.text.splitlines()[:4]
+    folder = kept.removeprefix("flight kept in ")
+    assert replay.startswith("replay: pytest 'test_junit")
+    assert pictures == [
+        f"[[ATTACHMENT|{place}]]" for place in (f"{folder}/flight.png", f"{pytester.path}/{folder}/flight.png")
+    ]
+    assert ("mine" in out.text) == (logging == "all")
+    (failure,) = case.findall("failure")
+    assert "stepping.py" not in (failure.text or "")
+    assert "sitl.hold(lambda" in (failure.text or "")
 
 
 def test_a_ground_link_is_bad_by_option_or_mark(pytester: pytest.Pytester) -> None:
