@@ -144,7 +144,7 @@ def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
         station.wait("HEARTBEAT")
         assert station.command(mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, -5.0) != ACCEPTED
         wait_for(
-            lambda: "  1 autopilot: warning: take-off refused: not a height above the ground\n" in flown.said,
+            lambda: "  1 autopilot: warning: take-off refused: -5 m above the ground" in flown.said,
             "a STATUSTEXT",
         )
         assert station.command(SHUT_DOWN, 2.0, 0, 0, 0, 0, 0, 0) == ACCEPTED

@@ -55,7 +55,7 @@ SCENARIOS = (
         name="no-disarming-in-the-air",
         peer="ours: refused unless forced",
         holds="refused; hovers within 0.1 m",
-        steps=(do.refused(do.disarm(), "flying"), do.hold(see.every(see.ARMED, see.height(5.0, 0.1)), for_=2.0)),
+        steps=(do.refused(do.disarm(), "not landed"), do.hold(see.every(see.ARMED, see.height(5.0, 0.1)), for_=2.0)),
         setting={"airborne": 5.0},
     ),
     Scenario(
