@@ -22,7 +22,7 @@ def _start_value(pair: str) -> tuple[str, float]:
     try:
         return key, number(value)
     except ValueError:
-        raise ArgumentTypeError(f"{key}: must be a number, not {value or 'nothing'}") from None
+        raise ArgumentTypeError(f"{key}: must be a number, not {value or 'empty'}") from None
 
 
 _FULL_TURN_DEG = 360.0
@@ -41,9 +41,9 @@ def gust(text: str) -> Gust:
     try:
         start_s, duration_s = number(values.pop("start")), number(values.pop("duration"))
     except (KeyError, ValueError):
-        raise ArgumentTypeError(f"must be {GUST}, 6@270:start=10,duration=2 say, not {text}") from None
+        raise ArgumentTypeError(f"must be {GUST}, for example 6@270:start=10,duration=2, not {text}") from None
     if values or times.count(",") > 1:
-        raise ArgumentTypeError(f"must be {GUST} and nothing else, not {text}")
+        raise ArgumentTypeError(f"must be {GUST} only, not {text}")
     if start_s < 0.0 or duration_s <= 0.0:
         raise ArgumentTypeError(f"the start must not be negative, the duration above zero, not {text}")
     return Gust(peak, start_s, duration_s)
@@ -82,7 +82,7 @@ def constant_wind(text: str) -> Wind:
     try:
         value = Wind(number(speed), number(direction))
     except ValueError:
-        raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, 5@270 say, not {text}") from None
+        raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, for example 5@270, not {text}") from None
     if value.speed_m_s < 0.0 or not 0.0 <= value.from_deg <= _FULL_TURN_DEG:
         raise ArgumentTypeError(f"the speed must not be negative, the direction 0 to 360 degrees, not {text}")
     if value.speed_m_s > MAX_SPEED_M_S:

@@ -148,7 +148,7 @@ class Missions:
         if isinstance(event, Reached):
             self._reached.append(event.seq)
         elif isinstance(event, Circling):
-            self._lines.say(WARNING, f"item {event.seq} of the mission: jumps in a circle, nothing is flown")
+            self._lines.say(WARNING, f"item {event.seq} of the mission: endless jumps: cannot be flown")
         else:
             self.move_home(event.position_enu_m or state.position_enu_m, state.euler[2], state)
 

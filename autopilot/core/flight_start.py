@@ -8,7 +8,7 @@ from colibri.autopilot.core.supervision import Supervision
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.services.statustext import INFO, WARNING
 
-FALLS = "restarted in the air, knowing nothing: found falling"
+FALLS = "Restarted in flight without a record: falling"
 
 
 class FlightStart:

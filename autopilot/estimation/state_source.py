@@ -24,7 +24,7 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> New
         return None
     sensors = vehicle.sensors
     if sensors is None:
-        raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
+        raise VehicleError(f"{vehicle.name} has no sensors: choose one with a table sensors, or --feedback state")
     from colibri.autopilot.estimation.estimator import Estimator  # slow to load
 
     gravity_m_s2 = vehicle.gravity_m_s2

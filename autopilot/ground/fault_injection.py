@@ -25,7 +25,7 @@ class Failures:
         if not enabled:
             return Refusal("failure refused: parameter SYS_FAILURE_EN is 0")
         if not self._relays:
-            return Refusal("failure refused: this simulator takes none", UNSUPPORTED)
+            return Refusal("failure refused: this simulator does not inject any", UNSUPPORTED)
         fault = fault_from(command.p1, command.p2, command.p3, (command.p4, command.x, command.y, command.z))
         if fault is None:
             return Refusal("failure refused: unit, type and instance must be whole numbers")
@@ -59,5 +59,5 @@ class Failures:
 def _outcome(result: int) -> Refusal | None:
     if result == RESULT_ACCEPTED:
         return None
-    why = "impossible numbers" if result == RESULT_DENIED else "it has no such part"
+    why = "impossible numbers" if result == RESULT_DENIED else "no such part"
     return Refusal(f"failure refused by the plant: {why}", result)

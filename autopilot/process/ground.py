@@ -168,7 +168,7 @@ class GroundService:
         record = copter.record()
         if record is not None and not self._state.keep(record) and not self._full_reported:
             self._full_reported = True
-            self._status.say("said", "the flight is too much to keep: after a restart it would begin in hold")
+            self._status.say("said", "the flight record is too large: after a restart it would begin in hold")
         self._kept_samples, self._kept_plans, self._kept_armed = samples, changes, armed
 
     def close(self) -> None:
@@ -191,7 +191,7 @@ class GroundService:
                 autopilot = self._new_autopilot(None)
             except Exception as error:
                 self.copter.stations.system.restart = 0.0
-                self.copter.defence.caught(table.RESTART, error, "the autopilot goes on as it is")
+                self.copter.defence.caught(table.RESTART, error, "the autopilot continues without restart")
                 return
             self.copter.stations.log.close()
             self.errors.write(self.copter.defence.take())
@@ -271,4 +271,8 @@ class GroundService:
 def _invitation(url: str) -> str:
     scheme, _, rest = url.partition(":")
     calls = scheme in ("udpout", "tcp", "serial")
-    return f"calls ground stations at {rest} ({scheme})" if calls else f"waits for ground stations on {rest} ({scheme})"
+    return (
+        f"connects to ground stations at {rest} ({scheme})"
+        if calls
+        else f"waits for ground stations on {rest} ({scheme})"
+    )

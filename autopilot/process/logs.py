@@ -111,7 +111,7 @@ class AutopilotLog:
         if said_bytes < MAX_SAID_BYTES or severity <= ERROR:
             self.topics.append(line)
             if said_bytes < MAX_SAID_BYTES <= self._said_bytes:
-                self.topics.append(messages.logged_string(time_us, WARNING, "too many texts: only errors from here"))
+                self.topics.append(messages.logged_string(time_us, WARNING, "too many texts: only errors from now on"))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)

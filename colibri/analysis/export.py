@@ -63,7 +63,7 @@ def read_log(log: Path) -> "ULog":
     except OSError as error:
         raise ExportError(f"{log}: {error.strerror}") from error
     except Exception as error:  # pyulog raises many kinds for an invalid file
-        raise ExportError(f"{log} is no ULog") from error
+        raise ExportError(f"{log} is not a ULog") from error
 
 
 def write_mcap(log: "ULog", path: Path) -> Path:

@@ -33,7 +33,7 @@ def limit(text: str) -> ReportLimit:
     try:
         return ReportLimit(key or RMSE, number(value))
     except ValueError:
-        raise ArgumentTypeError(f"must be [KEY=]VALUE, 0.1 or qp_failures=0 say, not {text}") from None
+        raise ArgumentTypeError(f"must be [KEY=]VALUE, for example 0.1 or qp_failures=0, not {text}") from None
 
 
 def exceeded(limits: Iterable[ReportLimit], report: Mapping[str, Any]) -> list[str]:
@@ -42,7 +42,7 @@ def exceeded(limits: Iterable[ReportLimit], report: Mapping[str, Any]) -> list[s
     for key, value in limits:
         flown = of_report(report, key)
         if flown is None:
-            found.append(f"{key} is not known of this flight, and shall not be above {value:g}")
+            found.append(f"{key} is missing in this flight; its limit is {value:g}")
         elif not flown <= value:
             found.append(f"{key} is {flown:.4g}, above {value:g}")
     return found

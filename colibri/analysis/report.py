@@ -145,7 +145,7 @@ def _estimation_rows(figures: Report) -> dict[str, str]:
         "estimate from truth, RMS": f"{length(off['horizontal'])} horizontal, {length(off['vertical'])} vertical",
         "attitude, RMS": f"roll {turned['roll']:.2f}°, pitch {turned['pitch']:.2f}°, yaw {turned['yaw']:.2f}°",
         "NEES, mean of 9 numbers": f"{figures['nees_mean']:.2f}",
-        "NIS, in parts of what is right": ", ".join(
+        "NIS, relative to its expected value": ", ".join(
             f"{kind} {nis['mean']:.2f}" for kind, nis in figures["nis_mean"].items() if nis["innovations"]
         ),
     }

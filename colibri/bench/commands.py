@@ -50,7 +50,7 @@ COMMANDS = len({goal.name for goal in GOALS})
 def colibri_of(checkout: Path) -> Path:
     command = checkout / ".venv" / "bin" / "colibri"
     if not command.is_file():
-        fail(f"--against {checkout}: there is no .venv/bin/colibri in it; make setup there makes it")
+        fail(f"--against {checkout}: .venv/bin/colibri is missing: run make setup there")
     return command
 
 

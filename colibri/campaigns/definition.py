@@ -219,7 +219,7 @@ def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> st
 def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
     names = [name_in_tables(name, value, others) for name, value in given.items()]
     if twice := first_twice(names):
-        raise CampaignError(f"{twice} is said twice, by two of its names")
+        raise CampaignError(f"{twice} is given twice, under two names")
     return dict(zip(names, given.values(), strict=True))
 
 
@@ -234,11 +234,11 @@ def _check_names(planned: Campaign) -> None:
     for name, values in planned.grid.items():
         levels = [each.settings for each in values if isinstance(each, Level)]
         if any(name not in settings for settings in levels) and name in keywords_of(FlightSpec):
-            raise CampaignError(f"{name}: a factor with levels needs a name of its own")
+            raise CampaignError(f"{name}: a factor with levels needs a name that is not an option")
         said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
     if twice := first_twice(said):
-        raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
+        raise CampaignError(f"{twice} is given twice: keep it in one of fly, grid and draw")
     if twice := first_twice(planned.columns):
         raise CampaignError(f"{twice}: the table would have two columns of that name: choose another")
     if "track" not in said:
-        raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')
+        raise CampaignError('no track: add one, for example track = ["spiral"] in grid')

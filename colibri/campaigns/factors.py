@@ -38,9 +38,9 @@ def factor_name(given: str) -> str:
     if dot and rest and table.replace("_", "-") in _TABLES:
         return f"{table.replace('_', '-')}.{rest}"
     if name == "seed":
-        raise CampaignError("seed is no factor: say which by seeds, 1-20 say")
+        raise CampaignError("seed is not a factor: set seeds, for example 1-20")
     if name in _NOT_FACTORS:
-        raise CampaignError(f"{given} is no factor: what a flight does is the same with any")
+        raise CampaignError(f"{given} is not a factor: it does not change a flight")
     known = sorted({*options, *(f"{table}.KEY" for table in _TABLES)})
     raise CampaignError(unknown("factor", given, known))
 
@@ -70,5 +70,5 @@ def _scaled(had: Any, by: Any, factor: str) -> Any:
     if isinstance(had, list):
         return [_scaled(each, by, factor) for each in had]
     if not (is_number(had) and is_number(by)):
-        raise CampaignError(f"{factor}: {had} times {by} is no number: leave the {SCALED} out")
+        raise CampaignError(f"{factor}: {had} times {by} is not a number: leave the {SCALED} out")
     return had * by

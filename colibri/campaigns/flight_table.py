@@ -65,7 +65,7 @@ class FlightTable:
         """Return a metric of each flight, (n,), nan where missing."""
         names = [metric.name for metric in self.campaign.metrics]
         if name not in names:
-            raise CampaignError(f"metric {name} was not kept: there are {', '.join(names)}")
+            raise CampaignError(f"metric {name} is not in the table: choose {', '.join(names)}")
         place = names.index(name)
         values = (each.metrics[place] for each in self.flown)
         return np.array([nan if value is None else value for value in values], dtype=np.float64)

@@ -51,7 +51,7 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
     if there and not resume:
         raise CampaignError(
             f"--out {folder} has {len(kept)} of the {campaign.flights} flights of this campaign: "
-            "go on with --resume, or choose another folder"
+            "continue with --resume, or choose another folder"
         )
     return Journal(folder, kept)
 
@@ -64,7 +64,9 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
         folder.mkdir(parents=True, exist_ok=True)
         if not path.exists():
             if any(entry != scratch for entry in folder.iterdir()):
-                raise CampaignError(f"--out {folder} is not empty, and has no {called} in it: choose another folder")
+                raise CampaignError(
+                    f"--out {folder} is not empty and does not contain a {called}: choose another folder"
+                )
             with scratch.open("wb") as file:
                 file.write(msgspec.json.format(now, indent=1) + b"\n")
                 file.flush()

@@ -66,7 +66,7 @@ def engine_of(workers: int | None, executor: Any) -> Engine:
             raise CampaignError(f"workers: must be a whole number of at least 1, not {workers}")
         return Pool(workers)
     if workers is not None:
-        raise CampaignError("workers: a cluster has its own: leave workers out")
+        raise CampaignError("workers: not used with a cluster: leave it out")
     if not isinstance(executor, str) and not hasattr(executor, "submit"):
         raise CampaignError(f"executor: must be an address or a distributed.Client, not {type(executor).__name__}")
     from colibri.campaigns.engines.cluster import Cluster
@@ -87,7 +87,7 @@ def fly_campaign(
 ) -> CampaignResults:
     """Fly the flights missing in `out`, and write the tables, also if interrupted."""
     if planned.flights > MAX_UNASKED and not yes:
-        raise CampaignError(f"{planned.flights} flights are many: say --yes if you mean it")
+        raise CampaignError(f"{planned.flights} flights: confirm with --yes")
     if parquet:
         parquet_writer()
     common = common_of(planned, remote=engine.is_remote)
@@ -127,5 +127,5 @@ def _fly(
             progress(each)
     results = CampaignResults(planned, flown, notes)
     if factors := results.without_effect():
-        results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ in nothing else are the same)")
+        results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ only in these are identical)")
     return results

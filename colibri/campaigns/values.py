@@ -103,7 +103,7 @@ def read_draw(key: str, given: Any) -> Draw:
         if second < 0.0:
             raise CampaignError(f"{key}: normal: the standard deviation is negative: {second:g}")
     elif first >= second:
-        raise CampaignError(f"{key}: {name}: {first:g} to {second:g} is no range")
+        raise CampaignError(f"{key}: {name}: {first:g} to {second:g} is an empty range")
     if name == "log-uniform" and first <= 0.0:
         raise CampaignError(f"{key}: log-uniform: {first:g} is not above zero")
     draw: Draw = _PAIRS[name](first, second)
@@ -174,7 +174,7 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
     first, last, count = float(span[0]), float(span[1]), float(span[2])
     if not count.is_integer() or not 2 <= count <= _MAX_SPAN or first == last:
         raise CampaignError(
-            f"{key}: {first:g}:{last:g}:{count:g} is no range: give first, last and how many, 2:20:10 say"
+            f"{key}: {first:g}:{last:g}:{count:g} is not a range: give FIRST:LAST:COUNT, for example 2:20:10"
         )
     if name == "linspace":
         return tuple(np.linspace(first, last, int(count)).tolist())

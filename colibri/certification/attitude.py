@@ -252,7 +252,7 @@ def _cross(a: AnyArray, b: AnyArray) -> AnyArray:
 def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
     """Return the rows of limits; angles and rates stay away from their ends by their motion within an interval."""
     if n.headroom <= 0:
-        raise RangeError("the thrust leaves the rotors nothing for moments")
+        raise RangeError("the thrust uses the full range of the rotors: no moments remain")
     h, rates = n.interval_s, n.rates_rad_s
     limited = len(box.max_angles)
     angles_left = box.max_angles - h * (box.max_kinematic @ rates)[:limited]
@@ -261,7 +261,7 @@ def _limits(n: AttitudeNumbers, box: VertexBox, eye: AnyArray) -> AnyArray:
     if min(*angles_left, *rates_left) <= 0:
         raise RangeError("a control interval is long enough to leave these ranges of angles and rates")
     if min(map(min, rotors_left)) <= 0:
-        raise RangeError("what the law may command beyond its gain is more than the rotors can do")
+        raise RangeError("the commands beyond the gain exceed the rotors")
     change = n.commanded[0] - eye[_COMMANDS]
     rows = [
         eye[_ANGLES[:limited]] / angles_left[:, None],

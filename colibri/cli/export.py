@@ -22,7 +22,7 @@ def run(args: Namespace) -> int:
     from colibri.common.errors import Error
 
     if not (args.mcap or args.csv or args.mat or args.parquet):
-        fail("export to what? --mcap, --csv, --mat, --parquet, or several of them")
+        fail("choose a format: --mcap, --csv, --mat, --parquet, or several of them")
     written = []
     try:
         path = log_file(args.log)

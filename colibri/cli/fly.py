@@ -33,6 +33,6 @@ def run(args: Namespace) -> int:
         from colibri.cli.shared.fly_and_report import fly
 
     if args.view and args.link != "udp":
-        fail(f"--view needs --link udp: over {args.link} there is no autopilot to connect to")
+        fail(f"--view needs --link udp: over {args.link} no autopilot process runs")
     with viewed(args, args.gcs):
         return fly(args)

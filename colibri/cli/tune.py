@@ -60,7 +60,7 @@ def run(args: Namespace) -> int:
                 **given,
             )
     except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; what was tried is in {args.out}: go on with --resume")
+        fail_interrupted(ended, f"; finished trials are in {args.out}: continue with --resume")
     except Error as error:
         fail(str(error), EXIT_BAD_INPUT)
     if not args.quiet:

@@ -222,7 +222,7 @@ class Companion:
             self.failing.append("overloaded: this computer is too slow for the control law")
         if self._passed_us is None and not self.failing:
             self._passed_us = now_us
-            self.said.append("all is checked: the law runs, and nothing is sent")
+            self.said.append("all checks passed: the law runs, nothing is sent")
 
     def _situation(self, now_us: int) -> Situation:
         report, stack = self.peer.report, self.peer.stack

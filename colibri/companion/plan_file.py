@@ -91,11 +91,11 @@ def read_plan(path: Path) -> MissionPlan:
         elif command == mav.MAV_CMD_NAV_WAYPOINT:
             points.append(_point(path, number, item, numbers))
         else:
-            raise _refused(path, number, f"is no waypoint ({_name(command)}): a track has none of it")
+            raise _refused(path, number, f"is no waypoint ({_name(command)}): tracks support waypoints only")
     if len(points) < 2:
-        raise CompanionError(f"{path}: a track needs two waypoints, and it has {len(points)}")
+        raise CompanionError(f"{path}: a track needs two waypoints, not {len(points)}")
     if len({point.heading_deg is None for point in points}) > 1:
-        raise CompanionError(f"{path}: some waypoints have a heading and some have none: give it to all, or to none")
+        raise CompanionError(f"{path}: only some waypoints have a heading: set all or none")
     return MissionPlan(path, tuple(points), speed_m_s, takeoff_m, LocalOrigin(planned, 0.0), note)
 
 
@@ -103,7 +103,7 @@ def _items(path: Path, items: list[Any]) -> Iterator[tuple[int, dict[str, Any], 
     for number, item in enumerate(items, start=1):
         kind = item.get("complexItemType", item.get("type")) if isinstance(item, dict) else None
         if kind != "SimpleItem":
-            raise _refused(path, number, f"is no waypoint ({shown(kind)}): a track has none of it")
+            raise _refused(path, number, f"is no waypoint ({shown(kind)}): tracks support waypoints only")
         command, numbers = item.get("command"), item.get("params")
         if not isinstance(command, int) or not isinstance(numbers, list) or len(numbers) != 7:
             raise _refused(path, number, "has no command with seven parameters")

@@ -79,7 +79,7 @@ def plan_of(args: Namespace) -> CompanionFlight:
     if args.height and not args.arm:
         raise CompanionError("--height is that of the take-off: add --arm, or leave it out")
     if args.arm and args.dry_run:
-        raise CompanionError("--dry-run arms nothing: leave --arm out")
+        raise CompanionError("--dry-run does not arm: leave --arm out")
     settings = CompanionSettings(
         may_arm=args.arm,
         dry_run=args.dry_run,
@@ -162,7 +162,7 @@ def fly(args: Namespace) -> int:
         if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
             if not companion.completed:
                 fail(
-                    f"the steps were not flown to their end: nothing is fitted; what was logged is in {args.out}",
+                    f"the steps were not completed: no fit; logs are in {args.out}",
                     EXIT_FAILED,
                 )
             _identify(companion, status, args.out)
@@ -219,7 +219,7 @@ def _seek_home(wire: _Wire, peer: VehiclePeer, wait_s: float, stop: Stop) -> Loc
         if stop:
             fail("ended by a signal before it flew", stop.code)
         if now_s > wait_s:
-            raise CompanionError("a mission is flown from the vehicle's home, and it has not said where that is")
+            raise CompanionError("a mission needs the vehicle's home position, which was not received")
         for datagram in wire.receive(peer, now_s):
             peer.receive(datagram, round(now_s * 1e6))
         wire.send(seeker.poll(round(now_s * 1e6)))
@@ -246,7 +246,7 @@ def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_
             companion.stop(str(error), fault=True)
         log.write(companion)
         for sender in wire.take_ignored():
-            status.say("link", f"{sender[0]}:{sender[1]} sends too, and is ignored: one vehicle is flown")
+            status.say("link", f"{sender[0]}:{sender[1]} is ignored: the link belongs to another vehicle")
         for line in companion.said:
             status.say("phase", line)
         companion.said.clear()
@@ -299,7 +299,7 @@ def _identify(companion: Companion, status: Status, out: Path) -> None:
     try:
         found, text, fitted = identified(companion)
     except Error as error:
-        fail(f"{error}; what was logged is in {out}", EXIT_FAILED)
+        fail(f"{error}; logs are in {out}", EXIT_FAILED)
     (out / RESPONSE).write_text(text, encoding="utf-8")
     draw(fitted, out / FIGURE)
     lags = ", ".join(f"{1e3 * lag_s:.0f}" for lag_s in found.time_constant_s)
@@ -332,4 +332,4 @@ def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Pat
         )
     if ended.in_order:
         return 0
-    fail(f"{ended.why}; what was logged is in {out}", EXIT_FAILED)
+    fail(f"{ended.why}; logs are in {out}", EXIT_FAILED)

@@ -19,7 +19,7 @@ class Protocol(NamedTuple):
     members: tuple[str, ...]
 
 
-ATTITUDE = Protocol("an attitude and a thrust in place of a place", ("step_attitude",))
+ATTITUDE = Protocol("an attitude and a thrust instead of a position", ("step_attitude",))
 CHARGE = Protocol("charge taken from the battery", ("charge_ah", "with_charge"))
 MASS = Protocol("mass estimated in flight", ("mass_kg", "with_mass"))
 PATH = Protocol("speed along the references", ("min_path_speed", "step_on_path", "path_speed", "lag_us", "with_lag"))

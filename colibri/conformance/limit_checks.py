@@ -105,7 +105,7 @@ def out_of_limits(subject: Subject, decision: Decision) -> str:
     """Describe an invalid part of a decision."""
     speeds = decision.rotor_speeds
     if not isinstance(speeds, np.ndarray) or speeds.shape != (4,) or not np.issubdtype(speeds.dtype, np.floating):
-        return f"rotor_speeds is no array of four floats: {speeds!r}"
+        return f"rotor_speeds is not an array of four floats: {speeds!r}"
     try:
         check_rotor_speeds(subject.name, speeds, subject.max_speed)
         angles, plan = np.array(decision.attitude_reference, dtype=float), decision.diagnostics.predicted

@@ -49,7 +49,7 @@ def memory_checks(subject: Subject) -> Iterator[Row]:
     yield judged(AREA, "references left as they are", failure, count, see)
     now = (np.array(step.decision.rotor_speeds) for step in steps)
     late = any(step.rotor_speeds.tobytes() != speeds.tobytes() for step, speeds in zip(steps, now, strict=True))
-    failure = "it overwrites the rotor speeds that it has returned: return an array of their own" if late else ""
+    failure = "it overwrites the rotor speeds that it has returned: return a new array" if late else ""
     see = subject.snippet("print(s[0].rotor_speeds.tolist(), s[0].decision.rotor_speeds.tolist())", _TRACK, **options)
     yield judged(AREA, "decisions left as they were", failure, count, see)
     yield _plain(steps)
@@ -112,7 +112,7 @@ def _plain(steps: list[FlownStep]) -> Row:
     try:
         size = max(len(to_bytes(step.memory)) for step in steps)
     except TypeError as error:
-        return Row(AREA, tried, Result.FIGURE, f"no, after a restart it begins anew: {error}")
+        return Row(AREA, tried, Result.FIGURE, f"no, after a restart it starts from initial(): {error}")
     return Row(AREA, tried, Result.OK, f"up to {size} bytes")
 
 
@@ -123,7 +123,7 @@ _TRIALS = (
         "a = s[{k}]; print(*(a.again(law, a.memory)[1].rotor_speeds.tolist() for _ in range(2)))",
     ),
     RepeatedSteps(
-        "the flight again by a law built anew",
+        "the same flight by a new instance",
         lambda subject, steps, _: _chained(subject, steps),
         "m = s[0].memory; print([(m := (r := a.again(law, m))[0], a.rotor_speeds.tolist(), "
         "r[1].rotor_speeds.tolist())[1:] for a in s][{k}])",

@@ -21,8 +21,8 @@ _STEPS = 3
 """Steps with each changed number."""
 _TRIED = {
     "seamless": "from its checkpoint, the same flight bit for bit",
-    "anew": "begun anew in flight, charge and mass kept",
-    "blind": "begun anew in flight, nothing kept",
+    "anew": "restarted in flight, charge and mass kept",
+    "blind": "restarted in flight, without a record",
 }
 
 
@@ -36,7 +36,7 @@ def restart_checks(subject: Subject) -> Iterator[Row]:
             failure = in_words(error)
         else:
             if how == "seamless" and not flown.is_plain:
-                yield not_applicable(AREA, _TRIED[how], "its memory is no plain data")
+                yield not_applicable(AREA, _TRIED[how], "its memory is not plain data")
                 continue
             found = f"at most {flown.off_m.max():.2g} m off (unbroken {flown.unbroken_m.max():.2g} m)"
             if how == "seamless" and not flown.same:

@@ -18,7 +18,7 @@ def machine_code() -> Finding:
     folder = MachineCode(rotation_matrix).cache_path
     if folder is None:
         advice = "name a folder: NUMBA_CACHE_DIR=FOLDER"
-        return Finding("machine code", Severity.NOTE, "can be kept nowhere: each start compiles anew", advice)
+        return Finding("machine code", Severity.NOTE, "cannot be cached: each start compiles again", advice)
     if not os.access(folder, os.W_OK):
         advice = "make it so, or name another: NUMBA_CACHE_DIR=FOLDER"
         return Finding("machine code", Severity.NOTE, f"{folder} cannot be written to", advice)
@@ -32,7 +32,7 @@ def flight() -> Finding:
     try:
         flown = fly(_TRACK, link="udp", duration=_DURATION_S)
     except Error as error:
-        return Finding("flight", Severity.FAILED, str(error), "colibri fly hover says more")
+        return Finding("flight", Severity.FAILED, str(error), "for details: colibri fly hover")
     times = flown.report["real_time_factor"]
     return Finding("flight", Severity.FINE, f"{times:.0f} times real time, on {os.cpu_count()} cores: {processor()}")
 

@@ -38,12 +38,12 @@ def ports() -> Iterator[Finding]:
         who = _who_has(port)
         checked = f"port {port}, {whose}"
         if who is None:
-            yield Finding(checked, Severity.FINE, "free" if ours else "nobody waits there yet: start it when you like")
+            yield Finding(checked, Severity.FINE, "free" if ours else "free: start the program at any time")
         elif ours:
             advice = "end that, or colibri sitl --plant-port 0"
             yield Finding(checked, Severity.FAILED, f"taken by {who}", advice)
         else:
-            yield Finding(checked, Severity.FINE, f"{who} waits there: it will be called")
+            yield Finding(checked, Severity.FINE, f"{who} is listening: the autopilot will connect")
 
 
 def beyond() -> Finding | None:
@@ -53,7 +53,7 @@ def beyond() -> Finding | None:
         return None
     host = gateway(_ROUTES.read_text(encoding="ascii")) if _ROUTES.exists() else None
     if host is None:
-        return Finding(what, Severity.NOTE, "no way out of it", "run the ground station in here, too")
+        return Finding(what, Severity.NOTE, "no way out of it", "run the ground station here, too")
     advice = f"colibri sitl --gcs udpout:{host}:{GROUND_PORT} --signing-key FILE (or --insecure)"
     return Finding(what, Severity.NOTE, f"a ground station on the host is at {host}", advice)
 

@@ -92,7 +92,7 @@ class FlightPlan:
         """
         checked("spec", spec, FlightSpec, "a FlightSpec, as of FlightSpec.of", PlanError)
         if spec.gcs and spec.link != "udp":
-            raise PlanError(f"--gcs needs --link udp: over {spec.link} there is no autopilot to connect to")
+            raise PlanError(f"--gcs needs --link udp: over {spec.link} no autopilot process runs")
         check_reach(spec.gcs, signed=spec.signing_key is not None, insecure=spec.insecure)
         contents = contents or contents_of(spec)
         profile, vehicle, plant_vehicle, track_file, _ = contents
@@ -202,7 +202,7 @@ def _check_sensors(name: str, vehicle: Vehicle) -> None:
     if vehicle.sensors is None:
         raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
     if vehicle.ground is None:
-        raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on while it finds its bearings")
+        raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on until the estimate is valid")
 
 
 def _usual_start(profile: Profile, vehicle: Vehicle, flown: Track, feedback: Feedback) -> Start:

@@ -110,7 +110,7 @@ def read_provenance(folder: Path) -> Provenance:
     try:
         return msgspec.json.decode(read_bytes(path), type=Provenance)
     except FileNotFoundError as error:
-        raise ProvenanceError(f"{path} is missing: {folder} is no folder of a flight of this version") from error
+        raise ProvenanceError(f"{path} is missing: {folder} is not a flight folder of this version") from error
     except OSError as error:
         raise ProvenanceError(f"cannot read {path}: {error.strerror}") from error
     except UNREADABLE as error:

@@ -134,7 +134,7 @@ def _read(path: Path) -> _Flight:
         raise ReplayError(f"{path}: {error}") from error
     if next(_recorded(flight), None) is None:
         (setup, *_) = flight.inputs.setups.values()
-        raise ReplayError(f"{path}: no frame of {setup.feedback} feedback is answered in it: nothing to replay")
+        raise ReplayError(f"{path}: no frame of {setup.feedback} feedback was answered: nothing to replay")
     return flight
 
 

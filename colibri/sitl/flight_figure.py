@@ -97,7 +97,7 @@ def _draw_plan(axes: "Axes", flown: Columns) -> None:
 def _write_texts(axes: "Axes", timeline: "Axes", numbered: Sequence[tuple[int, tuple[float, str]]]) -> None:
     axes.axis("off")
     lines = [f"{number:>3}  {time_s:8.3f} s  {_line(text, 54)}" for number, (time_s, text) in numbered]
-    axes.text(0.0, 1.0, "\n".join(lines or ["it said nothing"]), va="top", family="monospace", fontsize=8.5)
+    axes.text(0.0, 1.0, "\n".join(lines or ["no texts"]), va="top", family="monospace", fontsize=8.5)
     shown_s, room_s = -inf, 0.02 * float(np.diff(timeline.get_xlim())[0])
     for number, (time_s, _) in numbered:
         if time_s > shown_s + room_s:  # of several at a time, the first number

@@ -37,7 +37,7 @@ class RefusedError(SitlError):
     """
 
     def __init__(self, what: str, result: int, text: str) -> None:
-        super().__init__(f"{what} was refused: {text or 'without a word'} (result {result})")
+        super().__init__(f"{what} was refused: {text or 'no reason given'} (result {result})")
         self.result = result
         self.text = text
 

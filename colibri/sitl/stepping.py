@@ -49,7 +49,7 @@ class Stepped(Protocol):
         end_us = began_us + round(within * 1e6)
         while not predicate():
             if self.time_us >= end_us:
-                raise NotInTimeError(f"{what or 'what was waited for'} took longer than {within:g} s: {self}")
+                raise NotInTimeError(f"{what or 'the condition'} took longer than {within:g} s: {self}")
             self.step()
         return (self.time_us - began_us) * 1e-6
 
@@ -60,7 +60,7 @@ class Stepped(Protocol):
         while True:
             if not predicate():
                 after_s = (self.time_us - began_us) * 1e-6
-                raise NotInTimeError(f"{what or 'what was to hold'} did so for {after_s:.3f} of {for_:g} s: {self}")
+                raise NotInTimeError(f"{what or 'the condition'} did so for {after_s:.3f} of {for_:g} s: {self}")
             if self.time_us >= end_us:
                 return
             self.step()

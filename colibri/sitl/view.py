@@ -151,5 +151,5 @@ class View:
         east, north, up = self.position
         words = f"t = {self.time_us * 1e-6:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
         where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"
-        last = f"; last said: {'; '.join(self.texts[-3:])}" if self.texts else ""
+        last = f"; last texts: {'; '.join(self.texts[-3:])}" if self.texts else ""
         return f"{words}, {where}{last}"

@@ -30,7 +30,7 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     """Fly all contenders, tracks and seeds; `NAME-journal.jsonl` records each flight as it ends."""
     planned = _campaign(args, name, metrics, logs)
     if planned.flights > MAX_UNASKED:
-        raise CampaignError(f"{planned.flights} flights are too many: at most {MAX_UNASKED} are compared")
+        raise CampaignError(f"{planned.flights} flights exceed the limit of {MAX_UNASKED} are compared")
     common = common_of(planned)
     points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
     last = points[len(planned.seeds) - 1 :: len(planned.seeds)]

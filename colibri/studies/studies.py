@@ -17,6 +17,7 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
 from colibri.campaigns.engines.progress import in_order
 from colibri.campaigns.flights import common_of
+from colibri.common.errors import unknown
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder
 from colibri.plant.vehicle.description import load_vehicle
@@ -264,5 +265,5 @@ def _wanted(names: Sequence[str]) -> list[Study]:
     known = [study.name for study in STUDIES]
     for name in names:
         if name not in known:
-            fail(f"there is no study {name}: choose {', '.join(known)}")
+            fail(unknown("study", name, known))
     return [study for study in STUDIES if not names or study.name in names]

@@ -210,7 +210,9 @@ def _limits(result: StudyResult) -> Figure:
     error.set_xlim(begin_s, end_s)
     error.set_xlabel("t (s)")
     put_head(
-        figure, f"{result.row[0]}, rotors up to {result.row[1]} rad/s, {result.row[2]} battery: what binds", columns=5
+        figure,
+        f"{result.row[0]}, rotors up to {result.row[1]} rad/s, {result.row[2]} battery: limits",
+        columns=5,
     )
     return figure
 

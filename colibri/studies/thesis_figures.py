@@ -149,5 +149,5 @@ def _wanted(only: list[str] | None) -> list[ThesisFigure]:
     known = [figure.number for figure in FIGURES]
     for number in only or ():
         if number not in known:
-            fail(f"there is no figure {number}: choose 4.1 to 4.11 or A.1 to A.24")
+            fail(f'unknown figure "{number}" (choose 4.1 to 4.11 or A.1 to A.24)')
     return [figure for figure in FIGURES if only is None or figure.number in only]

@@ -94,7 +94,7 @@ def tuning_of(tables: TuningTables) -> Tuning:
         CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})
     )
     if campaign.flights > MAX_UNASKED:
-        raise TuningError(f"seeds: {campaign.flights} flights a trial are too many: at most {MAX_UNASKED}")
+        raise TuningError(f"seeds: {campaign.flights} flights a trial exceed the limit of {MAX_UNASKED}")
     _check_factors(campaign, space)
     objectives = read_objectives(tables.objectives, campaign.metrics)
     campaign = campaign._replace(metrics=metrics_of(objectives, campaign.metrics))
@@ -124,12 +124,12 @@ def _space(tables: TuningTables) -> dict[str, Range]:
         name = factor_name(given)
         key = key_of(name)
         if key is None or key.table != "profile":
-            raise TuningError(f"tune: {given} is no number of a profile: controllers.LAW.KEY say")
+            raise TuningError(f"tune: {given} is not a number of a profile: give controllers.LAW.KEY")
         if any(name.rstrip(SCALED) == other.rstrip(SCALED) for other in space):
-            raise TuningError(f"tune: {name.rstrip(SCALED)} is said twice")
+            raise TuningError(f"tune: {name.rstrip(SCALED)} is given twice")
         space[name] = read_range(name, values)
     if not space:
-        raise TuningError('tune: say which numbers, "controllers.LAW.KEY" = { uniform = [2, 20] } say')
+        raise TuningError('tune: no numbers: add for example "controllers.LAW.KEY" = { uniform = [2, 20] }')
     return space
 
 
@@ -146,9 +146,9 @@ def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
     varied = {name for point in campaign.samples() for name in point.settings}
     plain = {name.rstrip(SCALED) for name in (*campaign.fly, *varied)}
     for twice in (name for name in space if name.rstrip(SCALED) in plain):
-        raise TuningError(f"{twice} is said twice: what is tuned is not in fly, grid or draw")
+        raise TuningError(f"{twice} is given twice: remove it from fly, grid or draw")
     if "profile" in varied:
-        raise TuningError("profile: one is tuned: say which in fly")
+        raise TuningError("profile: only one can be tuned: set it in fly")
 
 
 def _check_seeds(given: Any, seeds: Sequence[int]) -> Sequence[int]:
@@ -159,7 +159,7 @@ def _check_seeds(given: Any, seeds: Sequence[int]) -> Sequence[int]:
     except Error as error:
         raise TuningError(f"check_{error}") from error
     if len(checked) < 2:
-        raise TuningError("check_seeds: one seed has no spread, so that no interval follows: give more, 101-150 say")
+        raise TuningError("check_seeds: one seed gives no interval: give more, for example 101-150")
     seen = sorted({*checked} & {*seeds})
     if seen:
         raise TuningError(f"check_seeds: {seen[0]} is among seeds: tuning must never have seen those it is checked by")

@@ -49,7 +49,7 @@ class Objective(NamedTuple):
             raise TuningError(f"no flight of the profile as it is came through: {flown[0].why}")
         values = [value for each in through if (value := each.metrics[place]) is not None]
         if len(values) < len(through):
-            raise TuningError(f"{self.metric} is not known of every flight: fly longer, or choose another objective")
+            raise TuningError(f"{self.metric} is missing in some flights: fly longer, or choose another objective")
         if min(values) < 0.0:
             raise TuningError(f"{self.metric} is {min(values):g} in a flight: an objective must not be below zero")
         return LOST_COUNTS * (max(values) or 1.0)
@@ -71,14 +71,14 @@ def value_of(flown: FlightResult, place: int, otherwise: float) -> float:
 def read_objectives(given: Mapping[str, Any], metrics: Sequence[Metric]) -> tuple[Objective, ...]:
     """Read objectives such as `{ rmse_m = "mean" }`."""
     if not given:
-        raise TuningError('objectives: say what is to become small, rmse_after_20s_m = "mean" say')
+        raise TuningError('objectives: none: add for example rmse_after_20s_m = "mean"')
     return tuple(_objective(name, pooling, metrics) for name, pooling in given.items())
 
 
 def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
     known = tuple(dict.fromkeys((*(metric.name for metric in metrics), *NAMES, SHARE_LOST)))
     if name in _NOT_SMALL:
-        raise TuningError(f"objectives: {name} is none that is to become small: choose {SHARE_LOST}")
+        raise TuningError(f"objectives: {name} is not an objective to minimise: choose {SHARE_LOST}")
     if name not in known:
         raise TuningError(f"objectives: {unknown('metric', name, known)}")
     if name == SHARE_LOST:

@@ -26,7 +26,7 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
     else:
         text = f'name = "{name}"\n{tomlkit.dumps(document)}'
         document = tomlkit.parse(text)
-    lines = [*origin, "Tuned, and what it was:"]
+    lines = [*origin, "Tuned numbers, with their original values:"]
     for factor in factors:
         key = key_of(factor)
         if key is None:

@@ -9,6 +9,7 @@ from colibri.analysis.tables import Row, comma_separated
 from colibri.autopilot.control.profile import Profile
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.values import shown
+from colibri.common.errors import unknown
 from colibri.tuning.definition import Tuning
 from colibri.tuning.profile_file import profile_file
 from colibri.tuning.space import TuningError
@@ -105,7 +106,7 @@ class TuningResults:
         """Return a figure: history, slices, with eight trials importance, with several objectives pareto."""
         figures = self._figures()
         if what not in figures:
-            raise TuningError(f"there is no figure {what} of these trials: choose {', '.join(figures)}")
+            raise TuningError(unknown("figure of these trials", what, figures))
         return figures[what]()
 
     def save(self, folder: str | Path) -> Path:

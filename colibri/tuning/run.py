@@ -134,7 +134,7 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
     except OSError as error:
         raise TuningError(f"cannot use --out {out}: {error}") from error
     if there and not resume:
-        raise TuningError(f"--out {out} has this tuning already: go on with --resume, or choose another folder")
+        raise TuningError(f"--out {out} has this tuning already: continue with --resume, or choose another folder")
 
 
 def _identity(tuning: Tuning) -> dict[str, Any]:

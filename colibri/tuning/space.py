@@ -38,13 +38,13 @@ def read_range(key: str, given: Any) -> Range:
         if not isinstance(read, Uniform | LogUniform | Choice):
             raise TypeError(read)
         if isinstance(read, Choice) and len(read.values) < 2:
-            raise TuningError(f"{key}: choice: one value leaves nothing to choose")
+            raise TuningError(f"{key}: choice: needs two values or more")
         return read
     span = given[kind]
     if not isinstance(span, Sequence) or len(span) != 2 or any(type(end) is not int for end in span):
         raise TuningError(f"{key}: integers: expected [lowest, highest], not {span}")
     if span[0] >= span[1]:
-        raise TuningError(f"{key}: integers: {span[0]} to {span[1]} is no range")
+        raise TuningError(f"{key}: integers: {span[0]} to {span[1]} is an empty range")
     return Integers(*span)
 
 
@@ -57,7 +57,7 @@ def check_holds(key: str, values: Range, value: Any) -> None:
             )
         return
     if not is_number(value):
-        raise TuningError(f"{key}: the profile has {shown(value)}, no number: tune a place in it, {key}.0 say")
+        raise TuningError(f"{key}: the profile has {shown(value)}, not a number: tune an element, for example {key}.0")
     if not values.low <= value <= values.high:
         raise TuningError(f"{key}: the profile has {value:g}, not within {values.low:g} to {values.high:g}: widen that")
 

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import msgspec
 
 from colibri.common.config import UNREADABLE
-from colibri.common.errors import Error
+from colibri.common.errors import Error, unknown
 from colibri.common.files import read_bytes
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
 from colibri.flights.folder import make_folder
@@ -36,7 +36,7 @@ class GoldenResult(NamedTuple):
 
 def verify_golden(args: argparse.Namespace) -> int:
     if args.duration is not None:
-        fail("--duration does not go with --golden: each golden flight has its own")
+        fail("--duration cannot be combined with --golden: each golden flight has its own")
     path: Path = args.golden
     flights = chosen(args.only)
     known = read_hashes(path) if path.exists() or not args.renew else {}
@@ -46,7 +46,7 @@ def verify_golden(args: argparse.Namespace) -> int:
     try:
         outcomes = [fly_golden(flight, args.out / flight.name, args.link) for flight in flights]
     except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; what was logged is in {args.out}")
+        fail_interrupted(ended, f"; logs are in {args.out}")
     found = {outcome.name: outcome._asdict() for outcome in outcomes}
     (args.out / FOUND).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if args.renew:
@@ -63,7 +63,7 @@ def chosen(names: Sequence[str]) -> list[TrackCase | SitlCase]:
     flights = {flight.name: flight for flight in FLIGHTS}
     for name in names:
         if name not in flights:
-            fail(f"--only {name}: there is no such golden flight; there are {', '.join(flights)}")
+            fail(f"--only: {unknown('golden flight', name, flights)}")
     return [flight for flight in FLIGHTS if not names or flight.name in names]
 
 
@@ -80,7 +80,7 @@ def read_hashes(path: Path) -> dict[str, str]:
     try:
         return msgspec.json.decode(read_bytes(path), type=dict[str, _Hash])
     except FileNotFoundError:
-        fail(f"there are no golden hashes in {path}: say which FILE has them, or write them with --renew")
+        fail(f"no golden hashes in {path}: name their FILE, or write them with --renew")
     except OSError as error:
         fail(f"cannot read {path}: {error.strerror}")
     except UNREADABLE as error:
@@ -89,10 +89,10 @@ def read_hashes(path: Path) -> dict[str, str]:
 
 def _check_names(path: Path, known: Mapping[str, str]) -> None:
     names = {flight.name for flight in FLIGHTS}
-    wrong = [f"names {name}, which is no golden flight" for name in sorted(known.keys() - names)]
+    wrong = [f"names {name}, which is not a golden flight" for name in sorted(known.keys() - names)]
     wrong += [f"has no hash of golden flight {name}" for name in sorted(names - known.keys())]
     if wrong:
-        fail(f"{path} {wrong[0]}: write it anew with --renew")
+        fail(f"{path} {wrong[0]}: write it again with --renew")
 
 
 def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[GoldenResult]) -> int:

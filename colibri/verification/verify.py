@@ -62,7 +62,7 @@ def verify(args: argparse.Namespace) -> int:
     except Error as error:
         fail(str(error), EXIT_FAILED)
     except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; what was logged is in {args.out}")
+        fail_interrupted(ended, f"; logs are in {args.out}")
     if not args.quiet:
         _print(verdicts, args)
     differing = [verdict.name for verdict in verdicts if not verdict.same]

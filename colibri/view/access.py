@@ -34,7 +34,7 @@ def refusal(headers: Mapping[str, str], port: int) -> str | None:
     origin = headers.get("Origin")
     connects = headers.get("Upgrade", "").lower() == "websocket"
     if origin is None:
-        return "a connection has to say where it comes from" if connects else None
+        return "a connection without an origin is refused" if connects else None
     if origin not in {f"http://{name}:{port}" for name in _OURS}:
         return f"{origin} may not use this page"
     return None

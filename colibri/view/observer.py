@@ -72,7 +72,7 @@ class VehicleObserver:
             return
         origin = self.telemetry.origin
         if origin is None:
-            self.telemetry.say("take off: the vehicle has not said where it is")
+            self.telemetry.say("take off: no position received")
             return
         home_up = self.telemetry.home_enu_m[2]
         above_sea = origin.altitude_m + (0.0 if home_up != home_up else home_up) + height_m
@@ -94,7 +94,7 @@ class VehicleObserver:
     def go_to(self, place_enu_m: Vector) -> None:
         origin = self.telemetry.origin
         if origin is None:
-            self.telemetry.say("go to: the vehicle has not said where it is")
+            self.telemetry.say("go to: no position received")
             return
         there = geodetic_of(place_enu_m, origin)
         east, north, up = place_enu_m
@@ -119,7 +119,7 @@ class VehicleObserver:
 
     def _give(self, what: str, command: Command) -> None:
         if not self.telemetry.system:
-            self.telemetry.say(f"{what}: no vehicle is there")
+            self.telemetry.say(f"{what}: no vehicle connected")
             return
         if self._order is not None:
             self._client.cancel(self._order[1])

@@ -48,5 +48,5 @@ def seeds(text: str) -> range:
     except ValueError:
         chosen = range(0)
     if not chosen:
-        raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
+        raise ArgumentTypeError(f"expected FIRST-LAST, for example 1-50, not {text}")
     return chosen

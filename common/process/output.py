@@ -14,7 +14,7 @@ _LOOKS, _LOOK_S = 10, 0.1
 """Number and duration of the waits for a reader at the end."""
 _PIECE = 512
 """Bytes that a pipe or terminal takes at once if it takes any."""
-_LEFT_OUT = "colibri: {} lines were left out, as nobody read them\n"
+_LEFT_OUT = "colibri: {} lines dropped: the output was not read\n"
 
 
 class Output(io.RawIOBase):

@@ -7,7 +7,7 @@ from typing import Any, TextIO
 
 from colibri.common.process.output import Output, text_output
 
-_LEFT_OUT = '{{"event": "left_out", "text": "{0} lines were left out, as nobody read them", "lines": {0}}}\n'
+_LEFT_OUT = '{{"event": "left_out", "text": "{0} lines dropped: the output was not read", "lines": {0}}}\n'
 
 
 class Status:

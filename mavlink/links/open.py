@@ -66,7 +66,7 @@ def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
 
 
 def unsigned_refusal(url: str) -> str:
-    return f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
+    return f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to accept commands from anyone"
 
 
 def _open_udp(url: str, scheme: str, host: str, port: int) -> UdpLink:
@@ -102,7 +102,7 @@ def _parse(url: str, schemes: tuple[str, ...]) -> tuple[str, str, int]:
         forms = [f"{scheme}:HOST:PORT" for scheme in schemes]
         raise LinkError(f"{url}: expected " + " or ".join(forms if schemes == _UDP else [*forms, _SERIAL_FORM]))
     if scheme in ("udpout", "tcp") and int(port) == 0:
-        raise LinkError(f"{url}: port 0 is no port to send to")
+        raise LinkError(f"{url}: port 0 is not a port to send to")
     return scheme, host, int(port)
 
 

@@ -28,11 +28,11 @@ _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16
 """Limit per call, so that a continuous sender cannot stall the process."""
 _REASONS = {
-    errno.ENOENT: "there is no such device; plug it in, or name another",
+    errno.ENOENT: "no such device: plug it in, or choose another",
     errno.EACCES: "no permission; join the group that owns it (often dialout), and log in again",
     errno.EAGAIN: "another program has it; end that, or name another",
     errno.EBUSY: "another program has it; end that, or name another",
-    errno.ENOTTY: "it is no serial port; name another",
+    errno.ENOTTY: "not a serial port: choose another",
 }
 
 
@@ -144,7 +144,7 @@ def _opened(url: str, device: str, baud: int) -> "Serial":
 
 def _reason(error: Exception) -> str:
     if not isinstance(error, OSError):
-        return "it has no such baud rate; name another"
+        return "unsupported baud rate: choose another"
     number = error.errno
     if number is None and error.__context__ is not None:  # termios has errors of its own, which pyserial only quotes
         number = error.__context__.args[0]

@@ -28,7 +28,7 @@ def misplaced(latitude_deg: float, longitude_deg: float) -> str:
     for (name, maximum), value in zip(_COORDINATES, (latitude_deg, longitude_deg), strict=True):
         if not abs(value) <= maximum:
             return f"{name} {value:.7g} is not within {maximum:g} degrees"
-    return "" if latitude_deg or longitude_deg else "latitude 0, longitude 0 is no place"
+    return "" if latitude_deg or longitude_deg else "latitude 0, longitude 0 is not accepted"
 
 
 def misplaced_height(altitude_m: float) -> str:

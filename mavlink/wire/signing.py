@@ -50,7 +50,7 @@ def parse_key(content: bytes) -> bytes:
         if len(key) != KEY_BYTES:
             raise SigningError(f"expected 32 bytes or 64 hexadecimal digits, found {len(content)} bytes")
     if key == _NO_KEY:
-        raise SigningError("a key of zeros signs nothing")
+        raise SigningError("the key is all zeros")
     return key
 
 
@@ -58,7 +58,7 @@ def read_key(path: Path) -> tuple[bytes, str]:
     """Return the key of a file, and a warning if others can read it; a key that others can write is refused."""
     content, mode = read_with_mode(path)
     if mode & 0o002:
-        raise SigningError(f"anybody can write it (mode {mode:04o}): make a new key, and chmod 600 the file")
+        raise SigningError(f"writable by everyone (mode {mode:04o}): make a new key, and chmod 600 the file")
     return parse_key(content), f"mode {mode:04o} lets others use the key: chmod 600" if mode & 0o077 else ""
 
 

@@ -73,7 +73,7 @@ class Physics:
         x, voltage_v = self._integrate(self._vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         if not close_attitude(x):
             when = f"at t = {world.time_us / 1e6:.3f} s"
-            raise IntegrationError(f"the state has left what the model describes {when}: it is no longer finite")
+            raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
         end = x.tolist()
         state = tuple(end[:_RIGID])
         voltage_v = nan if self._battery is None else voltage_v

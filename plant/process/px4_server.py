@@ -49,7 +49,7 @@ class Simulator:
         weather = spec.weather
         vehicle = load_vehicle(spec.vehicle).without(spec.without)
         if vehicle.sensors is None:
-            raise VehicleError(f"{vehicle.name} has no sensors: PX4 flies a vehicle with a table sensors")
+            raise VehicleError(f"{vehicle.name} has no sensors: choose one with a table sensors")
         delay_ms = px4_gps_delay_ms(vehicle)
         text = f"{vehicle.name}'s GPS is {delay_ms} ms late, SENS_GPS0_DELAY {delay_ms}"
         status.say("sensors", f"{text}; {all_parameters_by(str(spec.vehicle), 'px4')}", gps_delay_ms=delay_ms)

@@ -26,11 +26,11 @@ class Closable(Protocol):
 
 
 def awaiting(whom: str, link: GroundLink) -> str:
-    return f"waiting for {whom} on {link.url}" if link.target is None else f"calling {whom} at {link.url}"
+    return f"waiting for {whom} on {link.url}" if link.target is None else f"connecting to {whom} at {link.url}"
 
 
 def all_parameters_by(vehicle: str, whom: str) -> str:
-    return f"all of it by: colibri vehicle {shlex.quote(vehicle)} --for {whom}"
+    return f"all parameters: colibri vehicle {shlex.quote(vehicle)} --for {whom}"
 
 
 @contextmanager

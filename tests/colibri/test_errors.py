@@ -91,7 +91,7 @@ def test_errors_in_flight_and_of_tests_have_a_second_base() -> None:
 
 @pytest.mark.parametrize(
     ("error", "code", "line"),
-    [(FlightError("nan", 1, said=False), 1, "nan; what was logged is in {out}"), (LinkError("no way"), 2, "no way")],
+    [(FlightError("nan", 1, said=False), 1, "nan; logs are in {out}"), (LinkError("no way"), 2, "no way")],
 )
 def test_only_a_flight_that_began_names_its_logs(
     error: Error, code: int, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused

@@ -131,7 +131,7 @@ def test_numbers_of_the_report_have_limits(tmp_path: Path, refused: Refused) -> 
     limits = ("--no-figures", "--fail-above", "0.1", "--fail-above", "max_error_m=0.5", "--fail-above", "fallbacks=0")
     flight = ("fly", "hover", "--link", "memory", "--duration", "1", "--quiet", *limits)
     assert refused(*flight, "--out", tmp_path, code=1) == (
-        "--fail-above: rmse_after_20s_m is not known of this flight, and shall not be above 0.1; "
+        "--fail-above: rmse_after_20s_m is missing in this flight; its limit is 0.1; "
         f"max_error_m is 1, above 0.5; the logs are in {tmp_path}"
     )
 

@@ -132,7 +132,7 @@ def test_a_log_without_frames_is_not_replayed(copy: Path, refused: Refused) -> N
     (setup,) = read_inputs(log.inputs()).setups.values()
     commands = b"".join(map(COMMAND.encode, log.blocks(COMMAND)))
     (copy / "flight.ulg").write_bytes(BEGINNING + encode_input(0, RecordKind.SETUP, encoded(setup)) + commands)
-    assert "flight.ulg: no frame of state feedback is answered in it" in refused("replay", copy)
+    assert "flight.ulg: no frame of state feedback was answered" in refused("replay", copy)
 
 
 def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def test_code_is_not_json() -> None:
         ({"start": "zz=1"}, 'start: unknown key "zz" (did you mean "z"?)'),
         ({"profile": 3}, "profile: must be a name or a Profile, not int"),
         ({"gusts": [3]}, "gusts: must be SPEED@FROM:start=S,duration=S, not int"),
-        ({"wind": "strong"}, "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not strong"),
+        ({"wind": "strong"}, "wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not strong"),
     ],
 )
 def test_a_wrong_value_is_named_with_what_is_valid(given: dict[str, Any], line: str) -> None:

@@ -50,7 +50,7 @@ PARTS: Final = {
     part.name: part
     for part in (
         DefendedPart(BATTERY, "charge no longer known", optional=True),
-        DefendedPart(RESTART, "nothing goes on of the flight before"),
+        DefendedPart(RESTART, "the previous flight is not resumed"),
         DefendedPart(START, "begun anew"),
         DefendedPart(ESTIMATOR, "inertial sensors carry on"),
         DefendedPart(STANDBY, "attitude stays as it was"),

@@ -98,7 +98,7 @@ def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int
                 raise TrackFileError(f"{path}: line {line}, column {column}: expected {limits}, not '{shown(cell)}'")
         if len(cells) != len(header):
             column = header[len(cells)] if len(cells) < len(header) else str(len(header) + 1)
-            what = "missing" if len(cells) < len(header) else "has no name in the header"
+            what = "missing" if len(cells) < len(header) else "is not named in the header"
             raise TrackFileError(f"{path}: line {line}, column {column}: {what}")
         yield line, [float(cell) for cell in cells]
 

@@ -57,7 +57,7 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
         slowed = waypoints.stretched(stretch)
         if slowed.times_s[-1] > MAX_DURATION_S:
             break
-    raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it asks for a {worst}")
+    raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it needs a {worst}")
 
 
 def check_heights(waypoints: Waypoints, floor_m: float) -> None:
@@ -84,7 +84,7 @@ def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
     demands = reach.demands(mean_motion(track), reach.charge_of_hover(track.duration_s))
     excess, worst = _excess(demands, waypoints, 0.0)
     if excess.max() > 1.0:
-        what = f"{_legs([int(excess.argmax())])} asks for a {worst}"
+        what = f"{_legs([int(excess.argmax())])} needs a {worst}"
         raise waypoints.error(f"{what}: give it more time, or leave column t out")
     return track
 

@@ -50,7 +50,7 @@ def load_track(
         raise TrackError(f"track {name} is at {height_m:.2f} m after {time_s:.2f} s, below the floor of {floor:g} m")
     demands = reach.demands(exact_motion(found), reach.charge_of_hover(min(found.duration_s, DURATION_S)))
     beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
-    notes = [f"track {name} asks for more than there is: {'; '.join(beyond)}"] if beyond else []
+    notes = [f"track {name} exceeds the limits: {'; '.join(beyond)}"] if beyond else []
     return LoadedTrack(found, "; ".join(filter(None, (getattr(given, "note", found.note), *notes))))
 
 

@@ -51,7 +51,7 @@ def track(name: str, text: str | None = None) -> Track:
     if kind is None:
         raise TrackError(unknown("track", base, track_names()))
     if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
-        raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
+        raise TrackError(f"track {base}: {kind} is not a subclass of colibri.TrackOptions")
     return tried(base, read_options(base, kind, given if colon else None).track, kind.__name__)
 
 
@@ -92,7 +92,7 @@ def read_options(name: str, kind: type[TrackOptions], text: str | None) -> Track
     given = _pairs(name, kind, text)
     for key in given:
         if key not in fields:
-            raise TrackError(f"track {name} has no option {key}: choose {', '.join(fields)}")
+            raise TrackError(f"track {name}: {unknown('option', key, fields)}")
     for key, field in fields.items():
         if field.required and key not in given:
             raise TrackError(f"track {name} needs {key}: {name}:{key}={key.upper()}")

@@ -83,4 +83,4 @@ def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
         for row, axis in np.argwhere(apart > allowed)[:1]:
             by = (_VELOCITY if unit == "m" else _ACCELERATION)[axis]
             what = f"goes by {change[row, axis]:.3g} {unit} from the line before, and {by} by {by_rate[row, axis]:.3g}"
-            raise table.error(row + 1, columns[axis], f"{what}: the columns contradict, or rows are far apart")
+            raise table.error(row + 1, columns[axis], f"{what}: the columns disagree, or the rows are too far apart")

@@ -62,7 +62,7 @@ def read_waypoints(
     points, timed = table.matrix(_REQUIRED), "t" in table.values
     for option, value in (("speed", speed_m_s), ("margin", margin)):
         if timed and value is not None:
-            raise TrackFileError(f"{path}: line 1, column t: says when to be where, so leave {option} out")
+            raise TrackFileError(f"{path}: line 1, column t: sets the times: leave {option} out")
     fastest = speed_m_s == "max"
     average_m_s = speed_m_s if isinstance(speed_m_s, float) else DEFAULT_SPEED_M_S
     times_s = table.times(MIN_LEG_S) if timed else _times(table, points, average_m_s)

@@ -33,7 +33,7 @@ def fly(args: Namespace) -> int:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
             results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
     except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; what was flown is in {args.out}: go on with --resume")
+        fail_interrupted(ended, f"; finished flights are in {args.out}: continue with --resume")
     except Error as error:
         fail(str(error), EXIT_BAD_INPUT)
     if not args.quiet:
@@ -44,14 +44,14 @@ def fly(args: Namespace) -> int:
 def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[str, Any]:
     pairs = list(map(read, texts))
     if twice := first_twice(key for key, _ in pairs):
-        raise CampaignError(f"{twice} is said twice: give all of its values at once")
+        raise CampaignError(f"{twice} is given twice: give all values at once")
     return dict(pairs)
 
 
 def _setting(text: str) -> tuple[str, Any]:
     key, values = _pair(text, "KEY=VALUES, body.mass_kg=0.6:0.8:5 say")
     if values.count(":") == 1 and all(isinstance(_value(part), int | float) for part in values.split(":")):
-        raise CampaignError(f"{key}: a range is FIRST:LAST:COUNT, {values}:5 say, not {values}")
+        raise CampaignError(f"{key}: a range is FIRST:LAST:COUNT, for example {values}:5, not {values}")
     return key, values if values.count(":") == 2 else [_value(each) for each in values.split(",")]
 
 

@@ -45,12 +45,12 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
         _keep_what_there_is(plan, str(error))
         if error.said:
             return error.code
-        fail(f"{error}; what was logged is in {plan.out}", error.code)
+        fail(f"{error}; logs are in {plan.out}", error.code)
     except Error as error:
         fail(keep_failure(error, plan.out))
     except KeyboardInterrupt as ended:
         _keep_what_there_is(plan)
-        fail_interrupted(ended, f"; what was logged is in {plan.out}")
+        fail_interrupted(ended, f"; logs are in {plan.out}")
     found = _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
     if found["lost"] is not None:
         fail(f"lost at t = {found['lost_at_s']:.2f} s: {found['lost']}; the logs are in {plan.out}", EXIT_FAILED)

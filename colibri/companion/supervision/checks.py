@@ -71,7 +71,7 @@ def _clock_advice(now: CheckFacts) -> str:
             f"the vehicle's clock goes at {100 * now.clock_rate:.0f} % of this computer's: let a simulator fly at "
             "real time (colibri sitl --speed 1)"
         )
-    return "too few of its answers to TIMESYNC have arrived: wait, or look at the link"
+    return "too few TIMESYNC answers: wait, or check the link"
 
 
 def _in_time(now: CheckFacts) -> bool:
@@ -111,7 +111,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         "reports",
         lambda now: not missing(now.ages),
-        lambda now: f"the vehicle does not report {', '.join(missing(now.ages))}: nothing is concluded from it",
+        lambda now: f"the vehicle does not report {', '.join(missing(now.ages))}: not checked",
         required=False,
     ),
     Check(
@@ -122,7 +122,7 @@ CHECKS: tuple[Check, ...] = (
             f"{1e3 * now.state_age_s:.0f} ms old, of at most {1e3 * now.limits.max_state_age_s:.0f}: raise the link's "
             "rate, or end other streams"
             if now.state_age_s < inf
-            else "none has a known time yet: see the clock"
+            else "no time stamp yet: see the clock"
         ),
     ),
     Check(
@@ -151,7 +151,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         "hover thrust",
         lambda now: now.thrust is not None and _MIN_HOVER <= now.thrust.hover <= _MAX_HOVER,
-        lambda _: "the hover thrust of its parameters is none: hover it once, by its own autopilot",
+        lambda _: "the hover thrust parameter is 0: hover once with its own autopilot",
     ),
     Check(
         "estimator",
@@ -161,7 +161,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         "pre-arm",
         lambda now: now.report.armed or not now.may_arm or now.report.prearm_ok is not False,
-        lambda _: "the vehicle says that it cannot be armed: see its messages",
+        lambda _: "pre-arm checks of the vehicle fail: see its messages",
     ),
     Check(
         "altitude",

@@ -25,7 +25,5 @@ def how_it_ended(
     if why is PhaseCondition.PILOT:
         return CompanionEnd(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
     if why is PhaseCondition.TOO_LATE:
-        return CompanionEnd(
-            False, ": ".join((f"nothing came of {before} in time", *filter(None, ["; ".join(waits_for)])))
-        )
+        return CompanionEnd(False, ": ".join((f"{before}: timed out", *filter(None, ["; ".join(waits_for)]))))
     return CompanionEnd(why is not PhaseCondition.DISARMED or before is CompanionPhase.HANDING_OVER, why.value)

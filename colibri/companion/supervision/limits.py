@@ -138,7 +138,7 @@ LIMITS: tuple[Limit, ...] = (
         "overloaded",
         lambda now, limits, _: now.pace < limits.min_pace or now.gap_s > limits.max_gap_s,
         lambda now, limits: (
-            f"this computer is too slow: {100 * now.pace:.0f} % of the setpoints in the last second, of at least "
+            f"overloaded: {100 * now.pace:.0f} % of the setpoints in the last second, of at least "
             f"{100 * limits.min_pace:.0f}, and the last {1e3 * now.gap_s:.0f} ms ago, of at most "
             f"{1e3 * limits.max_gap_s:.0f}"
         ),

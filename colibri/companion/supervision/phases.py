@@ -21,18 +21,18 @@ class PhaseCondition(StrEnum):
     """Condition of a transition; its value is the message to the user."""
 
     CONNECTED = "the vehicle is known"
-    STOPPED = "it was told to end"
+    STOPPED = "stopped"
     PILOT = "the pilot has chosen another mode"
     DISARMED = "the rotors have stopped"
     MUST_END = "a limit is exceeded"
     CHECKED_TO_ARM = "all is checked, and it may arm"
     CHECKED_IN_AIR = "all is checked, and the vehicle flies"
     ARMED = "the rotors turn"
-    UP = "it is up there, and stays"
+    UP = "at height, holding"
     OFFBOARD = "the vehicle takes setpoints"
     FINISHED = "the track is flown, or the time is up"
     HELD = "the vehicle holds by itself"
-    TOO_LATE = "nothing came of it in time"
+    TOO_LATE = "timed out"
 
 
 class PhaseTransition(NamedTuple):

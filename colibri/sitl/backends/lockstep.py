@@ -168,7 +168,7 @@ class LockstepSession:
                 if is_frame and to_stations is not None:
                     return answer, to_stations, received
             if now_s() > began_s + _GIVE_UP_S:
-                raise SessionError("nothing passes between plant and autopilot, however often it is repeated")
+                raise SessionError("no message passes between plant and autopilot, despite repeats")
 
     def measure_again(self) -> None:
         self._frame, self.truth = self._taken_in(self.plant.frame())
@@ -196,7 +196,7 @@ class LockstepSession:
         frame, true_state = parted(datagram)
         truth = read_state(true_state, self._truth_source) or self._decoded_state(true_state)
         if truth is None:
-            raise SessionError("the vehicle has no finite state any more")
+            raise SessionError("the state of the vehicle is not finite")
         return frame, truth
 
     def _decoded_state(self, true_state: bytes) -> StateFrame | None:
@@ -220,7 +220,7 @@ class LockstepSession:
             command = decode_actuators(message) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:
                 return command
-        raise SessionError("the autopilot answered with what no rotor can follow")
+        raise SessionError("the autopilot sent an invalid rotor command")
 
 
 def answers(datagram: bytes, time_us: int) -> bool:

@@ -80,7 +80,7 @@ class UdpPlant:
                     return url
             self._child.check()
             sleep(0.005)
-        raise SessionError(f"the plant said nothing for {SILENCE_S:.0f} s")
+        raise SessionError(f"the plant was silent for {SILENCE_S:.0f} s")
 
 
 class UdpAutopilot:
@@ -162,7 +162,7 @@ def received(link: UdpLink, child: LoggedChild) -> tuple[bytes, Address]:
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:
         child.check()
         if perf_counter() > began_s + SILENCE_S:
-            raise SessionError(f"the {child.name} has said nothing for {SILENCE_S:.0f} s, and lives")
+            raise SessionError(f"the {child.name} was silent for {SILENCE_S:.0f} s, but still runs")
     return datagram
 
 

@@ -131,7 +131,7 @@ def test_plans_count_as_changes_and_the_current_item_must_exist() -> None:
     for plan_type in (MISSION, FENCE, RALLY):
         cockpit.load(plan_type)
     assert cockpit.missions.changes == 3
-    assert cockpit.missions.set_current(0, False) == Refusal("mission: there is none", FAILED)
+    assert cockpit.missions.set_current(0, False) == Refusal("no mission", FAILED)
     cockpit.load(MISSION, *PLAN)
     assert cockpit.missions.set_current(1, False) is None
     assert cockpit.missions.progress().seq == 1

@@ -66,7 +66,7 @@ def test_sensor_faults_need_sensor_feedback_and_our_plant() -> None:
     refusal = by_state.inject(asked(GPS, OFF), enabled=True)
     assert refusal == Refusal("failure refused: flown by the state, not by sensors", UNSUPPORTED)
     refusal = elsewhere.inject(asked(MOTOR, OFF), enabled=True)
-    assert refusal == Refusal("failure refused: this simulator takes none", UNSUPPORTED)
+    assert refusal == Refusal("failure refused: this simulator does not inject any", UNSUPPORTED)
     assert by_state.take() == elsewhere.take() == ()
 
 

@@ -74,7 +74,7 @@ def test_a_port_that_is_taken(capsys: pytest.CaptureFixture[str], taken: str, sc
     ("content", "line"),
     [
         (bytes(range(31)), "expected 32 bytes or 64 hexadecimal digits, found 31 bytes"),
-        (bytes(32), "a key of zeros signs nothing"),
+        (bytes(32), "the key is all zeros"),
     ],
     ids=["short", "zeros"],
 )
@@ -138,7 +138,7 @@ def test_a_state_folder_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize("url", ["udpin:0.0.0.0:0", "udpout:192.0.2.1:14550", "tcpin:0.0.0.0:0", "tcp:192.0.2.1:5760"])
 def test_a_link_beyond_this_computer_without_a_key(capsys: pytest.CaptureFixture[str], url: str) -> None:
     assert refused(capsys, "--gcs", url) == (
-        f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
+        f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to accept commands from anyone"
     )
 
 

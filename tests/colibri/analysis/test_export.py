@@ -131,8 +131,8 @@ def test_the_table_of_the_filter_has_what_the_vehicle_measures(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "options", "said"),
     [
-        (b"", [], "export to what? --mcap, --csv, --mat, --parquet, or several of them"),
-        (b"no log", ["--csv"], "is no ULog"),
+        (b"", [], "choose a format: --mcap, --csv, --mat, --parquet, or several of them"),
+        (b"no log", ["--csv"], "is not a ULog"),
         (None, ["--csv"], "No such file or directory"),
     ],
 )

@@ -29,7 +29,7 @@ def test_it_is_interrupted_and_goes_on_though_a_worker_is_killed(tmp_path: Path,
         first.terminate()
         _, said = first.communicate(timeout=PATIENCE_S)
     assert first.returncode == 143
-    assert said == f"colibri: error: ended by SIGTERM; what was flown is in {out}: go on with --resume\n"
+    assert said == f"colibri: error: ended by SIGTERM; finished flights are in {out}: continue with --resume\n"
     kept = rows(out, 3)
     assert kept < 40
     assert len(tables_in(out)[0].splitlines()) == kept + 1

@@ -52,7 +52,7 @@ def test_a_line_that_is_none_is_named(begun: Path) -> None:
 
 
 def test_it_goes_on_only_where_that_was_asked_for(begun: Path) -> None:
-    with pytest.raises(CampaignError, match="out has 2 of the 2 flights of this campaign: go on with --resume, or"):
+    with pytest.raises(CampaignError, match="out has 2 of the 2 flights of this campaign: continue with --resume, or"):
         opened(begun, resume=False)
 
 
@@ -99,7 +99,7 @@ def test_the_law_of_a_profile_that_changed_is_another_campaign(
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("", encoding="utf-8")
-    with pytest.raises(CampaignError, match="is not empty, and has no campaign in it: choose another folder"):
+    with pytest.raises(CampaignError, match="is not empty and does not contain a campaign: choose another folder"):
         opened(tmp_path)
 
 

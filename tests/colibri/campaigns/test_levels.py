@@ -88,15 +88,18 @@ def test_what_a_file_has_as_levels_can_be_replaced(tmp_path: Path) -> None:
     ("tables", "said"),
     [
         ({"grid": {"track": ["hover"], "plant": {"heavy": {"mass": 1.0}}}}, 'unknown factor "mass" '),
-        ({"grid": {"track": {"one": {"profile": "se3"}}}}, "track: a factor with levels needs a name of its own"),
+        (
+            {"grid": {"track": {"one": {"profile": "se3"}}}},
+            "track: a factor with levels needs ",
+        ),
         (
             {"grid": {"track": ["hover"], "verdict": {"one": {}}}},
             "verdict: the table would have two columns of that name",
         ),
-        ({"grid": {"track": ["hover"], "plant": {"one": {"duration": 1.0}}}}, "duration is said twice"),
-        ({"grid": {"track": ["hover"], "a": {"x": {MASS: 1}}, "b": {"x": {MASS: 2}}}}, f"{MASS} is said twice"),
-        ({"grid": {"plant": {"one": {"link": "memory"}}}}, "link is no factor"),
-        ({"grid": {"plant": {"one": {}}}}, "no track: say which is flown"),
+        ({"grid": {"track": ["hover"], "plant": {"one": {"duration": 1.0}}}}, "duration is given twice"),
+        ({"grid": {"track": ["hover"], "a": {"x": {MASS: 1}}, "b": {"x": {MASS: 2}}}}, f"{MASS} is given twice"),
+        ({"grid": {"plant": {"one": {"link": "memory"}}}}, "link is not a factor"),
+        ({"grid": {"plant": {"one": {}}}}, "no track: add one"),
     ],
 )
 def test_what_is_no_level_is_refused_in_one_line(tables: dict[str, Any], said: str) -> None:

@@ -95,7 +95,7 @@ def test_the_summary_has_quantiles_of_what_came_through(tmp_path: Path) -> None:
 
 
 def test_a_metric_that_was_not_kept_is_refused() -> None:
-    with pytest.raises(CampaignError, match="metric effort_n_m was not kept: there are rmse_m, max_tilt_deg"):
+    with pytest.raises(CampaignError, match="metric effort_n_m is not in the table: choose rmse_m, max_tilt_deg"):
         made().plot("effort_n_m")
 
 

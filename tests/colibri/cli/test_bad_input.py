@@ -45,7 +45,10 @@ BAD_OPTIONS = [
     ("spiral --speed 0", "--speed: must be a number above 0, or max, not 0"),
     ("spiral --link carrier-pigeon", '--link: unknown value "carrier-pigeon" '),
     ("spiral --without gravity", '--without: unknown value "gravity" (choose '),
-    ("spiral --wind 5m/s@west", "argument --wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not 5m/s@west"),
+    (
+        "spiral --wind 5m/s@west",
+        "argument --wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not 5m",
+    ),
     (
         "spiral --wind 5@400",
         "argument --wind: the speed must not be negative, the direction 0 to 360 degrees, not 5@400",
@@ -54,10 +57,10 @@ BAD_OPTIONS = [
     ("spiral --wind /none/wind.csv", "argument --wind: /none/wind.csv: No such file or directory"),
     (
         "spiral --gust 6@270",
-        "argument --gust: must be SPEED@FROM:start=S,duration=S, 6@270:start=10,duration=2 say, not 6@270",
+        "argument --gust: must be SPEED@FROM:start=S,duration=S, for example 6@270:start=10,duration=2, not 6@270",
     ),
     ("spiral --turbulence terrible", 'argument --turbulence: unknown value "terrible" (choose '),
-    ("spiral --start x=1,y", "--start: y: must be a number, not nothing"),
+    ("spiral --start x=1,y", "--start: y: must be a number, not empty"),
     ("spiral --start z=high", "argument --start: z: must be a number, not high"),
     ("spiral --start psi=nan", "argument --start: psi: must be a number, not nan"),
     ("spiral --start z=1,roll=3", 'unknown key "roll" (choose x, y, z, phi, theta, psi, vx, vy, vz, p, q, r, rotors'),

@@ -16,7 +16,7 @@ from tools.harness.ports import bound_socket
 from tools.harness.processes import THESIS_PLANT, wait_for
 
 COLIBRI = (sys.executable, "-m", "colibri")
-KEPT = "; what was logged is in {}"
+KEPT = "; logs are in {}"
 
 
 @pytest.mark.parametrize(

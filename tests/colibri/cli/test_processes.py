@@ -55,7 +55,7 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path) -> None:
     os.killpg(flight.pid, signal.SIGINT)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 130
-    assert said.splitlines()[-1] == f"colibri: error: interrupted; what was logged is in {tmp_path}"
+    assert said.splitlines()[-1] == f"colibri: error: interrupted; logs are in {tmp_path}"
     assert "Traceback" not in said
     assert not any(child.is_running() for child in children)
     flown = (tmp_path / "flight.csv").read_text(encoding="utf-8").splitlines()
@@ -70,7 +70,7 @@ def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str)
     victim.send_signal(signal.SIGKILL)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 1
-    expected = f"colibri: error: the {name} was killed by SIGKILL; what was logged is in {tmp_path}"
+    expected = f"colibri: error: the {name} was killed by SIGKILL; logs are in {tmp_path}"
     assert said.splitlines()[-1] == expected
     assert not any(child.is_running() for child in children)
 

@@ -22,7 +22,7 @@ def test_a_mission_without_a_vehicle_that_says_where_home_is(tmp_path: Path, ref
     mission = tmp_path / "there.plan"
     mission.write_text(MISSION, encoding="utf-8")
     said = refused("companion", mission, "--vehicle", LINK, "--wait", "0.01", "--out", tmp_path / "out")
-    assert "it has not said where that is" in said
+    assert "home position, which was not received" in said
 
 
 def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProcess[str]:
@@ -39,7 +39,7 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
         assert not any(sight.armed for sight in flown.seen.sights)
         late = companion(tmp_path / "late", flown.port, "hover", "--dry-run", "--wait", "0.3")
     assert ended.returncode == 0, ended.stderr
-    assert (late.returncode, "nothing came of" in late.stderr) == (1, True)
+    assert (late.returncode, "timed out" in late.stderr) == (1, True)
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert (report["stack"], report["setpoints"], report["in_order"]) == ("colibri", 0, True)
     rows = list(csv.DictReader((tmp_path / "out" / "companion.csv").read_text(encoding="utf-8").splitlines()))

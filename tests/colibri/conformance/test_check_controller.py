@@ -31,11 +31,11 @@ BAD: dict[type[laws.Good], tuple[str, set[str]]] = {
     laws.TooFast: ("limits", {"fast, in any direction", "far from the reference", "references that jump"}),
     laws.Half: ("interface", {"optional members in whole groups"}),
     laws.Forgetful: ("optional", {"charge_ah: charge taken from the battery"}),
-    laws.Tilted: ("optional", {"step_attitude: an attitude and a thrust in place of a place"}),
+    laws.Tilted: ("optional", {"step_attitude: an attitude and a thrust instead of a position"}),
     laws.LateLoading: ("optional", {"warm_up: compiled parts"}),
     laws.Drifting: ("flights", {"hover held, 8 s"}),
     laws.OfTwoTypes: ("restart", {"from its checkpoint, the same flight bit for bit"}),
-    laws.LostAnew: ("restart", {"begun anew in flight, charge and mass kept", "begun anew in flight, nothing kept"}),
+    laws.LostAnew: ("restart", {"restarted in flight, charge and mass kept", "restarted in flight, without a record"}),
 }
 
 
@@ -89,7 +89,7 @@ def test_each_bad_law_is_caught_by_its_check(law: type[laws.Good]) -> None:
 @pytest.mark.parametrize(
     ("law", "said"),
     [
-        (laws.Listed, "rotor_speeds is no array of four floats: ["),
+        (laws.Listed, "rotor_speeds is not an array of four floats: ["),
         (laws.NoAngles, "attitude_reference is not three finite angles: None"),
         (laws.NoDiagnostics, "AttributeError: 'NoneType' object has no attribute 'predicted'"),
     ],
@@ -102,7 +102,7 @@ def test_a_decision_of_other_types_is_a_failure_and_no_traceback(law: type[laws.
 def test_a_law_that_decides_by_chance_is_caught() -> None:
     assert "the same step twice" in {row.tried for row in tried(laws.Random, "memory").failed}
     caught = {row.tried for row in tried(laws.BuiltOtherwise, "memory").failed}
-    assert "the flight again by a law built anew" in caught
+    assert "the same flight by a new instance" in caught
     assert "the same step twice" not in caught
 
 

@@ -120,7 +120,7 @@ def test_what_it_raises_in_flight_is_raised_here() -> None:
     [
         ({"durations": 22}, 'unknown option "durations" (did you mean "duration"?)'),
         ({"colour": "red"}, 'unknown option "colour" (choose controller, delay, duration'),
-        ({"wind": "much"}, "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not much"),
+        ({"wind": "much"}, "wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not much"),
         ({"duration": -1}, "duration: must be a number above 0 s, not -1"),
         ({"start": {"height": 2.0}}, 'start: unknown key "height" (choose x, y, z'),
         ({"profile": "fligt"}, 'unknown profile "fligt" (did you mean "flight"?)'),

@@ -69,5 +69,5 @@ def test_a_campaign_names_options_and_factors_without_effect() -> None:
     assert fly_campaign(campaign, Here(), None).notes == [
         "no effect: seed (only sensors, and turbulence on drag, are random)",
         "no effect on some flights: wind (vehicle hummingbird has no drag)",
-        f"no effect: {idle} (flights that differ in nothing else are the same)",
+        f"no effect: {idle} (flights that differ only in these are identical)",
     ]

@@ -109,7 +109,7 @@ def test_a_flight_over_a_link_that_carries_nothing_ends() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         sitl = flights.begin()
         sitl.link.plant.down = True
-        with pytest.raises(SessionError, match="nothing passes between plant and autopilot"):
+        with pytest.raises(SessionError, match="no message passes between plant and autopilot"):
             sitl.step()
 
 
@@ -161,7 +161,7 @@ def test_wind_and_payload_change_in_flight() -> None:
 def test_a_world_that_there_is_not_is_refused() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         sitl = flights.begin()
-        with pytest.raises(ValueError, match="wind must be SPEED@FROM in m/s and degrees, 5@270 say, not west"):
+        with pytest.raises(ValueError, match="wind must be SPEED@FROM in m/s and degrees, for example 5@270, not west"):
             sitl.wind = "west"
         with pytest.raises(ValueError, match="payload_kg must be from 0 to 100, not -1"):
             sitl.payload_kg = -1

@@ -85,7 +85,7 @@ def test_a_refused_failure_says_what_is_possible(failure: tuple[Any, ...], reaso
         ({"vehicle": 3}, "vehicle: must be a name or a Vehicle, not int"),
         ({"params": 3}, "params: must be a Mapping, not int"),
         ({"params": "q"}, "params: must be KEY=VALUE,... in numbers, not q"),
-        ({"start": "q"}, "start: q: must be a number, not nothing"),
+        ({"start": "q"}, "start: q: must be a number, not empty"),
         ({"ground": {"loss": 7}}, "loss of a link must be from 0 to 1, not 7"),
         ({"ground": "down=1"}, 'ground: unknown fault "down" (choose corrupt, '),
     ],

@@ -182,7 +182,7 @@ def test_a_failure_is_reported_even_if_its_flight_is_not_kept(
         ("turbulence('light')", 'unknown mark "turbulence" (did you mean "sitl(turbulence=...)"?)'),
         ("sitl('iris')", "mark is sitl(NAME=VALUE, ...), not sitl('iris')"),
         ("sitl(winds='3@0')", 'unknown option "winds" (did you mean "wind"?)'),
-        ("wind('three')", "wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three"),
+        ("wind('three')", "wind: must be SPEED@FROM in m/s and degrees, for example 5@270, not three"),
         ("sitl(params={'NO_SUCH': 1.0})", 'unknown parameter "NO_SUCH" (choose *'),
         ("vehicle('no-such')", "*no-such*"),
     ],

@@ -51,7 +51,7 @@ def test_share_lost() -> None:
 def test_the_profile_as_it_is_must_be_measurable() -> None:
     with pytest.raises(TuningError, match="no flight of the profile as it is came through: why"):
         RMSE.worst([flown(0.0, 1.0, verdict=Verdict.LOST)], METRICS)
-    with pytest.raises(TuningError, match="rmse_m is not known of every flight: fly longer"):
+    with pytest.raises(TuningError, match="rmse_m is missing in some flights: fly longer"):
         RMSE.worst([flown(0.0, 1.0), flown(0.0, None)], METRICS)
     with pytest.raises(TuningError, match=r"rmse_m is -0\.5 in a flight: an objective must not be below zero"):
         RMSE.worst([flown(0.0, 1.0), flown(0.0, -0.5)], METRICS)

@@ -69,7 +69,7 @@ def test_it_is_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
         _, said = first.communicate(timeout=PATIENCE_S)
     assert first.returncode == 143
     out = tmp_path / "out"
-    assert said == f"colibri: error: ended by SIGTERM; what was tried is in {out}: go on with --resume\n"
+    assert said == f"colibri: error: ended by SIGTERM; finished trials are in {out}: continue with --resume\n"
 
 
 @pytest.mark.long

@@ -25,7 +25,7 @@ def test_comments_stay_and_numbers_change(tmp_path: Path) -> None:
     text = profile_file(base, profile_text("flight"), tuned, [POSITION, BLOCK, POLES], ["Tuned by hand."])
     assert text.startswith(
         "# Tuned by hand.\n"
-        "# Tuned, and what it was:\n"
+        "# Tuned numbers, with their original values:\n"
         f"#   {WEIGHTS}.position = 250.0  # 100.0\n"
         "#   controllers.lpv-mpc.plan.blocks.0 = 2  # 1\n"
         "#   controllers.lpv-mpc.guidance.poles = [-6.5, -8.0]  # [-7.0, -8.0]\n"

@@ -125,7 +125,7 @@ def test_an_order_is_said_again_until_it_is_answered(others: tuple[VehicleObserv
 def test_nobody_answers() -> None:
     observer = VehicleObserver()
     observer.land()
-    assert observer.telemetry.snapshot(0.0).texts == ("land: no vehicle is there",)
+    assert observer.telemetry.snapshot(0.0).texts == ("land: no vehicle connected",)
 
 
 def test_it_does_not_pass_for_a_ground_station() -> None:

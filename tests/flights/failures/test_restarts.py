@@ -103,7 +103,7 @@ def test_without_memory_a_vehicle_on_sensors_is_caught(sitl: Sitl, flying_s: flo
     assert sitl.flown(since_s)["z"].min() > height_m - 3.0
     assert sitl.speed_m_s < 0.2
     assert state(sitl) == HOLDING
-    assert sitl.said("restarted in the air, knowing nothing: found falling")
+    assert sitl.said("Restarted in flight without a record: falling")
 
 
 @pytest.mark.feedback("sensors")

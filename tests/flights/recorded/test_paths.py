@@ -52,5 +52,5 @@ def test_a_path_that_may_not_be_changed_ends_before_it_begins(
     assert ended.value.code == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "points.csv: leg 1 to 2 asks for a " in error
+    assert "points.csv: leg 1 to 2 needs a " in error
     assert not (tmp_path / "out").exists()

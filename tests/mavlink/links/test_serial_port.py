@@ -190,14 +190,14 @@ def test_what_cannot_be_opened_is_said_with_what_to_do(
     plain = tmp_path / "plain"
     plain.touch()
     for path, what in (
-        (tmp_path / "ttyACM9", "there is no such device; plug it in"),
+        (tmp_path / "ttyACM9", "no such device: plug it in"),
         (device.path, "another program has it"),
-        (plain, "it is no serial port"),
+        (plain, "not a serial port"),
     ):
         with pytest.raises(LinkError, match=f"^serial:{path}:{BAUD}: {what}"):
             open_ground_link(f"serial:{path}:{BAUD}")
     link.close()
-    with pytest.raises(LinkError, match="no such baud rate"):
+    with pytest.raises(LinkError, match="unsupported baud rate"):
         open_ground_link(f"serial:{device.path}:999999999999999")
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(LinkError, match=r"pyserial is not installed: pip install colibri-sitl\[serial\]$"):

@@ -343,7 +343,7 @@ def test_setting_the_current_item() -> None:
     ground.hear(FIRST, "MISSION_SET_CURRENT", *VEHICLE, 5)
     assert ground.set == [(5, False)]
     assert [message.name for message in ground.poll(4_000)] == ["MISSION_CURRENT"]
-    ground.refuses = Refusal("mission: there is none")
+    ground.refuses = Refusal("no mission")
     (text,) = ground.hear(FIRST, "MISSION_SET_CURRENT", *VEHICLE, 6)
     assert (text.name, ground.poll(4_000)) == ("STATUSTEXT", [])
 

@@ -211,7 +211,7 @@ def test_a_key_that_others_write_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "key"
     path.write_bytes(KEY)
     path.chmod(0o666)
-    with pytest.raises(SigningError, match=r"anybody can write it \(mode 0666\)"):
+    with pytest.raises(SigningError, match=r"writable by everyone \(mode 0666\)"):
         read_key(path)
 
 

@@ -68,7 +68,7 @@ def test_both_agree_in_free_flight_with_lag_drag_and_battery() -> None:
 def test_a_state_that_explodes_is_an_error(name: Integrator) -> None:
     vehicle = load_vehicle("hummingbird")
     spinning = (*(0.0,) * 3, 1e200, 1e200, 1e200, *(0.0,) * 3, 1.0, *(0.0,) * 3)
-    with pytest.raises(IntegrationError, match="the state has left what the model describes"):
+    with pytest.raises(IntegrationError, match="the state left the range of the model"):
         Physics(vehicle, name).step(World(0, spinning, (0.0,) * 4), ActuatorCommand(0, (0.0,) * 4, True), 100_000)
 
 

@@ -169,7 +169,7 @@ def test_the_process_answers_and_keeps_its_log(plant: Process, tmp_path: Path) -
     with closing(open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))) as link:
         frame = plant.wait_for("frame")
         assert (frame["frame_type"], frame["thrust_expo"]) == (6, pytest.approx(0.739, abs=1e-3))
-        assert frame["text"].endswith("; all of it by: colibri vehicle hummingbird --for ardupilot")
+        assert frame["text"].endswith("; all parameters: colibri vehicle hummingbird --for ardupilot")
         end, told = standing(), None
         for count in range(300):
             sent = request(count, pulses(told, TARGET_NED_M) if told else (1000,) * 4)

@@ -211,7 +211,7 @@ def test_a_px4_and_then_another_hover_over_tcp(tmp_path: Path) -> None:
         url = process.wait_for("listening")["url"].replace("tcpin", "tcp")
         sensors = process.wait_for("sensors")
         assert sensors["gps_delay_ms"] == 200
-        assert "SENS_GPS0_DELAY 200; all of it by: colibri vehicle jmavsim --for px4" in sensors["text"]
+        assert "SENS_GPS0_DELAY 200; all parameters: colibri vehicle jmavsim --for px4" in sensors["text"]
         for number in (1, 2):
             px4, link = Px4(), open_ground_link(url)
             wait_for(partial(_connected, link), "a connection")
@@ -268,4 +268,4 @@ def test_a_vehicle_without_sensors_is_refused_in_one_line(tmp_path: Path) -> Non
     )
     with running(process):
         assert process.wait() == 2
-    assert process.errors().splitlines()[-1].endswith("has no sensors: PX4 flies a vehicle with a table sensors")
+    assert process.errors().splitlines()[-1].endswith("has no sensors: choose one with a table sensors")

@@ -87,7 +87,7 @@ def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) ->
             break
         legs_s = (1.0 + min(max(0.2 * beyond, _SLOWER[0]), _SLOWER[1])) * legs_s
         if legs_s.sum() > MAX_DURATION_S:
-            raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it asks for a {worst}")
+            raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it needs a {worst}")
     top_m_s = np.sqrt((motion.velocity * motion.velocity).sum(axis=1).max())
     share = demands[0].values.max() / demands[0].limit
     return track, f"fastest: {track.duration_s:.2f} s, up to {top_m_s:.1f} m/s and {share:.0%} of the thrust"

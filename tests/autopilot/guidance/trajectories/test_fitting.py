@@ -108,7 +108,7 @@ def test_a_track_that_is_too_fast_is_slowed_down(tmp_path: Path) -> None:
         (DIPS.replace("1.447", "-1.4"), "waypoint 8 is at -1.4 m, below the floor of 0 m"),
         ("x,y,z,t\n0,0,3,0\n0,0,0.2,2\n9,0,0.2,12\n9,0,5,13\n", "leg 2 to 3 dips to -169.38 m, below the floor of "
          "0 m: add a waypoint there, or leave column t out"),
-        (UP_AND_DOWN, "leg 1 to 2 asks for a thrust of -35.4 N a rotor, where 0.0488 is the least: give it more time, "
+        (UP_AND_DOWN, "leg 1 to 2 needs a thrust of -35.4 N a rotor, where 0.0488 is the least: give it more time, "
          "or leave column t out"),
     ],
 )  # fmt: skip

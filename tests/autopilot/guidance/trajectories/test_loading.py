@@ -46,7 +46,7 @@ def test_a_formula_beyond_the_limits_is_flown_as_it_is_and_said() -> None:
     t = np.linspace(0.0, 3.0, 50)
     assert (position(fast.track, t) == position(track("lemniscate:lap=3"), t)).all()
     assert fast.note == (
-        "track lemniscate:lap=3 asks for more than there is: thrust of 6.87 N a rotor, where 3.5 is the most; "
+        "track lemniscate:lap=3 exceeds the limits: thrust of 6.87 N a rotor, where 3.5 is the most; "
         "tilt of 75.4 degrees, where 70 is the most; body rate of 15.3 rad/s, where 10 is the most"
     )
 
@@ -95,10 +95,10 @@ def test_samples_may_say_which_way_to_look(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "column", "value", "why"),
     [
-        (5, 5, "0", "line 6, column y: goes by 0.195 m from the line before, and vy by 0.0996: the columns contradict, "
-         "or rows are far apart"),
+        (5, 5, "0", "line 6, column y: goes by 0.195 m from the line before, and vy by 0.0996: the columns disagree, "
+         "or the rows are too far apart"),
         (5, 7, "9", "line 6, column vx: goes by -0.04 m/s from the line before, and ax by 0.208: the columns "
-         "contradict, or rows are far apart"),
+         "disagree, or the rows are too far apart"),
         (3, 0, "0.05", "line 4, column t: must be at least 0.001 s after the line before"),
         (3, 3, "", "line 4, column z: expected a number from -10000 to 10000, not ''"),
     ],
@@ -132,12 +132,12 @@ def test_a_foreign_track_may_return_constants(fly_theirs: FlyTheirs) -> None:
     ("wrong", "options", "why"),
     [
         (("class Helix", "class Other"), "", "track helix (their_track:Helix) cannot be loaded: "),
-        (("class Helix(TrackOptions)", "class Helix"), "", "track helix: <class 'their_track.Helix'> is no subclass of "
-         "colibri.TrackOptions"),
+        (("class Helix(TrackOptions)", "class Helix"), "", "track helix: <class 'their_track.Helix'> is not a subclass "
+         "of colibri.TrackOptions"),
         (("angle.cos()", "np.cos(angle)"), "", "track helix: Helix: NameError: name 'np' is not defined"),
         (("return Track(position, duration_s=60.0)", "return 3"), "", "track helix: Helix: AttributeError: "),
         (("self.climb * t", "self.climb / 0.0 * t"), "", "track helix: Helix: ZeroDivisionError: "),
-        (("", ""), ":width=3", "track helix has no option width: choose radius, climb"),
+        (("", ""), ":width=3", 'track helix: unknown option "width" (choose radius, climb)'),
         (("", ""), ":radius=x", "track helix: radius=x: Expected `float`, got `str`"),
         (("", ""), ":climb=-1", "track helix:climb=-1 is at -58.99 m after 59.99 s, below the floor of 0 m"),
     ],

@@ -27,7 +27,7 @@ def test_the_five_of_the_thesis() -> None:
         ("hover:2", "track hover: options are KEY=VALUE[,KEY=VALUE…], not '2': choose x, y, height, yaw"),
         ("hover:x=1,", "track hover: options are KEY=VALUE[,KEY=VALUE…], not 'x=1,': choose x, y, height, yaw"),
         ("hover:x=1,x=2", "track hover: x is given twice"),
-        ("hover:z=1", "track hover has no option z: choose x, y, height, yaw"),
+        ("hover:z=1", 'track hover: unknown option "z" (choose x, y, height, yaw)'),
         ("circle:radius=0", "track circle: radius=0: Expected `float` >= 0.01"),
         ("circle:speed=fast", "track circle: speed=fast: Expected `float`, got `str`"),
         ("hover:height=nan", "track hover: height=nan: Expected `float` >= -1000.0"),

@@ -48,7 +48,7 @@ def test_times_from_a_speed_halve_it_on_the_end_legs(tmp_path: Path, speed: floa
         ("x,y,z\n1,2,nan\n1,2,3\n", "line 2, column z: expected a number from -10000 to 10000, not 'nan'"),
         ("x,y,z\n1,2,3\n1,2,1e5\n", "line 3, column z: expected a number from -10000 to 10000, not '1e5'"),
         ("x,y,z\n1,2,3\n\n1,2\n", "line 4, column z: missing"),
-        ("x,y,z\n1,2,3,4\n", "line 2, column 4: has no name in the header"),
+        ("x,y,z\n1,2,3,4\n", "line 2, column 4: is not named in the header"),
         ("x,y,z,t\n1,2,3,1\n1,2,4,2\n", "line 2, column t: the first time must be 0, not 1"),
         ("x,y,z,t\n1,2,3,0\n1,2,4,2\n1,2,5,2\n", "line 4, column t: must be at least 0.05 s after the line before"),
         ("x,y,z,t\n1,2,3,0\n1,2,4,-2\n", "line 3, column t: must be at least 0.05 s after the line before"),
@@ -74,7 +74,7 @@ def test_rounded_times_at_20_hz_are_accepted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("options", "what"), [("speed=2", "speed"), ("speed=max", "speed"), ("margin=0.1", "margin")])
 def test_what_changes_times_is_refused_beside_them(tmp_path: Path, options: str, what: str) -> None:
     path = write(tmp_path, "x,y,z,t\n1,2,3,0\n1,2,4,2\n")
-    with pytest.raises(TrackError, match=f"line 1, column t: says when to be where, so leave {what} out"):
+    with pytest.raises(TrackError, match=f"line 1, column t: sets the times: leave {what} out"):
         track(f"waypoints:{path},{options}")
 
 
