@@ -92,7 +92,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
             COMMANDED[name],
             name=f"{name}-over-a-rough-link",
             peer="ours: 30 % lost and 50 ms of jitter, each way",
-            holds=f"as without: {COMMANDED[name].holds}",
+            holds="as on a good link",
             steps=(do.trouble("ground", **ROUGH), *COMMANDED[name].steps),
         )
         for name in OVER_A_ROUGH_LINK
