@@ -113,7 +113,8 @@ def _slowed(name: str, power: float) -> Callable[[Capability, Any], Any]:
 
 
 def _acceleration(vehicle: Capability, ratios: LpvMpcScaling) -> float:
-    return min(ratios.acceleration * vehicle.climb_m_s2, ratios.max_g * vehicle.gravity_m_s2)
+    most = min(ratios.acceleration * vehicle.climb_m_s2, ratios.max_g * vehicle.gravity_m_s2)
+    return most / sqrt(_slow(vehicle, ratios))
 
 
 def _approach_speed(vehicle: Capability, ratios: LpvMpcScaling) -> float:
@@ -127,7 +128,7 @@ def _max_rate(vehicle: Capability, ratios: LpvMpcScaling) -> list[float]:
 
 _LPV_MPC = {
     "guidance.poles": Row("poles / √slow", _slowed("poles", -0.5)),
-    "guidance.max_acceleration_m_s2": Row("acceleration × climb, at most max_g × g", _acceleration),
+    "guidance.max_acceleration_m_s2": Row("(acceleration × climb, at most max_g × g) / √slow", _acceleration),
     "guidance.approach_speed_m_s": Row("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
     "observer.acceleration_rad_s": Row("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
     "observer.moment_rad_s": Row("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),
@@ -135,7 +136,7 @@ _LPV_MPC = {
     "observer.max_moment_n_m": Row("lost_lift × lift", lambda vehicle, ratios: ratios.lost_lift * vehicle.lift_n_m),
     "plan.max_rate_rad_s": Row("√(2 turn_rad × turn), at most max_rate_rad_s", _max_rate),
     "weights.position": Row("position / √slow", _slowed("position", -0.5)),
-    "weights.rate": Row("rate × slow^2.5", _slowed("rate", 2.5)),
+    "weights.rate": Row("rate × slow³", _slowed("rate", 3.0)),
     "fallback.poles": Row("fallback_poles / √slow", _slowed("fallback_poles", -0.5)),
     "fallback.turn_1_s": Row("turn_1_s / slow", _slowed("turn_1_s", -1.0)),
     "fallback.rate_1_s": Row("rate_1_s / slow", _slowed("rate_1_s", -1.0)),
