@@ -147,6 +147,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     stepped: Annotated[
         str | None, Option("a program that speaks for all ground stations, frame by frame (for tests)", "URL")
     ] = None
+    tlog: Annotated[bool, Option("append the frames of ground stations to flight.tlog in --out, too")] = False
     home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
     identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
     state: Annotated[Path | None, Option("folder of parameters, logs and files (default: not kept)", "DIR")] = None

@@ -10,6 +10,10 @@ class Error(Exception):
     mistake in this program is another exception, with a traceback.
     """
 
+    def __str__(self) -> str:
+        """Return the message, or without one the name of the class: no line is empty."""
+        return super().__str__() or type(self).__name__
+
 
 class ForeignError(Error):
     """An exception of another package's code, `__cause__`, shown with its traceback."""

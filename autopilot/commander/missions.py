@@ -30,6 +30,8 @@ _PLACE_US = 2.0
 _ON_THE_GROUND = (mav.MAV_CMD_NAV_LAND, mav.MAV_CMD_DO_SET_HOME)
 _NONE = Refusal()
 _MOVED_M = 1.0
+_AT_HOME_M = 2.0
+_HOME_FIRST = "item 0 is home, as in ArduPilot: leave it out"
 
 
 class Missions:
@@ -205,7 +207,8 @@ class Missions:
         self.unmet = {need: reason for need, reason in reasons.items() if reason}
         away = "" if Need.WITHIN_REACH in self.unmet else _first(found, lambda place: far(place, home.position_enu_m))
         low = "" if Need.ABOVE_GROUND in self.unmet else _first(flown, lambda place: home.remark(place[2]))
-        self._remarks = tuple(filter(None, (away and f"{away} from home", low)))
+        hint = _HOME_FIRST if _is_home_first(flown, home.position_enu_m, low or reasons[Need.ABOVE_GROUND]) else ""
+        self._remarks = tuple(filter(None, (away and f"{away} from home", low, hint)))
         for text in (*self.unmet.values(), *self._remarks):
             if text not in said:
                 self._lines.say(WARNING, text)
@@ -214,6 +217,14 @@ class Missions:
 def _first(found: Iterable[tuple[int, Vector]], fault: Callable[[Vector], str]) -> str:
     """Return the first item whose place has a fault; empty if none has."""
     return next((_of_item(seq, reason) for seq, place in found if (reason := fault(place))), "")
+
+
+def _is_home_first(flown: Sequence[tuple[int, Vector]], home_enu_m: Vector, fault: str) -> bool:
+    """Whether item 0 is home, as in files of ArduPilot, and its height is a fault."""
+    first = flown[0] if flown else None
+    if first is None or first[0] != 0 or not fault.startswith(_of_item(0, "")):
+        return False
+    return max(abs(first[1][0] - home_enu_m[0]), abs(first[1][1] - home_enu_m[1])) < _AT_HOME_M
 
 
 def _of_item(seq: int, reason: str) -> str:

@@ -19,6 +19,7 @@ from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
+from colibri.autopilot.process.station_traffic import StationTraffic
 from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
 from colibri.autopilot.spec import AutopilotSpec
 from colibri.common.process.log_files import LogError
@@ -75,6 +76,7 @@ class GroundService:
                 status.say("track", note)
         self.errors = ErrorLog(spec.out or spec.state, status)
         self._log: AutopilotLog | None = None
+        self._traffic = StationTraffic(spec.out, spec.boot_unix_us) if spec.out and spec.tlog else None
         self._recorded_snapshot: TelemetrySnapshot | None = None
         self._texts: deque[str] = deque(maxlen=MAX_SAID)
         self.autopilot = self._new_autopilot(self._state.history())
@@ -109,6 +111,9 @@ class GroundService:
         """Answer ground stations last: acknowledged changes are then on disk, even if the process is killed."""
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
+        passed: list[bytes] = []
+        if self._traffic and received:
+            received = _noting(received, passed)
         if self._log and received:
             received = self._recorded(self._log, received)
         outbox = self.autopilot.serve(received)
@@ -117,10 +122,19 @@ class GroundService:
             self._restart(stations.system.restart)
         self.copter.guard(table.PROCESS, self._look_after, lambda: None, now_s)
         self._links.send(outbox)
+        if self._traffic:
+            self._log_traffic(self._traffic, [*passed, *(outgoing.datagram for outgoing in outbox)])
         records = self.copter.defence.take()
         if records:
             self.errors.write(records)
         return self.autopilot
+
+    def _log_traffic(self, traffic: StationTraffic, datagrams: list[bytes]) -> None:
+        try:
+            if datagrams:
+                traffic.write(self.copter.pilot.context().now_us, datagrams)
+        except LogError as error:
+            self._status.say("said", f"{error}; flying on")
 
     def _record_told(self) -> None:
         stations = self.copter.stations
@@ -176,6 +190,8 @@ class GroundService:
         self.copter.stations.log.close()
         self._state.save_signing()
         self._links.close()
+        if self._traffic:
+            self._traffic.close()
         self._state.close()
 
     def abandon(self) -> None:
@@ -276,3 +292,9 @@ def _invitation(url: str) -> str:
         if calls
         else f"waits for ground stations on {rest} ({scheme})"
     )
+
+
+def _noting(received: Iterable[Received], datagrams: list[bytes]) -> Iterator[Received]:
+    for each in received:
+        datagrams.append(each.datagram)
+        yield each

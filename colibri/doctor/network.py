@@ -24,7 +24,7 @@ def loopback() -> Finding:
             here.sendto(b"colibri", there.getsockname())
             there.recv(16)
         except OSError as error:
-            why = str(error)
+            why = str(error) or type(error).__name__
             return Finding("loopback", Severity.FAILED, f"UDP over {HOST}: {why}", "bring it up: ip link set lo up")
     return Finding("loopback", Severity.FINE, f"UDP over {HOST} arrives")
 

@@ -143,6 +143,7 @@ def _start_autopilot(member: Member, spec: FleetSpec) -> None:
         AutopilotSpec,
         plant=member.plant_url.replace("udpin", "udpout"),
         gcs=tuple(member.links),
+        tlog=True,
         state=spec.state / str(member.instance),
         **_common(member, spec),
     )

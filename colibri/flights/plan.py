@@ -184,7 +184,8 @@ class FlightPlan:
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
         """Return the specification of the autopilot, which calls the plant."""
-        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m)
+        tlog = self.spec.tlog or bool(self.spec.gcs)
+        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog)
 
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:

@@ -64,8 +64,8 @@ class BlockLog(LogFile):
 
     BLOCK = 64
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
+    def __init__(self, path: Path, how: Literal["wb", "ab"] = "wb") -> None:
+        super().__init__(path, how)
         self._waiting: list[bytes] = []
 
     def add(self, record: bytes) -> None:

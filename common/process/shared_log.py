@@ -20,7 +20,7 @@ class SharedLog(LogFile):
                 self._file.truncate(0)
             if self._file.seek(0, 2) == 0:
                 self.append(beginning)
-            _share(self._file.fileno())
+            share(self._file.fileno())
         except OSError as error:
             raise LogError(f"cannot write {path}: {error.strerror}") from error
 
@@ -36,13 +36,14 @@ def _is_alone(file: int) -> bool:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        _share(file)
+        share(file)
         return False
     except OSError:
         return False
     return True
 
 
-def _share(file: int) -> None:
+def share(file: int) -> None:
+    """Mark an open file as one with several writers."""
     with suppress(OSError):
         fcntl.flock(file, fcntl.LOCK_SH)

@@ -2,13 +2,17 @@
 
 import struct
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 from colibri.common.process.log_files import BlockLog
+from colibri.common.process.shared_log import share
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.framing import frame_length
 
 STAMP = struct.Struct(">Q")
+TRAFFIC = "flight.tlog"
+"""Its name in the folder of a flight."""
 
 
 class Logged(NamedTuple):
@@ -37,7 +41,12 @@ def decode(log: bytes) -> Iterator[Logged]:
 
 
 class TlogWriter(BlockLog):
-    """A telemetry log written in blocks."""
+    """A telemetry log written in blocks; a `shared` one goes on, and has several writers."""
+
+    def __init__(self, path: Path, *, shared: bool = False) -> None:
+        super().__init__(path, "ab" if shared else "wb")
+        if shared:
+            share(self._file.fileno())
 
     def write(self, time_us: int, frames: list[bytes]) -> None:
         if frames:

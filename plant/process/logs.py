@@ -11,11 +11,9 @@ from colibri.mavlink.ulog.flight_topics import TRUTH
 from colibri.mavlink.ulog.log import FileLog, TopicLog
 from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
-from colibri.mavlink.wire.tlog import TlogWriter
+from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 from colibri.plant.physics.world import World
 from colibri.plant.vehicle.description import Vehicle
-
-TRAFFIC = "flight.tlog"
 
 
 def truth_row(world: World) -> tuple[float, ...]:
@@ -51,9 +49,10 @@ class PlantLogs:
     def _open(self) -> None:
         path = self._folder / FILE
         remove_unused(path)
+        remove_unused(self._folder / TRAFFIC)
         self._log = FileLog(partial(SharedLog, path, beginning(self._vehicle.name, {}), goes_on=True))
         self._truth = TruthLog(self._log, self._vehicle)
-        self._tlog = TlogWriter(self._folder / TRAFFIC) if self.has_tlog else None
+        self._tlog = TlogWriter(self._folder / TRAFFIC, shared=True) if self.has_tlog else None
 
     def begin_again(self) -> None:
         """Rename the files to `flight-1.ulg`, `flight-1.tlog` and so on, and begin others."""

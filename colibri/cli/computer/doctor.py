@@ -14,7 +14,8 @@ def add_options(parser: ArgumentParser) -> None:
         nargs="?",
         const=GCS,
         metavar="URL",
-        help=f"call a ground station as a vehicle does, and wait for its heartbeat (default {GCS})",
+        help="call a ground station as a vehicle does, and wait for its heartbeat: "
+        f"udpout:, udpin:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD (default {GCS})",
     )
     add("--within", type=positive, default=10.0, metavar="S", help="how long to wait for it (default %(default)s)")
 

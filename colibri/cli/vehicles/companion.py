@@ -18,7 +18,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--vehicle",
         required=True,
         metavar="URL",
-        help="how the vehicle is reached: udpin:, udpout:, tcp: or tcpin:HOST:PORT",
+        help="how the vehicle is reached: udpin:, udpout:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD",
     )
     add("--system", type=natural, default=0, metavar="ID", help="MAVLink system id, where several are on the link")
     add("--model", metavar="NAME", help="vehicle name or .toml that describes it (default: the profile's)")

@@ -7,7 +7,7 @@ from colibri.cli.shared.beside import loading_viser, say
 from colibri.common.process.arguments import ArgumentParser, natural
 from colibri.common.process.lifecycle import fail
 
-_LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:")
+_LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:", "serial:")
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -17,7 +17,7 @@ def add_options(parser: ArgumentParser) -> None:
         nargs="+",
         metavar="FOLDER|LINK",
         help="flights by their folders, written by `colibri fly` (several are shown together); or a link to a "
-        "MAVLink vehicle, for example udpin:127.0.0.1:14550",
+        "MAVLink vehicle: udpin:, udpout:, tcp: or tcpin:HOST:PORT, or serial:DEVICE:BAUD",
     )
     add("--port", type=natural, default=0, metavar="N", help="of the page, on loopback (default: any that is free)")
     add("--export", type=Path, metavar="FILE.html", help="write flights as one file that plays them, and end")

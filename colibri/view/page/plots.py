@@ -17,6 +17,9 @@ _SERIES = ("#1e6ed2", "#e67814", "#28964a", "#963caa", "#c8282d", "#606060")
 _LIMIT = "#9a9a9a"
 _NOW = "#d01080"
 _AXIS_PX = 44
+_MARK = "mark"
+_UNSEEN = -1e4
+"""So far below the scale of 0 to 1 that what is seen of the way up is a vertical line."""
 
 
 class Plots:
@@ -46,7 +49,7 @@ class Plots:
             return
         for handle, data in self._shown.values():
             times_s, *values, _ = data
-            handle.data = (times_s, *values, _spike(times_s, values, time_s))
+            handle.data = (times_s, *values, _spike(times_s, time_s))
 
     def _add(self, title: str, data: tuple[Array, ...], series: tuple[uplot.Series, ...]) -> Any:
         return self._gui.add_uplot(
@@ -54,7 +57,7 @@ class Plots:
             series,
             title=title,
             height=HEIGHT_PX,
-            scales={"x": uplot.Scale(time=False)},
+            scales={"x": uplot.Scale(time=False), _MARK: uplot.Scale(auto=False, range=(0.0, 1.0))},
             axes=(uplot.Axis(size=28), uplot.Axis(size=_AXIS_PX)),
             legend=uplot.Legend(show=len(series) > 2 + self._marked, live=False),
             cursor=uplot.Cursor(show=True),
@@ -90,14 +93,13 @@ class Plots:
         seconds = uplot.Series(label="s")
         if not self._marked:
             return (times_s, *values), (seconds, *lines)
-        mark = uplot.Series(label="now", stroke=_NOW, width=1, points={"show": False})
-        return (times_s, *values, _spike(times_s, values, -np.inf)), (seconds, *lines, mark)
+        mark = uplot.Series(label="now", scale=_MARK, stroke=_NOW, width=1, points={"show": False})
+        return (times_s, *values, _spike(times_s, -np.inf)), (seconds, *lines, mark)
 
 
-def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
-    """Return a line with a peak at a time. A nan would break uPlot's scaling."""
-    low, high = (float(pick(values)) for pick in (np.min, np.max))
-    mark = np.full(len(times_s), low)
+def _spike(times_s: Array, time_s: float) -> Array:
+    """Return a line from far below its scale, where it is not drawn, to the top at a time. uPlot cannot scale nan."""
+    mark = np.full(len(times_s), _UNSEEN)
     if time_s >= times_s[0]:
-        mark[min(int(np.searchsorted(times_s, time_s)), len(times_s) - 1)] = high
+        mark[min(int(np.searchsorted(times_s, time_s)), len(times_s) - 1)] = 1.0
     return mark

@@ -118,11 +118,11 @@ def test_low_places_and_low_homes_are_warned_of() -> None:
     assert "488 m below the ground" in ask(flying(), "DO_SET_HOME", 0, LATITUDE, LONGITUDE, 0.0)[1]
 
 
-def made(command: int, frame: int, x: float, y: float) -> MissionItem:
+def made(command: int, frame: int, x: float, y: float, height_m: float = 5.0) -> MissionItem:
     """Return an item at degrees; all its parameters are 1."""
     x7, y7 = (NOT_GIVEN if isnan(degrees) else round(degrees * 1e7) for degrees in (x, y))
     p1 = 0.0 if command == mav.MAV_CMD_DO_SET_HOME else 3.0 if command in (5001, 5002) else 1.0
-    return MissionItem(frame, command, 1, p1, 1.0, 1.0, 1.0, x7, y7, 5.0)
+    return MissionItem(frame, command, 1, p1, 1.0, 1.0, 1.0, x7, y7, height_m)
 
 
 PLACED = sorted(
@@ -174,6 +174,23 @@ def test_a_moved_origin_or_home_is_told_of_with_the_mission() -> None:
     there = cockpit.place(0.0, 40_000.0)
     assert cockpit.do("DO_SET_HOME", 0.0, x=there.latitude_deg, y=there.longitude_deg, z=ALTITUDE_M).result == ACCEPTED
     assert cockpit.said("home: 96 km away")
+
+
+@pytest.mark.parametrize(
+    ("first", "hinted"),
+    [
+        (made(16, 0, LATITUDE, LONGITUDE, ALTITUDE_M), True),
+        (made(16, 0, LATITUDE, LONGITUDE, 0.0), True),
+        (made(16, 3, LATITUDE, LONGITUDE, 0.0), True),
+        (made(16, 3, LATITUDE, LONGITUDE, 10.0), False),
+        (made(16, 3, LATITUDE + 0.001, LONGITUDE, 0.0), False),
+        (made(22, 3, LATITUDE, LONGITUDE, 5.0), False),
+    ],
+)
+def test_home_as_item_0_gets_a_hint(first: MissionItem, hinted: bool) -> None:
+    cockpit = flying()
+    cockpit.load(MISSION, first, item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)))
+    assert cockpit.said("item 0 is home, as in ArduPilot: leave it out") is hinted
 
 
 NEAR, OUT, FAR = (25.0, 0.0, 5.0), (25.0, 60.0, 5.0), (25.0, 2_000_000.0, 5.0)

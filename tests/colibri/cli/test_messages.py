@@ -1,10 +1,15 @@
 """What the commands answer to input that they refuse: one line each, exit code 2, and not a flight folder."""
 
+import re
 import shlex
 from pathlib import Path
 
 import pytest
 
+from colibri.cli.shared.commands import COMMANDS
+from colibri.cli.shared.parser import subcommand
+from colibri.common.errors import Error, InFlightError
+from colibri.common.process.arguments import ArgumentParser
 from tests.support.commands import Refused
 
 LINK = "udpin:127.0.0.1:0"
@@ -161,3 +166,20 @@ def test_a_file_in_place_of_a_flight_is_refused(
     monkeypatch.chdir(tmp_path)
     Path("flight.tlog").touch()
     assert refused(command, "flight.tlog").startswith('"flight.tlog" is a file: expected the folder of a flight')
+
+
+def test_help_of_every_link_names_serial_ports() -> None:
+    links: dict[str, str] = {}
+    for name in COMMANDS:
+        parser = ArgumentParser()
+        subcommand(name).add_options(parser)
+        options = re.split(r"\n  (?=\S)", parser.format_help())
+        one_line = [" ".join(option.split()) for option in options]
+        links |= {f"{name} {option.split()[0]}": option for option in one_line if "tcp: or tcpin:" in option}
+    assert len(links) >= 5
+    assert [name for name, words in links.items() if "serial:" not in words] == []
+
+
+def test_no_error_is_empty() -> None:
+    assert str(Error()) == "Error"
+    assert str(InFlightError("lost")) == "lost"

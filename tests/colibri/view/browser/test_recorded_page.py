@@ -14,6 +14,7 @@ from colibri.view.recorded.flight import RecordedFlight
 from colibri.view.run import Show
 
 pytestmark = pytest.mark.view
+NOW = (0xD0, 0x10, 0x80)
 BLUE_OVER_RED = 60
 """By how much what is drawn of the first vehicle is bluer than it is red: nothing else in the middle is."""
 
@@ -56,7 +57,11 @@ def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: Recorde
         show.turn(4.0)
         tab_page.get_by_text("t 5.00 s").wait_for()
         tab_page.get_by_role("button", name="Play").wait_for()
-        picture = _middle(tab_page.screenshot())
+        shot = tab_page.screenshot()
+        now = np.abs(np.asarray(Image.open(BytesIO(shot)).convert("RGB"), dtype=int) - NOW).sum(axis=2) < 120
+        assert now.sum(axis=0).max() > 100, "a line upwards in each plot"
+        assert now.sum(axis=1).max() < 20, "and none along an axis"
+        picture = _middle(shot)
         assert np.count_nonzero(picture[:, :, 2] > picture[:, :, 0] + BLUE_OVER_RED) > 200
         assert not tab.complaints
 

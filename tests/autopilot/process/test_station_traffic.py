@@ -1,0 +1,40 @@
+"""The frames of ground stations in `flight.tlog`."""
+
+from pathlib import Path
+
+import pytest
+
+from colibri.autopilot.process import station_traffic
+from colibri.autopilot.process.station_traffic import StationTraffic
+from colibri.mavlink.wire.dialect import Codec
+from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter, decode
+
+CODEC = Codec(255, 190)
+BEAT = CODEC.encode("HEARTBEAT", 6, 8, 0, 0, 0, 3)
+KEY = CODEC.encode("SETUP_SIGNING", 1, 1, [*(5 * b"secret" + b"--")], 0)
+FAR = b"\xff" * 9
+
+
+def frames(folder: Path) -> list[tuple[int, bytes]]:
+    return [(each.time_us, each.frame) for each in decode((folder / TRAFFIC).read_bytes())]
+
+
+def test_whole_frames_are_kept_beside_those_of_the_plant_and_no_key(tmp_path: Path) -> None:
+    plant = TlogWriter(tmp_path / TRAFFIC, shared=True)
+    traffic = StationTraffic(tmp_path, 1_000_000)
+    plant.write(1, [BEAT])
+    traffic.write(5, [BEAT + BEAT, KEY + BEAT, b"", FAR, BEAT[:-1], BEAT + FAR])
+    traffic.write(9, [])
+    traffic.close()
+    plant.close()
+    assert sorted(frames(tmp_path)) == [(1, BEAT)] + 4 * [(1_000_005, BEAT)]
+    assert b"secret" not in (tmp_path / TRAFFIC).read_bytes()
+
+
+def test_a_flood_does_not_fill_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(station_traffic, "MAX_BYTES", 3 * len(BEAT))
+    traffic = StationTraffic(tmp_path, 0)
+    for _ in range(100):
+        traffic.write(1, [BEAT])
+    traffic.close()
+    assert len(frames(tmp_path)) == 3
