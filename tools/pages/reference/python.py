@@ -7,12 +7,27 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any, get_args
 
+from colibri.autopilot.spec import LawSpec
 from colibri.common.spec import Option, described, fields_of
+from colibri.flights import FlightSpec
+from colibri.plant.spec import WorldSpec
 from tools.pages.tables import cell, with_body
 
 FACES = ("colibri", "colibri.sitl")
 _SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
-_ENTRY = re.compile(r"^    (\*{0,2}\w+)(?: \(.*?\))?: (.*)$")
+_ENTRY = re.compile(r"^    (\*{0,2}\w+(?:, \w+)*)(?: \(.*?\))?: (.*)$")
+_OPTIONS_OF: dict[str, type] = {"colibri fly": FlightSpec, "colibri plant": WorldSpec, "colibri autopilot": LawSpec}
+_INTERNAL = {
+    "FlightPlan": "autopilot_spec plant_spec start_yaw_rad",
+    "Record": "add note",
+    "Setting": "autopilot_spec chosen delay_s law law_name load plant_spec started weather",
+    "FlightSpec": "chosen delay_s law law_name load pace started weather",
+    "Sitl": "begin fly_frame have_others_catch_up",
+    "Station": "add arriving check departing listen request",
+    "TuningResults": "add_check file_of headings save_verdict",
+    "CampaignResults": "groups headings through usual_metric",
+}
+"""Members that only Colibri's own packages call."""
 
 
 def _sections() -> Iterator[str]:
@@ -20,11 +35,21 @@ def _sections() -> Iterator[str]:
     for face in FACES:
         package = import_module(face)
         yield f"## {face}\n\n{inspect.getdoc(package)}\n"
-        for name in sorted(package.__all__, key=str.lower):
-            thing = getattr(package, name)
-            if id(thing) not in shown:
-                shown.add(id(thing))
+        things = {name: getattr(package, name) for name in sorted(package.__all__, key=str.lower)}
+        new = {name: thing for name, thing in things.items() if id(thing) not in shown}
+        shown.update(map(id, new.values()))
+        errors = {name: thing for name, thing in new.items() if _is_plain_error(thing)}
+        for name, thing in new.items():
+            if name not in errors:
                 yield from _thing(name, thing)
+        yield "### Errors\n\n| | |\n|---|---|"
+        for name, thing in errors.items():
+            yield f"| `{name}` | {cell(_sentence(inspect.getdoc(thing) or ''))} |"
+        yield ""
+
+
+def _is_plain_error(thing: Any) -> bool:
+    return inspect.isclass(thing) and issubclass(thing, Exception) and "Attributes:" not in (thing.__doc__ or "")
 
 
 def _thing(name: str, thing: Any) -> Iterator[str]:
@@ -41,19 +66,29 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
 
 
 def _options(kind: type) -> Iterator[str]:
-    if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
-        yield "| option | |\n|---|---|"
-        for name, field in fields_of(kind).items():
-            if field.option.keyword:
-                yield f"| `{name}` | {cell(described(field))} |"
-        yield ""
+    """Describe options of the class, and list those described with commands."""
+    if not (is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type))):
+        return
+    known = {name: field for name, field in fields_of(kind).items() if field.option.keyword}
+    commands = [command for command, spec in _OPTIONS_OF.items() if issubclass(kind, spec)]
+    commands = commands[:1] if kind is _OPTIONS_OF[commands[0]] else commands
+    inherited = {name: field for command in commands for name, field in fields_of(_OPTIONS_OF[command]).items()}
+    shared = {name for name in known if known[name] == inherited.get(name)}
+    links = ", ".join(f"[`{command}`](cli.md#{command.replace(' ', '-')})" for command in commands)
+    yield f"Options described in {links}: {', '.join(f'`{name}`' for name in known if name in shared)}.\n"
+    rows = [f"| `{name}` | {cell(described(field))} |" for name, field in known.items() if name not in shared]
+    if rows:
+        yield "| option | |\n|---|---|\n" + "\n".join(rows) + "\n"
 
 
 def _members(kind: type) -> Iterator[str]:
     rows = []
-    for name, member in inspect.getmembers(kind):
+    internal = _INTERNAL.get(kind.__name__, "").split()
+    members = dict(inspect.getmembers(kind))
+    assert members.keys() >= set(internal), f"{kind.__name__} lacks {set(internal) - members.keys()}"
+    for name, member in members.items():
         owner = next((base for base in kind.__mro__ if name in vars(base)), kind)
-        if name.startswith("_") or not owner.__module__.startswith("colibri."):
+        if name.startswith("_") or name in internal or not owner.__module__.startswith("colibri."):
             continue
         if inspect.isfunction(member) or inspect.ismethod(member):
             shown = _signature(name, member)
@@ -102,7 +137,8 @@ def _text(doc: str) -> str:
             in_section = True
             lines += [f"*{section[1]}*", ""]
         elif in_section and entry:
-            lines.append(f"- `{entry[1]}`: {entry[2]}")
+            names = ", ".join(f"`{name}`" for name in entry[1].split(", "))
+            lines.append(f"- {names}: {entry[2]}")
         elif in_section and line.startswith("        "):
             lines[-1] += f" {line.strip()}"
         else:
