@@ -4,4 +4,4 @@ from colibri.common.errors import Error
 
 
 class AutopilotError(Error):
-    """What cannot be flown: a profile, a control law, a solver, a track, parameters, what was kept."""
+    """A profile, control law, solver, track, parameter or stored state is unusable."""

@@ -1,4 +1,4 @@
-"""Colibri: a quadrotor autopilot by LPV model predictive control, and the plant it flies, over MAVLink."""
+"""Colibri: a multirotor autopilot with LPV model predictive control, and a plant, over MAVLink."""
 
 from typing import TYPE_CHECKING
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 
 class Error(Exception):
-    """Something that a user can put right; the message is the one line of what, where and how.
+    """A user's error; the message names input, value and remedy in one line.
 
     Each package has a base below it: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`, `CompanionError`. A
     mistake in this program is another exception, with a traceback.
@@ -20,7 +20,7 @@ class ForeignError(Error):
 
 
 class InFlightError(Error):
-    """A flight that was begun and could not be finished; its logs are kept."""
+    """The flight ended early; its logs are kept."""
 
 
 def unknown(what: str, given: object, known: Iterable[str]) -> str:

@@ -4,4 +4,4 @@ from colibri.common.errors import Error
 
 
 class PlantError(Error):
-    """The vehicle cannot be simulated, or not any further."""
+    """The vehicle cannot be simulated any further, or at all."""

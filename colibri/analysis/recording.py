@@ -76,7 +76,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class Recording(Samples):
-    """A whole flight in memory: at 125 Hz 0.04 MB a simulated second, and twice that during reading.
+    """A flight in memory: 0.04 MB a simulated second at 125 Hz, twice that during reading.
 
     Attributes:
         path_lag_s: Last lag of path time; `None` for a control law on the clock.

@@ -4,4 +4,4 @@ from colibri.common.errors import Error
 
 
 class SitlError(Error):
-    """A flight of a test or notebook cannot begin or go on, or fails."""
+    """A flight in a test or notebook fails."""

@@ -33,7 +33,7 @@ class RefusedError(SitlError):
 
     Attributes:
         result: MAV_RESULT, MAV_MISSION_RESULT or MAV_PARAM_ERROR.
-        text: Its STATUSTEXT lines about it.
+        text: The vehicle's STATUSTEXT lines about the refusal.
     """
 
     def __init__(self, what: str, result: int, text: str) -> None:
@@ -50,7 +50,7 @@ class SteppedVehicle(Stepped, Protocol):
 
 
 class Station(Inbox):
-    """A component on a link of its own; received messages are in `Inbox`.
+    """A MAVLink component with a separate link; received messages are in `Inbox`.
 
     A method that waits for an answer advances simulated time and repeats its request every half second; it raises
     `RefusedError` if the vehicle refuses, and `NotInTimeError` after `ANSWER_WITHIN_S`.

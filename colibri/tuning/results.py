@@ -56,7 +56,7 @@ class TuningResults:
 
     @property
     def is_better(self) -> bool:
-        """Whether an objective is better with 95 % confidence on `check_seeds`, and none worse."""
+        """Whether some objective is better with 95 % confidence on `check_seeds`, without a worse one."""
         return better(self.verdict)
 
     @property

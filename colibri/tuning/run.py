@@ -56,9 +56,7 @@ def tune(
     Args:
         file: TOML file of the tuning; keywords take precedence.
         out: Folder for profile, tables, figures and journal; by default no files are written.
-        workers: Processes; default one per core. In a script, call this under `if __name__ == "__main__":`, as each
-            process imports the script.
-        executor: A `distributed.Client` or the address of a Dask scheduler, instead of processes.
+        workers, executor: As in `campaign`.
         resume: Continue the tuning in `out`, or join running processes.
         watcher: Progress callbacks.
         tables: As in the file: `tune={"controllers.LAW.KEY": {"uniform": [2, 20]}}, objectives={"rmse_m": "mean"},

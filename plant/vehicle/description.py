@@ -189,18 +189,18 @@ class Vehicle(Table, frozen=True, kw_only=True):
 
     @property
     def hover_speed(self) -> float:
-        """Rotor speed at which four rotors carry the weight."""
+        """Rotor speed in hover."""
         weight_n = self.body.mass_kg * self.gravity_m_s2
         return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
 
     @property
     def hover_rpm(self) -> float:
-        """The same in turns per minute."""
+        """Rotor speed in hover, rpm."""
         return self.hover_speed / self.speed_from_rpm(1.0)
 
     @property
     def ground_height_m(self) -> float:
-        """Height of the ground, z of ENU: the vehicle at rest on its feet, a little sunk in, is at 0."""
+        """Height of the ground, z of ENU; at rest, feet slightly compressed, the vehicle is at 0."""
         if self.ground is None:
             return -inf
         load_n = self.body.mass_kg * self.gravity_m_s2 / len(self.ground.foot_position_m)

@@ -56,7 +56,7 @@ def track(name: str, text: str | None = None) -> Track:
 
 
 def track_names() -> list[str]:
-    """Return the names of all tracks: Colibri's own, then those of other packages."""
+    """Return the names of all tracks: built-in, then from other packages."""
     own = [*THESIS_TRACKS, *OPTIONS]
     return own + sorted({entry.name for entry in entry_points(group=GROUP)}.difference(own))
 

@@ -45,7 +45,7 @@ class Track:
             An endless track requires it, so that yaw depends on time alone.
         duration_s: Then the track rests at its last point; infinite for an endless track.
         waypoints: Waypoints, if the track between them may be changed.
-        note: What was derived from samples, for the user.
+        note: Quantities derived from samples, for the user.
     """
 
     position: Callable[[TaylorSeries], Place]
@@ -59,14 +59,14 @@ class Track:
             raise ValueError("a track without end needs a formula for its yaw")
 
     def clock(self, t: Array, order: int) -> TaylorSeries:
-        """Return the argument of the formulas at `t` (n,), s: it stops at the end of the track."""
+        """Return path time at `t` (n,), s, which stops at the end of the track."""
         ended = self.ended(t)
         time = TaylorSeries.time(np.where(ended, self.duration_s, t), order)
         time.coefficients[1:2, ended] = 0.0
         return time
 
     def ended(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times `t` (n,), s, the track has ended."""
+        """Return whether the track has ended, at each of `t` (n,), s."""
         ended: NDArray[np.bool_] = t > self.duration_s + _INSTANT_S
         return ended
 

@@ -45,20 +45,20 @@ class Setting(WorldSpec, LawSpec):
     The seed also seeds link faults. The default start is standing at the origin, facing north.
     """
 
-    vehicle: Annotated[str | Vehicle, Option("vehicle that the plant flies, name or .toml")] = "hummingbird"
-    believed: Annotated[str | Vehicle | None, Option("vehicle that the autopilot controls (default: the same)")] = None
+    vehicle: Annotated[str | Vehicle, Option("vehicle of the plant, name or .toml")] = "hummingbird"
+    believed: Annotated[str | Vehicle | None, Option("vehicle assumed by the autopilot (default: the same)")] = None
     airborne: Annotated[
         float | None,
         Option(
-            "picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed; with "
-            'feedback "state" only',
+            "start in mode HOLD at this height above the origin, rotors at hover speed, without a take-off; only with "
+            'feedback "state"',
             unit="m",
         ),
     ] = None
-    params: Annotated[Mapping[str, int | float], Option("parameters that were changed before", read=_numbers)] = field(
+    params: Annotated[Mapping[str, int | float], Option("changed parameters", read=_numbers)] = field(
         default_factory=dict
     )
-    track: Annotated[str | None, Option("flown from time 0 on; the vehicle must be in the air (default: none)")] = None
+    track: Annotated[str | None, Option("track from time 0 on; the vehicle must start in the air")] = None
     home: Annotated[HomePlace, Option("LAT,LON,ALT,YAW: the origin of the ENU frame", read=read_home)] = DEFAULT_HOME
     ground: Annotated[
         Mapping[str, float],
@@ -70,9 +70,9 @@ class Setting(WorldSpec, LawSpec):
     identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
     system: Annotated[int, Option("MAVLink system id", least=1, most=255)] = 1
     strict: Annotated[
-        bool, Option("what a part of the autopilot raises in flight fails the test, rather than being replaced")
+        bool, Option("fail the test if a part of the autopilot raises, instead of replacing it")
     ] = True
-    ready: Annotated[bool, Option("the flight is handed over only after the first HEARTBEAT")] = True
+    ready: Annotated[bool, Option("begin the test after the first HEARTBEAT")] = True
 
     def plant_spec(self) -> PlantSpec:
         """Return the specification of the plant."""

@@ -18,7 +18,7 @@ _SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
 _ENTRY = re.compile(r"^    (\*{0,2}\w+(?:, \w+)*)(?: \(.*?\))?: (.*)$")
 _OPTIONS_OF: dict[str, type] = {"colibri fly": FlightSpec, "colibri plant": WorldSpec, "colibri autopilot": LawSpec}
 _INTERNAL = {
-    "FlightPlan": "autopilot_spec plant_spec start_yaw_rad",
+    "FlightPlan": "autopilot_spec floor_m flown_by integrator plant_spec plant_vehicle_name start_yaw_rad vehicle_name",
     "Record": "add note",
     "Setting": "autopilot_spec chosen delay_s law law_name load plant_spec started weather",
     "FlightSpec": "chosen delay_s law law_name load pace started weather",
