@@ -69,9 +69,7 @@ class Setting(WorldSpec, LawSpec):
     ] = field(default_factory=dict)
     identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
     system: Annotated[int, Option("MAVLink system id", least=1, most=255)] = 1
-    strict: Annotated[
-        bool, Option("fail the test if a part of the autopilot raises, instead of replacing it")
-    ] = True
+    strict: Annotated[bool, Option("fail the test if a part of the autopilot raises, instead of replacing it")] = True
     ready: Annotated[bool, Option("begin the test after the first HEARTBEAT")] = True
 
     def plant_spec(self) -> PlantSpec:
