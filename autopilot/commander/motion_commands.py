@@ -104,7 +104,9 @@ class MotionCommands:
         if not isnan(command.z):
             up_m = self._height_of_takeoff(command)
         if not ground_m + MIN_CLIMB_M <= up_m < MAX_HEIGHT_M:
-            return denied("take-off", f"{up_m - ground_m:g} m above the ground is not within {MIN_CLIMB_M:g} to 10 km")
+            return denied(
+                "take-off", f"{up_m - ground_m:g} m above the ground is not within {MIN_CLIMB_M:g} to {MAX_HEIGHT_M:g}"
+            )
         context = pilot.context()
         x, y, _ = context.place
         refusal = self._fence.refusal((x, y, up_m))

@@ -154,7 +154,7 @@ class StreamService:
         elif self._is_known(message_id):
             interval_us = -1
         else:
-            return Refusal(f"interval refused: {_named(message_id, asked)} is not streamed", UNSUPPORTED)
+            return Refusal(f"no interval: {_named(message_id, asked)} is not streamed", UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
 
     def _request_message(self, command: ReceivedCommand) -> Refusal | None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES, places
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem, fault_of
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 from tests.support.mission_flight import ITEMS
@@ -89,6 +89,11 @@ def test_items_that_are_flown_or_skipped(valid: MissionItem) -> None:
 )
 def test_items_that_are_refused_and_why(refused: MissionItem, result: int) -> None:
     assert MISSION_RULES.check_item(refused) == result
+    words = fault_of(refused, result)
+    assert f"({refused.command})" in words or f"command {refused.command}" in words
+    values = {P1 + index: f"parameter {index + 1} is {refused[3 + index]:g}" for index in range(4)}
+    places = {P5: "latitude", P6: "longitude", P7: "altitude", BAD_FRAME: f"frame {refused.frame}"}
+    assert {**values, **places, mav.MAV_MISSION_UNSUPPORTED: "is not supported"}[result] in words
 
 
 def test_a_jump_out_of_the_mission_is_refused() -> None:
