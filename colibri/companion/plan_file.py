@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.waypoint_file import DEFAULT_SPEED_M_S, MIN_LEG_S, Waypoints, leg_times
-from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
+from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.errors import shown
 from colibri.common.files import read_text
 from colibri.common.types import Vector
 from colibri.companion.errors import CompanionError
 from colibri.companion.home import LocalOrigin
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.places import misplaced
 
 SUFFIX = ".plan"
 _EAST_DEG = 90.0
@@ -79,7 +80,7 @@ def read_plan(path: Path) -> MissionPlan:
         raise CompanionError(f"{path}: {error.strerror}") from error
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise CompanionError(f"{path}: no mission of QGroundControl: save it there as .plan") from error
-    if not isinstance(items, list) or not is_on_earth(*planned[:2]) or not 0.0 < speed_m_s < float("inf"):
+    if not isinstance(items, list) or misplaced(*planned[:2]) or not 0.0 < speed_m_s < float("inf"):
         raise CompanionError(f"{path}: no mission of QGroundControl: save it there as .plan")
     takeoff_m, note = None, ""
     points = []
@@ -114,8 +115,9 @@ def _point(path: Path, number: int, item: dict[str, Any], numbers: list[Any]) ->
     stay_s, latitude, longitude = (_number(path, number, numbers[n]) for n in (0, 4, 5))
     if stay_s > 0.0:
         raise _refused(path, number, f"stays for {stay_s:g} s: a track passes its waypoints, so set it to 0")
-    if not is_on_earth(latitude, longitude):
-        raise _refused(path, number, f"is at {latitude:g}, {longitude:g}, which is nowhere on earth")
+    wrong = misplaced(latitude, longitude)
+    if wrong:
+        raise _refused(path, number, f"is nowhere on earth: {wrong}")
     heading = None if numbers[3] is None else _number(path, number, numbers[3])
     return PlannedPoint(number, latitude, longitude, _height(path, number, item, numbers), heading)
 
