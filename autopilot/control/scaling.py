@@ -113,8 +113,8 @@ def _slowed(name: str, power: float) -> Callable[[Capability, Any], Any]:
 
 
 def _acceleration(vehicle: Capability, ratios: LpvMpcScaling) -> float:
-    most = min(ratios.acceleration * vehicle.climb_m_s2, ratios.max_g * vehicle.gravity_m_s2)
-    return most / sqrt(_slow(vehicle, ratios))
+    most = ratios.max_g * vehicle.gravity_m_s2 / sqrt(_slow(vehicle, ratios))
+    return min(ratios.acceleration * vehicle.climb_m_s2, most)
 
 
 def _approach_speed(vehicle: Capability, ratios: LpvMpcScaling) -> float:
@@ -128,7 +128,7 @@ def _max_rate(vehicle: Capability, ratios: LpvMpcScaling) -> list[float]:
 
 _LPV_MPC = {
     "guidance.poles": Row("poles / √slow", _slowed("poles", -0.5)),
-    "guidance.max_acceleration_m_s2": Row("(acceleration × climb, at most max_g × g) / √slow", _acceleration),
+    "guidance.max_acceleration_m_s2": Row("acceleration × climb, at most max_g × g / √slow", _acceleration),
     "guidance.approach_speed_m_s": Row("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
     "observer.acceleration_rad_s": Row("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
     "observer.moment_rad_s": Row("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),
