@@ -83,12 +83,12 @@ class Topic:
 
 
 _STATE = (
-    Columns("u v w", "m/s", "velocity in the body's axes, FLU"),
+    Columns("u v w", "m/s", "velocity, FLU"),
     Columns("p q r", "rad/s", "body rates, FLU"),
     Columns("x y z", "m", "position, ENU"),
-    Columns("qw qx qy qz", "", "attitude as a quaternion, wxyz, FLU to ENU"),
+    Columns("qw qx qy qz", "", "attitude quaternion wxyz, FLU to ENU"),
 )
-_ROTORS = Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed, in the unit of the vehicle file")
+_ROTORS = Columns("omega1 omega2 omega3 omega4", "the vehicle's", "rotor speed")
 _POSITION = Columns("x y z", "m", "position, ENU")
 _VELOCITY = Columns("vx vy vz", "m/s", "velocity, ENU")
 _RATES, _ATTITUDE = _STATE[1], _STATE[3]
@@ -101,8 +101,8 @@ TRUTH = Topic(
     (
         *_STATE,
         _ROTORS,
-        Columns("voltage_v", "V", "battery voltage under load; `nan` without a battery"),
-        Columns("charge_ah", "Ah", "charge taken from the battery"),
+        Columns("voltage_v", "V", "battery voltage under load, or `nan`"),
+        Columns("charge_ah", "Ah", "charge drawn from the battery"),
         Columns("wind_east wind_north wind_up", "m/s", "wind at the vehicle, with turbulence and gusts"),
     ),
 )
@@ -114,21 +114,21 @@ DECISION = Topic(
     (
         Columns("phi_ref theta_ref psi_ref", "rad", "attitude setpoint"),
         Columns("qp_status", "", "how the QP ended", "int8_t"),
-        Columns("fallback", "", "fallback that decided in its place", "int8_t"),
-        Columns("solve_time_us", "µs", "solve time of the QP, by the wall clock", "float"),
-        Columns("control_step_us", "µs", "time from frame to command, by the wall clock", "float"),
+        Columns("fallback", "", "fallback used instead", "int8_t"),
+        Columns("solve_time_us", "µs", "solve time of the QP, wall clock", "float"),
+        Columns("control_step_us", "µs", "time from frame to command, wall clock", "float"),
         Columns("cost", "", "cost of the plan"),
-        Columns("slack", "parts", "largest planned excess of a soft limit, in parts of each"),
+        Columns("slack", "parts", "largest planned excess of a soft limit, relative"),
         Columns(
             "active_rotors active_increments active_angles active_rates",
             "",
-            "number of active constraints of the kind",
+            "active constraints by kind",
             "uint16_t",
         ),
         Columns("delay_us", "µs", "compensated delay from frame to effect of its command", "float"),
-        Columns("mass_kg", "kg", "mass estimated by the control law; `nan` for a law that estimates none"),
-        Columns("path_lag_s", "s", "lag of the path time behind the clock; `nan` for a law that keeps to the clock"),
-        Columns("qp_iterations", "", "iterations of the QP solver; `nan` where it reports none", "float"),
+        Columns("mass_kg", "kg", "mass estimated by the control law, or `nan`"),
+        Columns("path_lag_s", "s", "lag of the path time behind the clock, or `nan`"),
+        Columns("qp_iterations", "", "iterations of the QP solver, or `nan`", "float"),
     ),
 )
 MEASURED = ("velocity", "position", "height", "pressure", "field", "distance")
@@ -142,12 +142,12 @@ ESTIMATE = Topic(
         *(_POSITION, _VELOCITY, _ATTITUDE, _RATES),
         Columns("sd_x sd_y sd_z", "m", "standard deviation of the position"),
         Columns("sd_vx sd_vy sd_vz", "m/s", "standard deviation of the velocity"),
-        Columns("sd_east sd_north sd_up", "rad", "standard deviation of the attitude, about each axis of ENU"),
+        Columns("sd_east sd_north sd_up", "rad", "standard deviation of the attitude, about the axes of ENU"),
         Columns("gyro_bias_x gyro_bias_y gyro_bias_z", "rad/s", "estimated gyroscope bias, FLU"),
         Columns("accel_bias_x accel_bias_y accel_bias_z", "m/s²", "estimated accelerometer bias, FLU"),
         Columns("flags", "", "bits of ESTIMATOR_STATUS_FLAGS", "uint32_t"),
-        Columns("rejected", "", "measurements rejected so far", "uint32_t"),
-        Columns("resets", "", "resets of a part of the state so far", "uint32_t"),
+        Columns("rejected", "", "rejected measurements so far", "uint32_t"),
+        Columns("resets", "", "resets of parts of the state so far", "uint32_t"),
     ),
 )
 FILTER = Topic(
@@ -160,17 +160,17 @@ FILTER = Topic(
         Columns(
             " ".join(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
             "",
-            "covariance of the error of position, velocity and attitude: its upper triangle, row by row",
+            "error covariance of position, velocity and attitude: upper triangle, row by row",
         ),
         Columns(
             " ".join(f"nis_{kind}" for kind in MEASURED),
             "",
-            "sum of the normalised innovations squared since the start, for each kind of measurement",
+            "sum of normalised innovations squared since the start, by measurement",
         ),
         Columns(
             " ".join(f"believed_{kind}" for kind in MEASURED),
             "",
-            "measurements accepted since the start, for each kind of measurement",
+            "accepted measurements since the start",
         ),
     ),
 )
@@ -180,8 +180,8 @@ COMMAND = Topic(
     "command.csv",
     "a frame that was answered: the command",
     (
-        Columns("control1 control2 control3 control4", "", "rotor speeds in parts of the largest", "float"),
-        Columns("armed", "", "whether the rotors are armed", "uint8_t"),
+        Columns("control1 control2 control3 control4", "", "rotor speeds relative to the largest", "float"),
+        Columns("armed", "", "1 if armed", "uint8_t"),
     ),
 )
 FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND)

@@ -18,7 +18,6 @@ def _tables() -> Iterator[str]:
 
 
 def _rows(columns: Iterable[Columns]) -> Iterator[tuple[str, ...]]:
-    yield "`t`", "s", "simulated time"
     for each in columns:
         names = each.names.split()
         shown = names if len(names) <= _MANY else [names[0], "…", names[-1]]
@@ -27,7 +26,7 @@ def _rows(columns: Iterable[Columns]) -> Iterator[tuple[str, ...]]:
 
 
 def _codes(codes: Mapping[Any, int]) -> str:
-    return ", ".join(f"{code} {name or 'nothing'}" for name, code in codes.items())
+    return ", ".join(f"{code} {name or 'none'}" for name, code in codes.items())
 
 
 PAGES = {"files.md": lambda page: with_tables(page, _tables())}
