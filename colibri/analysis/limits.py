@@ -1,4 +1,4 @@
-"""`--fail-above`: limits on numbers of a flight's report, for continuous integration."""
+"""`--fail-above` and `--fail-lost`: limits on reports and on lost flights, for continuous integration."""
 
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping
@@ -26,6 +26,40 @@ class ReportLimit(NamedTuple):
     value: float
 
 
+class LossLimit(NamedTuple):
+    """Most flights that may be lost or refused, a number or a percentage of all."""
+
+    most: float
+    percent: bool = False
+
+
+NONE_LOST = LossLimit(0.0)
+
+
+def loss_limit(text: str) -> LossLimit:
+    percent = text.endswith("%")
+    try:
+        most = number(text.removesuffix("%")) if percent else float(int(text))
+    except ValueError:
+        most = -1.0
+    if most < 0.0 or (percent and most > 100.0):
+        raise ArgumentTypeError(f"must be a number of flights or a percentage, 3 or 5% say, not {text}")
+    return LossLimit(most, percent)
+
+
+def loss_exceeds(limit: LossLimit | None, lost: int, flights: int) -> str:
+    """Describe how many flights are lost if too many are; without a limit, if all are."""
+    if limit is None:
+        return f"all {flights} flights were lost or refused" if lost == flights else ""
+    most = limit.most * flights / 100.0 if limit.percent else limit.most
+    unit = "%" if limit.percent else ""
+    return (
+        f"--fail-lost: {lost} of {flights} flights were lost or refused, above {limit.most:g}{unit}"
+        if lost > most
+        else ""
+    )
+
+
 def limit(text: str) -> ReportLimit:
     key, equals, value = text.rpartition("=")
     if equals and key not in KEYS:
@@ -38,14 +72,14 @@ def limit(text: str) -> ReportLimit:
 
 def exceeded(limits: Iterable[ReportLimit], report: Mapping[str, Any]) -> list[str]:
     """Describe each limit that a report exceeds, or does not contain."""
-    found = []
-    for key, value in limits:
-        flown = of_report(report, key)
-        if flown is None:
-            found.append(f"{key} is missing in this flight; its limit is {value:g}")
-        elif not flown <= value:
-            found.append(f"{key} is {flown:.4g}, above {value:g}")
-    return found
+    return [reason for limit in limits if (reason := above(limit, of_report(report, limit.key)))]
+
+
+def above(limit: ReportLimit, flown: float | None) -> str:
+    """Describe a number above its limit, or unknown; empty if it is neither."""
+    if flown is None:
+        return f"{limit.key} is missing in this flight; its limit is {limit.value:g}"
+    return "" if flown <= limit.value else f"{limit.key} is {flown:.4g}, above {limit.value:g}"
 
 
 def of_report(report: Mapping[str, Any], key: str) -> Any:

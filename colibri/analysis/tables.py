@@ -1,6 +1,7 @@
 """Tables as Markdown for people, and as CSV for programs."""
 
 import csv
+import re
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -12,13 +13,22 @@ _MAX_WIDTH = 400
 
 
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int, notes: Sequence[str] = ()) -> list[Path]:
-    """Write `path` with suffixes md, which has the notes, and csv."""
+    """Write `path` with suffixes md, which has the notes, and csv, whose columns are identifiers."""
     below = "".join(f"\n{note}\n" for note in notes)
-    texts = {"md": markdown(headings, rows, names=names) + below, "csv": comma_separated(headings, rows)}
+    texts = {
+        "md": markdown(headings, rows, names=names) + below,
+        "csv": comma_separated(tuple(map(identifier, headings)), rows),
+    }
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in texts]
     for written, text in zip(paths, texts.values(), strict=True):
         written.write_text(text, encoding="utf-8")
     return paths
+
+
+def identifier(heading: str) -> str:
+    """Return a heading as the name of a column: "QP p50 (µs)" is qp_p50_us."""
+    plain = heading.lower().replace("µ", "u").replace("°", "deg").replace("%", "percent")
+    return re.sub(r"[^\w]+", "_", plain).strip("_")
 
 
 def markdown(headings: Row, rows: Sequence[Row], *, names: int) -> str:

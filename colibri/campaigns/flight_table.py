@@ -14,7 +14,7 @@ from colibri.campaigns.values import CampaignError, is_number, shown
 from colibri.experiments.table import SampleTable
 
 _NORMAL_95 = 1.959963984540054
-_QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
+_QUANTILES = {"median": 0.5, "p05": 0.05, "p95": 0.95}
 
 
 class FlightTable:
@@ -110,8 +110,8 @@ class FlightTable:
         names = [metric.name for metric in self.campaign.metrics]
         headings = (
             *self.campaign.grid,
-            *("flights", "refused", "lost", "share lost", "share lost, low", "share lost, high"),
-            *(f"{name}, {which}" for name in names for which in (*_QUANTILES, "largest")),
+            *("flights", "refused", "lost", "share_lost", "share_lost_low", "share_lost_high"),
+            *(f"{name}_{which}" for name in names for which in (*_QUANTILES, "largest")),
         )
         values = {name: self.metric(name) for name in names}
         rows = []

@@ -2,8 +2,9 @@
 
 from argparse import Namespace
 
-from colibri.analysis.limits import limit
+from colibri.analysis.limits import NONE_LOST
 from colibri.cli.shared.beside import add_view, viewed
+from colibri.cli.shared.options import add_gate
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail, loading
 from colibri.common.spec import add_options as add_spec
@@ -16,15 +17,7 @@ def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add_view(add)
     add("--quiet", action="store_true", help="print errors only")
-    add(
-        "--fail-above",
-        type=limit,
-        action="append",
-        default=[],
-        metavar="[KEY=]VALUE",
-        help="exit with 1 if a number of report.json is larger: rmse_after_20s_m (m), or another by its "
-        "KEY, for example ground_contact_s=0; may be repeated",
-    )
+    add_gate(add, NONE_LOST)
     add("--no-figures", action="store_true", help="draw no PNG figures")
 
 

@@ -5,8 +5,8 @@ import argparse
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, print_table, write_table
 from colibri.campaigns.flights import FlightResult, Verdict
+from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.metrics import Metric
-from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.studies.comparison import fly_comparison
 
 COLUMNS = (
@@ -32,11 +32,11 @@ _FORMATS = (".4g", ".4g", ".4g", ".0f", ".0f")
 
 def compare(args: argparse.Namespace) -> int:
     """Compare; RMS is that after the first 20 s, the maximum includes the start."""
-    table = fly_comparison(args, "compare", _METRICS, "all")
+    table = fly_comparison(args, "compare", with_limits(_METRICS, args.fail_above), "all")
     rows = [(*names, *_cells(table.flown[place])) for names, (place,) in table.groups().items()]
     write_table(args.out / "compare", COLUMNS, rows, names=2, notes=table.notes)
     lost = any(row[-1] for row in rows)
-    if not args.quiet:
+    if not (args.quiet or args.json):
         title = f"RMS after {SETTLED_AFTER_S:.0f} s; written to {args.out}"
         shown = len(COLUMNS) - (1 if lost else 2)
         print_table(title, COLUMNS[:shown], [row[:shown] for row in rows], names=2)
@@ -44,11 +44,11 @@ def compare(args: argparse.Namespace) -> int:
         for controller, track, *_, at_s, why in rows:
             if why:
                 print(f"{controller}, {track}: lost at t = {at_s} s: {why}")  # noqa: T201
-    return EXIT_FAILED if lost else 0
+    return handed_over(table, args)
 
 
 def _cells(flown: FlightResult) -> Row:
-    *figures, lost_at_s = flown.metrics
+    *figures, lost_at_s = flown.metrics[: len(_METRICS)]
     cells = (_UNKNOWN if value is None else format(value, how) for value, how in zip(figures, _FORMATS, strict=True))
     if flown.verdict is Verdict.FLOWN:
         return (*cells, "", "")

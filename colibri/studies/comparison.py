@@ -42,7 +42,7 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     if not args.resume:
         journal.unlink(missing_ok=True)
     flown = _kept(journal, points, common)
-    if args.resume and not args.quiet:
+    if args.resume and not (args.quiet or args.json):
         print(f"--resume: {len(flown)} of {len(points)} flights were flown already, by the same contents")  # noqa: T201
     left = [point for point in points if point.flight not in flown]
     with Journal(args.out, flown, journal.name) as kept:
@@ -89,7 +89,7 @@ def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argpar
     for point in points if common.logs == "all" else ():
         prepare(args.out / point.folder)
     with closing(fly_points(points, common, Pool())) as ended:
-        for each in with_bar(ended, "flights", len(points), quiet=args.quiet):
+        for each in with_bar(ended, "flights", len(points), quiet=args.quiet or args.json):
             journal.add(each)
 
 

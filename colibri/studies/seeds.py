@@ -11,8 +11,8 @@ from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import Row, comma_separated, print_table, write_table
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Verdict
+from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.metrics import Metric
-from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.studies.comparison import fly_comparison
@@ -47,7 +47,7 @@ and the number of innovations.
 
 
 def compare_seeds(args: argparse.Namespace) -> int:
-    table = fly_comparison(args, "seeds", METRICS, "none")
+    table = fly_comparison(args, "seeds", with_limits(METRICS, args.fail_above), "none")
     (args.out / "seeds-flights.csv").write_text(comma_separated(table.headings, table.rows()), encoding="utf-8")
     rows = [(*names, *_cells(table, places)) for names, places in table.groups().items()]
     write_table(args.out / "seeds", HEADINGS, rows, names=2, notes=table.notes)
@@ -55,7 +55,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
 
     draw_seeds(table, args.out)
     lost = [each for each in table.flown if each.verdict is not Verdict.FLOWN]
-    if not args.quiet:
+    if not (args.quiet or args.json):
         over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
         shown = len(HEADINGS) if args.feedback is Feedback.SENSORS else _WITHOUT_ESTIMATE
         print_table(f"{over}; written to {args.out}", HEADINGS[:shown], [row[:shown] for row in rows], names=2)
@@ -63,7 +63,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
         for flown, row in zip(table.flown, table.rows(), strict=True):
             if flown in lost:
                 print(f"{row[1]}, {row[2]}, seed {row[3]}: lost: {flown.why}")  # noqa: T201
-    return EXIT_FAILED if lost else 0
+    return handed_over(table, args)
 
 
 def _cells(table: FlightTable, places: Sequence[int]) -> Row:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import colibri
+from colibri.analysis.tables import identifier
 from colibri.autopilot.control import loop
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
@@ -129,8 +130,9 @@ def test_a_profile_given_by_path_flies_under_its_name(tmp_path: Path, ran: Ran) 
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert (report["profile"], report["without"], report["start"]["z"]) == ("t2", ["drag"], 3.0)
     (row,) = csv.DictReader((out / "compare.csv").read_text(encoding="utf-8").splitlines())
-    assert tuple(row) == COLUMNS
-    assert (row["controller"], row["RMS (m)"], row["why"]) == ("t2", "-", "")
+    assert tuple(row) == tuple(map(identifier, COLUMNS))
+    assert all(name.isidentifier() for name in row)
+    assert (row["controller"], row["rms_m"], row["why"]) == ("t2", "-", "")
     flown = (folder / "flight.csv").stat().st_mtime_ns
     said = ran(*command, "--resume").out
     assert said.startswith("--resume: 1 of 1 flights were flown already, by the same contents\n")

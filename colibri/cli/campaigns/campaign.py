@@ -3,7 +3,7 @@
 from argparse import SUPPRESS, Namespace
 from pathlib import Path
 
-from colibri.cli.shared.options import add_engine, add_out
+from colibri.cli.shared.options import add_engine, add_gate, add_junit, add_out
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import loading
 from colibri.common.spec import add_options as add_spec
@@ -42,6 +42,8 @@ def add_options(parser: ArgumentParser) -> None:
     add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")
     add_spec(parser, FlightSpec, leave_out=("track", "seed", "speed"), given_only=True, keywords_only=True)
+    add_gate(add, None)
+    add_junit(add)
     add_out(add, "out/campaign", "table, summary, figure and journal")
 
 

@@ -2,7 +2,8 @@
 
 from argparse import Namespace
 
-from colibri.cli.shared.options import add_out
+from colibri.analysis.limits import NONE_LOST
+from colibri.cli.shared.options import add_gate, add_junit, add_out
 from colibri.common.process.arguments import ArgumentParser, seeds
 from colibri.common.spec import add_options as add_spec
 from colibri.flights.spec import FlightSpec
@@ -32,6 +33,8 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add("--resume", action="store_true", help="reuse flights in --out with the same contents")
     add_spec(parser, FlightSpec, leave_out=("track", "profile", "controller", "speed"), keywords_only=True)
+    add_gate(add, NONE_LOST)
+    add_junit(add)
     add_out(add, "out/compare", "the tables")
 
 

@@ -7,12 +7,13 @@ from typing import Any
 
 from colibri.analysis.tables import print_table
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
-from colibri.campaigns.flights import FlightResult, Verdict
+from colibri.campaigns.flights import FlightResult
+from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.campaigns.values import CampaignError, first_twice
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, fail, fail_interrupted
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec
 
@@ -28,6 +29,7 @@ def fly(args: Namespace) -> int:
         grid = ({"track": args.tracks} if args.tracks else {}) | _once(_setting, args.settings)
         given = tables | {"fly": options, "grid": grid, "draw": _once(_draw, args.draws)}
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
+        planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
         engine = engine_of(args.workers, args.dask)
         with closing(_Bar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
@@ -36,9 +38,9 @@ def fly(args: Namespace) -> int:
         fail_interrupted(ended, f"; finished flights are in {args.out}: continue with --resume")
     except Error as error:
         fail(str(error), EXIT_BAD_INPUT)
-    if not args.quiet:
+    if not (args.quiet or args.json):
         _print(results, args)
-    return EXIT_FAILED if results.verdicts[Verdict.REFUSED] == len(results.flown) else 0
+    return handed_over(results, args)
 
 
 def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[str, Any]:
@@ -84,7 +86,7 @@ def _print(results: CampaignResults, args: Namespace) -> None:
     counts = ", ".join(f"{count} {verdict}" for verdict, count in results.verdicts.items() if count)
     headings, rows = results.summary()
     metric = results.usual_metric
-    shown = [*results.campaign.grid, "flights", "lost", *(f"{metric}, {which}" for which in ("median", "5 %", "95 %"))]
+    shown = [*results.campaign.grid, "flights", "lost", *(f"{metric}_{which}" for which in ("median", "p05", "p95"))]
     cells = [tuple(_short(row[headings.index(name)]) for name in shown) for row in rows]
     title = f"{results.campaign.name}: {counts}; written to {args.out}"
     print_table(title, tuple(shown), cells, names=len(results.campaign.grid))

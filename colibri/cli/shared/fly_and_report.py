@@ -1,11 +1,12 @@
 """Fly one track with a progress bar, and report."""
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from colibri.analysis.limits import exceeded
+from colibri.analysis.limits import exceeded, loss_exceeds
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
@@ -51,8 +52,12 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     except KeyboardInterrupt as ended:
         _keep_what_there_is(plan)
         fail_interrupted(ended, f"; logs are in {plan.out}")
-    found = _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
-    if found["lost"] is not None:
+    found = _report(plan, summary, figures=not args.no_figures, quiet=args.quiet or args.json)
+    if args.json:
+        from colibri.analysis.outcome import REPORT
+
+        sys.stdout.write((plan.out / REPORT).read_text(encoding="utf-8"))
+    if found["lost"] is not None and loss_exceeds(args.fail_lost, 1, 1):
         fail(f"lost at t = {found['lost_at_s']:.2f} s: {found['lost']}; the logs are in {plan.out}", EXIT_FAILED)
     above = exceeded(args.fail_above, found)
     if above:

@@ -85,13 +85,13 @@ def test_the_summary_has_quantiles_of_what_came_through(tmp_path: Path) -> None:
     flown = made(verdicts, seeds="1-5", grid={"track": ["hover"], LATENCY: [1.0, 2.0]})
     flown.save(tmp_path)
     first, second = csv.DictReader(tables_in(tmp_path)[1].splitlines())
-    assert [first[name] for name in ("track", LATENCY, "flights", "refused", "lost", "share lost")] == [
+    assert [first[name] for name in ("track", LATENCY, "flights", "refused", "lost", "share_lost")] == [
         *("hover", "1.0", "5", "0", "2", "0.4")
     ]
-    assert [first[f"rmse_m, {which}"] for which in ("median", "largest")] == ["10.004", "10.005"]
-    assert first["max_tilt_deg, median"] == ""
-    assert [second[name] for name in ("flights", "refused", "lost", "share lost")] == ["5", "1", "0", "0"]
-    assert [float(second[f"share lost, {end}"]) for end in ("low", "high")] == pytest.approx(wilson(0, 4))
+    assert [first[f"rmse_m_{which}"] for which in ("median", "largest")] == ["10.004", "10.005"]
+    assert first["max_tilt_deg_median"] == ""
+    assert [second[name] for name in ("flights", "refused", "lost", "share_lost")] == ["5", "1", "0", "0"]
+    assert [float(second[f"share_lost_{end}"]) for end in ("low", "high")] == pytest.approx(wilson(0, 4))
 
 
 def test_a_metric_that_was_not_kept_is_refused() -> None:
@@ -145,5 +145,5 @@ def test_without_numbers_it_is_a_strip_a_combination() -> None:
 
 def test_a_notebook_shows_summary_and_figure() -> None:
     shown = made(seeds="1-2")._repr_html_()
-    assert "share lost" in shown
+    assert "share_lost" in shown
     assert "data:image/png;base64," in shown
