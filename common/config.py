@@ -88,7 +88,7 @@ class SettingsError(Error):
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of numbers that can be computed with."""
+    """A table of a TOML file; its numbers must be finite."""
 
     def __post_init__(self) -> None:
         for key in self.__struct_fields__:

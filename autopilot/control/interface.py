@@ -209,7 +209,7 @@ class Controller(Protocol[Memory]):
 
 @runtime_checkable
 class AttitudeController(Controller[Memory], Protocol[Memory]):
-    """A control law that can also track an attitude; required by the modes that demand one.
+    """A control law that can also track an attitude, as some modes require.
 
     A flight may switch between both steps at any sample.
     """

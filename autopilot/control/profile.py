@@ -68,7 +68,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.controllers.get(table_of(controller), {})
 
     def of(self, vehicle: Vehicle) -> "Profile":
-        """Return the profile with the numbers of the laws that follow from a vehicle.
+        """Return the profile scaled to a vehicle.
 
         Raises:
             ProfileError: The vehicle is too heavy for its rotors, or a ratio is invalid.
@@ -83,7 +83,7 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return msgspec.structs.replace(self, controllers={**self.controllers, name: table})
 
     def value(self, key: str) -> Any:
-        """Return the value at a dotted key: of the profile's own vehicle, if it follows from one."""
+        """Return the value at a dotted key, scaled by the profile's own vehicle if necessary."""
         return value_at(self._with(key), key, ProfileError)
 
     def _with(self, key: str) -> "Profile":

@@ -35,7 +35,7 @@ class VehiclesSpec(WorldSpec, LawSpec):
 
 @dataclass(frozen=True, kw_only=True)
 class FlightSpec(VehiclesSpec, GroundSpec):
-    """A flight: each attribute is an option of `colibri fly` and a keyword of `colibri.fly`."""
+    """The options of a flight."""
 
     track: Annotated[Any, Option(TRACK_HELP, "TRACK")]
     integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
@@ -60,7 +60,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
 
     @classmethod
     def of(cls, track: Any, **options: Any) -> "FlightSpec":
-        """Return a flight with options as Python values or as texts of the command line."""
+        """Return a flight; options may be Python values or texts of the command line."""
         return from_values(cls, {"track": track, **options}, OptionError)
 
     @property

@@ -64,7 +64,7 @@ class Links(NamedTuple):
 class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
-    Commands, uploads and parameters raise a `RefusedError` if the vehicle refuses.
+    Refused commands, uploads and parameters raise a `RefusedError`.
 
     Attributes:
         items: Functions for items of missions and fences, such as `items.waypoint(3.0, 0.0, 5.0)`.

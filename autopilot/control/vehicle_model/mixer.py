@@ -21,7 +21,7 @@ class Mixer:
         self._squared_max = square(vehicle.rotors.max_speed)
 
     def rotor_speeds(self, wrench: Array) -> Array:
-        """Return the rotor speeds (4,), in the vehicle's unit, for U1 (N), U2, U3, U4 (N m), clipped to the limits."""
+        """Return rotor speeds (4,), in the vehicle's unit, for U1 (N), U2, U3, U4 (N m), within the limits."""
         return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
     def wrench(self, speeds: Array) -> Array:

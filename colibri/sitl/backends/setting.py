@@ -40,7 +40,7 @@ def _number(text: str) -> int | float:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting(WorldSpec, LawSpec):
-    """The setting of a flight; most fields are options of `colibri plant` and `autopilot`.
+    """The setting of a flight.
 
     The seed also seeds link faults. The default start is standing at the origin, facing north.
     """

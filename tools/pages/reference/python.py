@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, get_args
 
 from colibri.autopilot.spec import LawSpec
@@ -19,6 +21,7 @@ _ENTRY = re.compile(r"^    (\*{0,2}\w+(?:, \w+)*)(?: \(.*?\))?: (.*)$")
 _OPTIONS_OF: dict[str, type] = {"colibri fly": FlightSpec, "colibri plant": WorldSpec, "colibri autopilot": LawSpec}
 _INTERNAL = {
     "FlightPlan": "autopilot_spec floor_m flown_by integrator plant_spec plant_vehicle_name start_yaw_rad vehicle_name",
+    "Flights": "keep summary",
     "Record": "add note",
     "Setting": "autopilot_spec chosen delay_s law law_name load plant_spec started weather",
     "FlightSpec": "chosen delay_s law law_name load pace started weather",
@@ -32,6 +35,7 @@ _INTERNAL = {
 
 def _sections() -> Iterator[str]:
     shown: set[int] = set()
+    origins = _origins()
     for face in FACES:
         package = import_module(face)
         yield f"## {face}\n\n{inspect.getdoc(package)}\n"
@@ -41,7 +45,7 @@ def _sections() -> Iterator[str]:
         errors = {name: thing for name, thing in new.items() if _is_plain_error(thing)}
         for name, thing in new.items():
             if name not in errors:
-                yield from _thing(name, thing)
+                yield from _thing(name, thing, origins)
         yield "### Errors\n\n| | |\n|---|---|"
         for name, thing in errors.items():
             yield f"| `{name}` | {cell(_sentence(inspect.getdoc(thing) or ''))} |"
@@ -52,7 +56,7 @@ def _is_plain_error(thing: Any) -> bool:
     return inspect.isclass(thing) and issubclass(thing, Exception) and "Attributes:" not in (thing.__doc__ or "")
 
 
-def _thing(name: str, thing: Any) -> Iterator[str]:
+def _thing(name: str, thing: Any, origins: dict[str, str]) -> Iterator[str]:
     if not (inspect.isclass(thing) or inspect.isfunction(thing)):
         yield f"### {name}\n\nA type: `{thing}`.\n"
         return
@@ -62,7 +66,7 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
     yield _text(inspect.getdoc(thing) or "")
     if inspect.isclass(thing):
         yield from _options(thing)
-        yield from _members(thing)
+        yield from _members(thing, origins)
 
 
 def _options(kind: type) -> Iterator[str]:
@@ -81,8 +85,30 @@ def _options(kind: type) -> Iterator[str]:
         yield "| option | |\n|---|---|\n" + "\n".join(rows) + "\n"
 
 
-def _members(kind: type) -> Iterator[str]:
-    rows = []
+def _origins() -> dict[str, str]:
+    """Return the class that describes a member, by its row: the first on the page, or a base of that."""
+    origins: dict[str, type] = {}
+    for package in map(import_module, FACES):
+        for name in sorted(package.__all__, key=str.lower):
+            kind = getattr(package, name)
+            for _, row in _rows(kind) if inspect.isclass(kind) else ():
+                if row not in origins or kind in origins[row].__mro__:
+                    origins[row] = kind
+    return {row: kind.__name__ for row, kind in origins.items()}
+
+
+def _members(kind: type, origins: dict[str, str]) -> Iterator[str]:
+    rows = dict(_rows(kind))
+    repeated = sorted((origins[row], name) for name, row in rows.items() if origins[row] != kind.__name__)
+    for other, same in groupby(repeated, key=itemgetter(0)):
+        yield f"As in `{other}`: {', '.join(f'`{name}`' for _, name in same)}.\n"
+    own = [row for row in rows.values() if origins[row] == kind.__name__]
+    if own:
+        yield "| | |\n|---|---|\n" + "\n".join(own) + "\n"
+
+
+def _rows(kind: type) -> Iterator[tuple[str, str]]:
+    """Yield names and table rows of the public members with a docstring."""
     internal = _INTERNAL.get(kind.__name__, "").split()
     members = dict(inspect.getmembers(kind))
     assert members.keys() >= set(internal), f"{kind.__name__} lacks {set(internal) - members.keys()}"
@@ -98,9 +124,7 @@ def _members(kind: type) -> Iterator[str]:
             continue
         said = _sentence(inspect.getdoc(member) or "")
         if said:
-            rows.append(f"| `{cell(shown)}` | {cell(said)} |")
-    if rows:
-        yield "| | |\n|---|---|\n" + "\n".join(rows) + "\n"
+            yield name, f"| `{cell(shown)}` | {cell(said)} |"
 
 
 def _signature(name: str, function: Any) -> str:
@@ -130,15 +154,15 @@ def _sentence(doc: str) -> str:
 
 def _text(doc: str) -> str:
     lines: list[str] = []
-    in_section = False
+    in_section, begin = False, "- "
     for line in doc.splitlines():
         section, entry = _SECTION.match(line), _ENTRY.match(line)
         if section:
-            in_section = True
-            lines += [f"*{section[1]}*", ""]
+            in_section, begin = True, "Raises " if section[1] == "Raises" else "- "
+            lines += [f"*{section[1]}*", ""] if begin == "- " else []
         elif in_section and entry:
             names = ", ".join(f"`{name}`" for name in entry[1].split(", "))
-            lines.append(f"- {names}: {entry[2]}")
+            lines.append(f"{begin}{names}: {entry[2]}")
         elif in_section and line.startswith("        "):
             lines[-1] += f" {line.strip()}"
         else:
