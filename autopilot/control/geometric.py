@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Clock, Decision, Horizon, Preview, VehicleState
-from colibri.autopilot.control.scaling import scaled
+from colibri.autopilot.control.parts.recovery import mix_with_priority
+from colibri.autopilot.control.scaling import capability_of, sagging_speed, scaled
 from colibri.autopilot.control.settings import ControlInterval, interval_us
-from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.config import Positive, Table, read_settings
 from colibri.common.elementary import square
@@ -24,6 +25,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 _MIN_FORCE = 0.05  # least demanded force in parts of the weight: a smaller one has no useful direction
 _SATURATING_RAD = 0.13  # least attitude error that may saturate the moments: at less, the loop is unstable in wind
+_MIN_FEEDBACK = 0.05  # least limit of the feedback in parts of gravity, else what is left beside hover with a payload
 _MIN_LIFT = 0.5  # near the ground: least lift in parts of the weight, at which the target is level
 
 
@@ -63,7 +65,12 @@ class GeometricController:
         frequencies = np.array([attitude_rad_s] * 2 + [settings.yaw_frequency_rad_s])
         self._k_rotation = self._inertia * frequencies**2
         self._k_rate = self._inertia * 2.0 * frequencies
-        self._mixer = Mixer(vehicle)
+        top = square(vehicle.rotors.max_speed)
+        inverse = exact_inverse(vehicle.allocation() * top)
+        self._from_thrust, self._from_moments = inverse[:, 0].copy(), inverse[:, 1:].copy()
+        self._top_speed = vehicle.rotors.max_speed
+        self._squared = square(vehicle.rotors.idle_speed) / top, square(sagging_speed(vehicle))
+        self._max_feedback_m_s2 = max(capability_of(vehicle).climb_m_s2, _MIN_FEEDBACK * vehicle.gravity_m_s2)
 
     def initial(self, rotor_speed: float) -> None:
         del rotor_speed
@@ -76,7 +83,7 @@ class GeometricController:
         target = track_direction(acceleration, jerk, float(references.yaw_rad[0]), float(references.yaw_rate_rad_s[0]))
         thrust_n = self._mass_kg * dot(acceleration, R[:, 2])  # [15]
         moment_n_m = self._moment(R, rate, target)
-        speeds = self._mixer.rotor_speeds(np.array([max(thrust_n, 0.0), *moment_n_m]))
+        speeds = self._rotor_speeds(max(thrust_n, 0.0), moment_n_m)
         return None, Decision(speeds, euler_of(target.rotation, float(references.yaw_rad[0])))
 
     def step_attitude(
@@ -90,7 +97,7 @@ class GeometricController:
             body_rate_of(phi, theta, demand.angle_rates_rad_s[0]),
         )
         moment_n_m = self._moment(R, np.array(state.rate_flu_rad_s), target)
-        speeds = self._mixer.rotor_speeds(np.array([max(float(demand.thrust_n[0]), 0.0), *moment_n_m]))
+        speeds = self._rotor_speeds(max(float(demand.thrust_n[0]), 0.0), moment_n_m)
         return None, Decision(speeds, (phi, theta, psi))
 
     def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
@@ -99,15 +106,27 @@ class GeometricController:
         position_error = np.array(state.position_enu_m) - references.position_enu_m[0]
         velocity_error = np.array(state.velocity_enu_m_s) - references.velocity_enu_m_s[0]
         wanted = references.acceleration_enu_m_s2[0]
-        force = -self._k_position * position_error - self._k_velocity * velocity_error + wanted + gravity
+        feedback = -self._k_position * position_error - self._k_velocity * velocity_error
+        size = norm(feedback)
+        share = min(self._max_feedback_m_s2 / size, 1.0) if size > 0.0 else 1.0
+        force = share * feedback + wanted + gravity
         floor = _MIN_FORCE * self._gravity_m_s2
         if norm(force) < floor:
             force = floor * R[:, 2]
         if not state.airborne:
             force = self._upright(force)
         lifted = dot(force, R[:, 2]) * R[:, 2] - gravity
-        jerk = -self._k_position * velocity_error - self._k_velocity * (lifted - wanted) + references.jerk_enu_m_s3[0]
+        jerk = references.jerk_enu_m_s3[0]
+        if share == 1.0:
+            jerk = jerk - self._k_position * velocity_error - self._k_velocity * (lifted - wanted)
         return force, jerk
+
+    def _rotor_speeds(self, thrust_n: float, moment_n_m: Array) -> Array:
+        """Return the rotor speeds within their limits: tilting moments first, then thrust, then yaw."""
+        least, most = self._squared
+        squared = mix_with_priority(thrust_n, moment_n_m, self._from_thrust, self._from_moments, least, most)
+        speeds: Array = np.sqrt(squared) * self._top_speed
+        return speeds
 
     def _upright(self, force: Array) -> Array:
         """Return the force for a vehicle near the ground: the less lift, the less tilt, so that it cannot tip over."""

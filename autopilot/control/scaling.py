@@ -80,7 +80,7 @@ class Row(NamedTuple):
 def capability_of(vehicle: Vehicle) -> Capability:
     rotors, gravity = vehicle.rotors, vehicle.gravity_m_s2
     weight_n, allocation = vehicle.body.mass_kg * gravity, vehicle.allocation() * square(rotors.max_speed)
-    hover, most = weight_n / float(allocation[0].sum()), square(_sagging_speed(vehicle))
+    hover, most = weight_n / float(allocation[0].sum()), square(sagging_speed(vehicle))
     turns = np.abs(allocation[1:]).sum(axis=1) * max(min(hover, most - hover), 0.0) / vehicle.body.inertia_kg_m2
     lag_s = max(rotors.lag.time_constant_up_s, rotors.lag.time_constant_down_s) if rotors.lag else 0.0
     lever_m = float(np.abs(np.array(rotors.position_m)).max())
@@ -89,7 +89,7 @@ def capability_of(vehicle: Vehicle) -> Capability:
     return Capability(most / hover, climb_m_s2, (x, y, z), lag_s, lift_n_m, gravity)
 
 
-def _sagging_speed(vehicle: Vehicle) -> float:
+def sagging_speed(vehicle: Vehicle) -> float:
     """Return the speed of all rotors at full throttle, in parts of the largest: s² + (V / R P)(V s - V) = 0."""
     battery, rotors = vehicle.battery, vehicle.rotors
     if battery is None or battery.resistance_ohm == 0.0:
