@@ -45,6 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def run_plant(spec: PlantSpec, starter: Starter) -> int:
     if spec.realtime and (spec.serve != "colibri" or spec.speed == inf):
         fail("--realtime follows the wall clock for `colibri autopilot`: no --serve beside it, and no --speed max")
+    if spec.events and spec.serve != "colibri":
+        fail(f"--event needs --serve colibri: {spec.serve} flies wind, gusts and turbulence only")
     url = spec.link or DEFAULT_LINKS[spec.serve]
     if spec.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, starter, open_ground_link)

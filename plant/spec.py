@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
 from colibri.common.spec import Option
 from colibri.plant.environment.weather import NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
+from colibri.plant.events import EVENT, FORMS, event, events_of
 from colibri.plant.physics.start import Start
 from colibri.plant.texts import COLUMNS, GUST, gust, start_values
 from colibri.plant.texts import wind as read_wind
@@ -45,6 +46,10 @@ class WorldSpec:
         Intensity | None,
         Option("Dryden turbulence on top of the wind, by MIL-F-8785C at low altitude; --seed chooses the sample"),
     ] = None
+    events: Annotated[
+        tuple[Any, ...],
+        Option(f"at T seconds: {FORMS}; or a file with tables [[events]]", EVENT, read=event, flag="event"),
+    ] = ()
     seed: Annotated[int, Option("seed of everything random", "N", least=0)] = 0
     start: Annotated[
         Mapping[str, float],
@@ -66,6 +71,11 @@ class WorldSpec:
             most=1000.0,
         ),
     ] = 0.0
+
+    def __post_init__(self) -> None:
+        """Read and sort the events."""
+        if self.events:
+            object.__setattr__(self, "events", events_of(self.events, getattr(self, "duration", inf)))
 
     @property
     def weather(self) -> Weather:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from colibri.common.spec import fields_of
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.events import Blow
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -56,6 +57,12 @@ RULES = (
     EffectRule("gusts", _NO_DRAG, lambda it: it.has_drag),
     EffectRule(
         "gusts", "each begins after the flight", lambda it: any(g.start_s < it.spec.duration for g in it.spec.gusts)
+    ),
+    EffectRule(
+        "events", "each is after the flight", lambda it: any(event.t < it.spec.duration for event in it.spec.events)
+    ),
+    EffectRule(
+        "events", _NO_DRAG, lambda it: it.has_drag or any(not isinstance(event, Blow) for event in it.spec.events)
     ),
     EffectRule("turbulence", _NO_DRAG, lambda it: it.has_drag),
     EffectRule("seed", "only sensors, and turbulence on drag, are random", lambda it: it.is_random),

@@ -22,6 +22,7 @@ from colibri.flights.launcher import Child, end_children, events_of, how_it_ende
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
+from colibri.plant.events import check_events
 from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
@@ -83,6 +84,7 @@ def _check(spec: FleetSpec) -> str:
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
         whole = load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed
         vehicle = whole.without(spec.without)
+        check_events(spec.events, vehicle, on_sensors=spec.feedback is Feedback.SENSORS)
         check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
     except Error as error:
         fail(str(error))

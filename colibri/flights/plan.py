@@ -18,6 +18,7 @@ from colibri.flights.effects import FlownOptions, without_effect
 from colibri.flights.spec import FlightSpec
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
+from colibri.plant.events import check_events
 from colibri.plant.physics.contact import check_contact
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.spec import PlantSpec
@@ -87,6 +88,7 @@ class FlightPlan:
 
         Raises:
             PlanError: Options cannot be combined, or a vehicle has no sensors or ground for feedback from sensors.
+            EventError: The flight cannot have an event.
             LinkError: The URL of a ground station is invalid, or reachable from the network without a key.
             ProfileError, VehicleError, TrackError: A file is invalid, or the vehicle cannot fly so.
         """
@@ -101,6 +103,7 @@ class FlightPlan:
             for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
                 _check_sensors(name, each)
         floor_m = _floor_m(spec, plant_vehicle)
+        check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS)
         track, note = load_track(spec.track, vehicle, profile, floor_m, track_file)
         start = spec.started(_usual_start(profile, plant_vehicle, track, spec.feedback))
         try:

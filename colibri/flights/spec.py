@@ -52,7 +52,8 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False
 
     def __post_init__(self) -> None:
-        """Sample a track that is an object or a function."""
+        """Sample a track that is an object or a function, and read the events."""
+        super().__post_init__()
         if not isinstance(self.track, str | Trajectory):
             from colibri.autopilot.guidance.trajectories.sampling import sampled_track  # slow to load
 

@@ -27,6 +27,7 @@ from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
 from colibri.sitl.mission_items import Item, on_wire
+from colibri.sitl.station_events import StationEvents
 from colibri.sitl.status_texts import StatusTexts
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
@@ -89,6 +90,7 @@ class Sitl(View, Stepped, Steered):
         self._wind, self._payload_kg = str(setting.wind or CALM), 0.0
         self._sticks: dict[str, float] | None = None
         self._sticks_at_us = 0
+        self._events = StationEvents(setting.events)
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
         self._texts = StatusTexts()
@@ -125,6 +127,8 @@ class Sitl(View, Stepped, Steered):
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
+        if now_us >= self._events.next_us:
+            self._events.send(self, now_us)
         stations, note = self._stations, self.record.note
         parcels = [Parcel(station.number, datagram) for station in stations for datagram in station.departing(now_us)]
         for _, datagram in parcels:

@@ -12,7 +12,7 @@ from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import Eddies
-from colibri.plant.environment.weather import NO_WEATHER, Weather, Wind
+from colibri.plant.environment.weather import NO_WEATHER, RecordedWind, Weather, Wind
 from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, attitude_of, close_attitude, specific_force
 from colibri.plant.physics.integrators import Integrator, solver
 from colibri.plant.physics.parameters import parameters_of
@@ -117,7 +117,7 @@ class Physics:
         """Multiply the battery's resistance."""
         self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
 
-    def blow(self, wind: Wind) -> None:
+    def blow(self, wind: Wind | RecordedWind) -> None:
         """Replace the mean wind; with gusts or turbulence it acts from the next step on."""
         self._air.blow(wind)
         if self._air.steady is not None:

@@ -5,6 +5,7 @@ from colibri.common.process.lifecycle import Stop, fail
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink, is_bound
+from colibri.plant.events import check_events
 from colibri.plant.physics.start import default_starts
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import closing
@@ -18,6 +19,7 @@ from colibri.plant.vehicle.description import load_vehicle
 
 def builder_of(spec: PlantSpec) -> PlantBuilder:
     vehicle = load_vehicle(spec.vehicle).without(spec.without)
+    check_events(spec.events, vehicle, on_sensors=vehicle.sensors is not None)
     usual = default_starts(vehicle)
     starts = {it: nudged(spec.started(usual[it])) for it in served_by(vehicle)}
     return PlantBuilder(spec, vehicle, starts, integrator=spec.integrator, origin=spec.home.origin)

@@ -10,7 +10,8 @@ from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedF
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, WorldChange
-from colibri.plant.environment.weather import Wind
+from colibri.plant.environment.weather import RecordedWind, Wind
+from colibri.plant.events import Event, changes_of, check_events
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
@@ -18,6 +19,8 @@ from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.simulation.faults import Faults
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import Vehicle
+
+_NEVER_US = 1 << 62
 
 
 class DelayedCommands:
@@ -56,7 +59,11 @@ class Plant:
         seed: int,
         interval_us: int,
         latency_us: int = 0,
+        events: Sequence[Event] = (),
     ) -> None:
+        check_events(events, vehicle, on_sensors=feedback is Feedback.SENSORS)
+        self._events = deque(changes_of(events))
+        self._next_us = self._events[0][0] if self._events else _NEVER_US
         self.world = world
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
@@ -86,22 +93,35 @@ class Plant:
 
     def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
         """Inject faults and changes of the world now; results of faults go with the next frame."""
-        results = []
-        for each in asked:
-            if isinstance(each, WindChange):
-                self._physics.blow(Wind(each.speed_m_s, each.from_deg))
-            elif isinstance(each, PayloadChange):
-                self._physics.carry(each.mass_kg)
-            else:
-                self.world, result = self.faults.inject(each, self.world)
-                results.append(result)
-        self._results = tuple(results)
+        results = map(self._change, asked)
+        self._results = tuple(result for result in results if result is not None)
+
+    def _change(self, asked: Fault | WorldChange | Wind | RecordedWind) -> FaultResult | None:
+        if isinstance(asked, WindChange):
+            self._physics.blow(Wind(asked.speed_m_s, asked.from_deg))
+        elif isinstance(asked, Wind | RecordedWind):
+            self._physics.blow(asked)
+        elif isinstance(asked, PayloadChange):
+            self._physics.carry(asked.mass_kg)
+        else:
+            self.world, result = self.faults.inject(asked, self.world)
+            return result
+        return None
+
+    def _happen(self) -> None:
+        """Let the events happen that are due."""
+        events = self._events
+        while events and events[0][0] <= self.world.time_us:
+            self._change(events.popleft()[1])
+        self._next_us = events[0][0] if events else _NEVER_US
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:
         self._actuation.arrive(sent_us + self._round_trip_us, command)
 
     def go_on(self) -> None:
         begin_us = self.world.time_us
+        if begin_us >= self._next_us:
+            self._happen()
         for command, duration_us in self._actuation.spans(begin_us, begin_us + self.interval_us):
             self.world = self._physics.step(self.world, command, duration_us)
 
@@ -137,6 +157,7 @@ class PlantBuilder:
             seed=self._spec.seed,
             interval_us=interval_us,
             latency_us=round(self._spec.latency * 1e3),
+            events=self._spec.events,
         )
 
 

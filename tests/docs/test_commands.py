@@ -55,6 +55,7 @@ def test_every_command_is_ours_or_known_to_be_another_s() -> None:
 def test_the_parsers_read_every_command_of_colibri(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wind.csv").write_text("t,east,north,up\n0,0,0,0\n", encoding="utf-8")
+    (tmp_path / "events.toml").write_text("events = []\n", encoding="utf-8")
     for page, words in command_lines():
         if words[0] == "colibri":
             try:

@@ -1,5 +1,7 @@
 """Commands that arrive late act late, to the microsecond, and the one before holds until then."""
 
+from typing import Any
+
 import pytest
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -63,7 +65,8 @@ def test_latency_shifts_what_happens() -> None:
 
 def test_a_plant_says_how_late_the_last_command_took_effect() -> None:
     physics = Physics(VEHICLE, "rk4")
-    world, options = starting_world(Start(z=10.0, rotors=4740.0), VEHICLE), {"seed": 0, "interval_us": FRAME_US}
+    world = starting_world(Start(z=10.0, rotors=4740.0), VEHICLE)
+    options: dict[str, Any] = {"seed": 0, "interval_us": FRAME_US}
     for latency_us, said in ((0, [None, None, None]), (4_500, [None, None, 9_000])):
         plant = Plant(world, VEHICLE, physics, Feedback.STATE, DEFAULT_ORIGIN, **options, latency_us=latency_us)
         delays = []
