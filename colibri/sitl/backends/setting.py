@@ -52,7 +52,7 @@ class Setting(WorldSpec, LawSpec):
     airborne: Annotated[
         float | None,
         Option(
-            "start in mode HOLD at this height above the origin, rotors at hover speed, without a take-off; only with "
+            "start in mode HOLD at this height in m above the origin, rotors at hover speed, without take-off; only with "
             'feedback "state"',
             unit="m",
         ),

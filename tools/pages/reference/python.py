@@ -13,7 +13,7 @@ from colibri.autopilot.spec import LawSpec
 from colibri.common.spec import Option, described, fields_of
 from colibri.flights import FlightSpec
 from colibri.plant.spec import WorldSpec
-from tools.pages.tables import cell, with_body
+from tools.pages.tables import with_body
 
 FACES = ("colibri", "colibri.sitl")
 _SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
@@ -46,9 +46,8 @@ def _sections() -> Iterator[str]:
         for name, thing in new.items():
             if name not in errors:
                 yield from _thing(name, thing, origins)
-        yield "### Errors\n\n| | |\n|---|---|"
-        for name, thing in errors.items():
-            yield f"| `{name}` | {cell(_sentence(inspect.getdoc(thing) or ''))} |"
+        yield "### Errors\n"
+        yield from (f"- `{name}`: {_sentence(inspect.getdoc(thing) or '')}" for name, thing in errors.items())
         yield ""
 
 
@@ -63,10 +62,10 @@ def _thing(name: str, thing: Any, origins: dict[str, str]) -> Iterator[str]:
     yield f"### {name}\n"
     if inspect.isfunction(thing):
         yield f"```\n{_signature(name, thing)}\n```\n"
-    yield _text(inspect.getdoc(thing) or "")
+    parts = [_text(inspect.getdoc(thing) or "")]
     if inspect.isclass(thing):
-        yield from _options(thing)
-        yield from _members(thing, origins)
+        parts += [*_options(thing), *_members(thing, origins)]
+    yield re.sub(r"(?m)^(- .*)\n\n+(?=- )", r"\1\n", "\n".join(parts))
 
 
 def _options(kind: type) -> Iterator[str]:
@@ -80,9 +79,8 @@ def _options(kind: type) -> Iterator[str]:
     shared = {name for name in known if known[name] == inherited.get(name)}
     links = ", ".join(f"[`{command}`](cli.md#{command.replace(' ', '-')})" for command in commands)
     yield f"Options described in {links}: {', '.join(f'`{name}`' for name in known if name in shared)}.\n"
-    rows = [f"| `{name}` | {cell(described(field))} |" for name, field in known.items() if name not in shared]
-    if rows:
-        yield "| option | |\n|---|---|\n" + "\n".join(rows) + "\n"
+    yield from (f"- `{name}`: {described(field)}" for name, field in known.items() if name not in shared)
+    yield ""
 
 
 def _origins() -> dict[str, str]:
@@ -104,11 +102,11 @@ def _members(kind: type, origins: dict[str, str]) -> Iterator[str]:
         yield f"As in `{other}`: {', '.join(f'`{name}`' for _, name in same)}.\n"
     own = [row for row in rows.values() if origins[row] == kind.__name__]
     if own:
-        yield "| | |\n|---|---|\n" + "\n".join(own) + "\n"
+        yield "\n".join(own) + "\n"
 
 
 def _rows(kind: type) -> Iterator[tuple[str, str]]:
-    """Yield names and table rows of the public members with a docstring."""
+    """Yield names and lines of the public members with a docstring."""
     internal = _INTERNAL.get(kind.__name__, "").split()
     members = dict(inspect.getmembers(kind))
     assert members.keys() >= set(internal), f"{kind.__name__} lacks {set(internal) - members.keys()}"
@@ -124,7 +122,7 @@ def _rows(kind: type) -> Iterator[tuple[str, str]]:
             continue
         said = _sentence(inspect.getdoc(member) or "")
         if said:
-            yield name, f"| `{cell(shown)}` | {cell(said)} |"
+            yield name, f"- `{shown}`: {said}"
 
 
 def _signature(name: str, function: Any) -> str:
