@@ -52,8 +52,8 @@ class Setting(WorldSpec, LawSpec):
     airborne: Annotated[
         float | None,
         Option(
-            "start in mode HOLD at this height in m above the origin, rotors at hover speed, without take-off; only with "
-            'feedback "state"',
+            "start in mode HOLD at this height in m above the origin, rotors at hover speed, without take-off; only "
+            'with feedback "state"',
             unit="m",
         ),
     ] = None
