@@ -32,6 +32,7 @@ def take_off(station: GroundStation, system: int, height_m: float) -> None:
 def test_each_flies_its_own_flight(tmp_path: Path) -> None:
     with GroundStation() as station:
         with vehicle(tmp_path, "--count", "3", "--instance", "2", links=(station.url,)) as flown:
+            assert not any(is_armed(station, system) for system in SYSTEMS)
             for number, system in enumerate(SYSTEMS):
                 take_off(station, system, 2.0 + number)
                 for other in SYSTEMS:

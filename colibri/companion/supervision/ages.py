@@ -22,7 +22,7 @@ class Age(NamedTuple):
 
 AGES: tuple[Age, ...] = (
     Age("clock", "TIMESYNC", 1.0, 3.0),
-    Age("heartbeat", "HEARTBEAT", 3.0, 3.0),
+    Age("heartbeat", "HEARTBEAT", 5.0, 5.0),
     Age("mode", "CURRENT_MODE or HEARTBEAT", 2.5, 2.5),
     Age("estimator", "ESTIMATOR_STATUS or SYS_STATUS", 2.0, 3.0),
     Age("status", "SYS_STATUS", 3.0, 5.0),

@@ -212,7 +212,7 @@ def test_another_sender_does_not_take_the_link() -> None:
 @pytest.mark.parametrize(
     ("message", "limit", "within_s"),
     [
-        ("HEARTBEAT", "stale reports", 4.2),
+        ("HEARTBEAT", "stale reports", 6.2),
         ("ESTIMATOR_STATUS", "stale reports", 3.5),
         ("SYS_STATUS", "stale reports", 5.5),
         ("TIMESYNC", "stale reports", 3.5),
