@@ -1,6 +1,6 @@
 """Uploaded plans, and the task that flies a mission."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import dist, hypot
 
 from colibri.autopilot.commander.fence import CHECKED_AT_ONCE, Fence
@@ -53,7 +53,8 @@ class Missions:
         self._remarks: tuple[str, ...] = ()
         self._rally: Sequence[MissionItem] = ()
         self.checking = False
-        self._check: Iterator[int] = iter(())
+        self._found: list[tuple[int, Vector]] = []
+        self._checked = 0
         self._reached: list[int] = []
         self.changes = 0
 
@@ -177,27 +178,28 @@ class Missions:
 
     def check_on(self) -> None:
         """Check a few more items: at most `CHECKED_AT_ONCE` pairs of a place and an edge of the fence."""
-        self.checking = next(self._check, None) is not None
+        if not self.checking:
+            return
+        at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
+        part = self._found[self._checked : self._checked + at_once]
+        refused = self._fence.first_outside([place for _, place in part]) if part else None
+        self._checked += at_once
+        self.checking = refused is None and self._checked < len(self._found)
+        if not self.checking:
+            self._judge("" if refused is None else _of_item(part[refused[0]][0], refused[1].reason))
 
     def _check_mission(self) -> None:
-        self._check = self._checked()
+        """Begin to find items that cannot be flown to, or may be a mistake; legs between items are not checked."""
+        items, home = self._executor.items, self._home
+        self._fence.budget.spend(_PLACE_US * len(items))
+        self._found = list(places(items, home.position_enu_m, home.origin))
+        self._checked, self.checking = 0, True
         self.check_on()
 
-    def _checked(self) -> Iterator[int]:
-        """Find items that cannot be flown to, or may be a mistake; legs between items are not checked."""
+    def _judge(self, outside: str) -> None:
+        """Say which items cannot be flown to, or may be a mistake; `outside` names one outside the fence."""
         home, items, said = self._home, self._executor.items, {*self.unmet.values(), *self._remarks}
-        self._fence.budget.spend(_PLACE_US * len(items))
-        found = list(places(items, home.position_enu_m, home.origin))
-        at_once = max(CHECKED_AT_ONCE // self._fence.size, 1)
-        outside = ""
-        for first in range(0, len(found), at_once):
-            part = found[first : first + at_once]
-            refused = self._fence.first_outside([place for _, place in part])
-            if refused is not None:
-                outside = _of_item(part[refused[0]][0], refused[1].reason)
-                break
-            if first + at_once < len(found):
-                yield first + at_once
+        found = self._found
         flown = [each for each in found if items[each[0]].command not in _ON_THE_GROUND]
         reasons = {
             Need.WITHIN_REACH: _first(found, too_far),
