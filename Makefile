@@ -17,7 +17,7 @@ setup: .venv/.ready
 	@$(PYTHON) -m venv --clear .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@$(BIN)/colibri campaign tools/first-flights.toml --quiet --out .venv/first-flights  # compiles, on all cores
+	@$(BIN)/colibri compile --quiet
 	@$(BIN)/colibri sitl --plant-port 0 --gcs udpin:127.0.0.1:0 --speed max --duration 0.1 --quiet
 	@touch $@
 

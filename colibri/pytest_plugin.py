@@ -6,6 +6,7 @@ Every run of pytest loads it; modules that fly are loaded by the first test that
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
@@ -35,6 +36,7 @@ _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
 _SAID = pytest.StashKey[str]()
+_SAYS_COMPILING = pytest.StashKey[bool]()
 _UNWRITTEN = pytest.StashKey[str]()
 _REGISTERED = pytest.StashKey[list[str]]()
 """Names of registered marks, once for each that registers it."""
@@ -224,9 +226,26 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     ground = request.config.getoption("--sitl-ground")
     with _in_one_line():
         setting = setting_of([*([{"ground": ground}] if ground else []), *_said(request.node, seed)])
+    _say_what_takes_long(request.config)
     flights = stack.enter_context(Flights(setting, _launcher(request.config, stack)))
     request.node.stash[_FLIGHTS] = flights
     return flights
+
+
+def _say_what_takes_long(config: pytest.Config) -> None:
+    """Say once that machine code is compiled, past the capture of output."""
+    if config.stash.get(_SAYS_COMPILING, False):
+        return
+    config.stash[_SAYS_COMPILING] = True
+    from colibri.common.jit import on_compile
+
+    def report(functions: int) -> None:
+        capture = config.pluginmanager.getplugin("capturemanager")
+        if functions == 1:
+            with capture.global_and_fixture_disabled() if capture else ExitStack():
+                sys.stderr.write("\nsitl: compiling, once: a minute and more; colibri compile does it beforehand\n")
+
+    on_compile(report)
 
 
 @contextmanager

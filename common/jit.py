@@ -10,7 +10,7 @@ from numba.core.event import Event, Listener, register
 from numpy.typing import NDArray
 
 from colibri.common.errors import Error
-from colibri.common.machine_code.on_disk import MachineCode
+from colibri.common.machine_code.on_disk import MachineCode, waiting
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise Error("NUMBA_DISABLE_JIT must be unset: kernels are compiled")
@@ -91,8 +91,10 @@ def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
 
 
 def on_compile(report: Callable[[int], None]) -> None:
-    """Report the number of functions compiled so far as each compilation begins."""
-    register("numba:compile", _Compiling(report))  # type: ignore[no-untyped-call]
+    """Report the number of functions compiled so far as each compilation begins, here or in a process waited for."""
+    compiling = _Compiling(report)
+    register("numba:compile", compiling)  # type: ignore[no-untyped-call]
+    waiting.append(compiling.on_wait)
 
 
 class _Compiling(Listener):
@@ -104,11 +106,17 @@ class _Compiling(Listener):
         self._begun += 1
         self._report(self._begun)
 
+    def on_wait(self) -> None:
+        if not self._begun:
+            self._begun = 1
+            self._report(1)
+
     def on_end(self, _event: Event) -> None:
         pass
 
 
 def _kernel(function: Callable[..., Any], *, forceinline: bool = False) -> Any:
     kernel: Any = njit(error_model="numpy", forceinline=forceinline)(function)
-    kernel._cache = MachineCode(function)  # noqa: SLF001
+    machine_code = kernel._cache = MachineCode(function)  # noqa: SLF001
+    kernel.compile = machine_code.in_turn(kernel.compile)
     return kernel

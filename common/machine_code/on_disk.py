@@ -16,6 +16,7 @@ from numba.core.caching import FunctionCache, NullCache
 
 from colibri.common.machine_code import results
 from colibri.common.machine_code.private_folder import private_folder
+from colibri.common.machine_code.turns import Turn
 
 _SAID = "COLIBRI_SAID_UNCACHED"
 _NOWHERE = (
@@ -29,6 +30,31 @@ class MachineCode:
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
+        self._turns: list[Turn] = []
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load machine code; without any, wait for a process that compiles it, or take the turn to do so."""
+        found = self._cache.load_overload(sig, target_context)
+        if found is None and isinstance(self._cache, _OnDisk):
+            turn = Turn(self._cache.lock_file(), _report_waiting)
+            self._turns.append(turn)
+            found = self._cache.load_overload(sig, target_context)
+            if found is None:
+                turn.hold_signals()
+        return found
+
+    def in_turn(self, compile_for: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """Return `compile_for` that ends the turns it has taken."""
+
+        def compile_in_turn(sig: Any) -> Any:
+            turns = len(self._turns)
+            try:
+                return compile_for(sig)
+            finally:
+                while len(self._turns) > turns:
+                    self._turns.pop().end()
+
+        return compile_in_turn
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._cache, name)
@@ -51,9 +77,23 @@ class _OnDisk(FunctionCache):
         version = (numba.__version__, llvmlite.__version__, *sorted(files))
         self._cache_file._version = self._cache_file._source_stamp = self._impl.version = version  # noqa: SLF001
 
+    def lock_file(self) -> Path:
+        """Return the file that is locked during compilation."""
+        self._impl.locator.ensure_cache_path()
+        return Path(self._cache_file._index_path).with_suffix(".lock")  # noqa: SLF001
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
+
+
+waiting: list[Callable[[], object]] = []
+"""Called before this process waits for another that compiles."""
+
+
+def _report_waiting() -> None:
+    for report in waiting:
+        report()
 
 
 @cache

@@ -3,16 +3,21 @@
 import importlib
 import os
 import pkgutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from numba.core.dispatcher import Dispatcher
+from numba.core.event import Event, Listener, install_listener
 
 from colibri import autopilot, common, mavlink, plant
+from colibri.common.machine_code import on_disk
 from colibri.common.machine_code.on_disk import files_of
+from colibri.common.machine_code.turns import Turn
 
 MODULES = [
     importlib.import_module(entry.name)
@@ -112,3 +117,42 @@ def test_machine_code_needs_a_private_writable_folder(tmp_path: Path, *, trusted
     assert private.stat().st_mode & 0o777 == (0o700 if trusted else 0o777)
     assert ("NUMBA_CACHE_DIR" in first.stderr) is not trusted
     assert len(first.stderr.splitlines()) == (0 if trusted else 1)
+
+
+class _Interrupts(Listener):
+    def on_start(self, _event: Event) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def on_end(self, _event: Event) -> None: ...
+
+
+def _unseen(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return a kernel that is not compiled yet."""
+    text = "from colibri.common.jit import compiled\n\n@compiled\ndef tripled(x):\n    return 3.0 * x\n"
+    (folder / "unseen.py").write_text(text)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "unseen", raising=False)
+    return importlib.import_module("unseen").tripled
+
+
+def test_an_interrupt_is_raised_after_compilation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = _unseen(tmp_path, monkeypatch)
+    with install_listener("numba:compile", _Interrupts()), pytest.raises(KeyboardInterrupt):
+        kernel(1.0)
+    assert list(tmp_path.rglob("*.nbc")), "it is on disk"
+    assert kernel(2.0) == 6.0
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_one_process_compiles_while_others_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = _unseen(tmp_path, monkeypatch)
+    other = Turn(kernel._cache.lock_file(), lambda: None)  # noqa: SLF001
+    said = []
+
+    def report() -> None:
+        said.append("waiting")
+        other.end()
+
+    monkeypatch.setattr(on_disk, "waiting", [report])
+    assert kernel(1.0) == 3.0
+    assert said == ["waiting"]

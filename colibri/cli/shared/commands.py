@@ -138,6 +138,11 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
         ),
     },
     "this computer": {
+        "compile": CommandEntry(
+            "compile what flights and flight tests need, beforehand",
+            "computer",
+            "colibri compile    # once after installation, in CI before pytest",
+        ),
         "doctor": CommandEntry(
             "look whether everything is there that flights need",
             "computer",

@@ -1,0 +1,17 @@
+"""`colibri compile`."""
+
+from argparse import Namespace
+
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import loading
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+
+
+def run(args: Namespace) -> int:
+    with loading():
+        from colibri.cli.computer.first_flights import compile_all
+
+    return compile_all(quiet=args.quiet)
