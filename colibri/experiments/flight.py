@@ -119,9 +119,9 @@ class Flight:
 
 
 def load_flight(folder: str | PurePath) -> Flight:
-    """Return a recorded flight by its folder, as `fly` or `save` left it.
+    """Read a flight from a folder of `colibri fly` or `save`.
 
-    The flight's log is read as it is needed. A flight that ended early has the report of what there is.
+    Its log is read on demand. After an early end, the report covers the flight until then.
 
     Raises:
         Error: The folder has no flight, or one of another version.
