@@ -9,16 +9,17 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any, get_args
 
-from colibri.autopilot.spec import LawSpec
-from colibri.common.spec import Option, described, fields_of
-from colibri.flights import FlightSpec
-from colibri.plant.spec import WorldSpec
+from colibri.common.spec import Option, fields_of
 from tools.pages.tables import with_body
 
 FACES = ("colibri", "colibri.sitl")
 _SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
 _ENTRY = re.compile(r"^    (\*{0,2}\w+(?:, \w+)*)(?: \(.*?\))?: (.*)$")
-_OPTIONS_OF: dict[str, type] = {"colibri fly": FlightSpec, "colibri plant": WorldSpec, "colibri autopilot": LawSpec}
+_OPTIONS = {
+    "FlightSpec": "[`colibri fly`](cli.md#colibri-fly)",
+    "Setting": "[initial conditions](scenarios.md#initial-conditions) and [`colibri fly`](cli.md#colibri-fly)",
+}
+"""Where options are described."""
 _INTERNAL = {
     "FlightPlan": "autopilot_spec floor_m flown_by integrator plant_spec plant_vehicle_name start_yaw_rad vehicle_name",
     "Flights": "keep summary",
@@ -69,18 +70,10 @@ def _thing(name: str, thing: Any, origins: dict[str, str]) -> Iterator[str]:
 
 
 def _options(kind: type) -> Iterator[str]:
-    """Describe options of the class, and list those described with commands."""
-    if not (is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type))):
-        return
-    known = {name: field for name, field in fields_of(kind).items() if field.option.keyword}
-    commands = [command for command, spec in _OPTIONS_OF.items() if issubclass(kind, spec)]
-    commands = commands[:1] if kind is _OPTIONS_OF[commands[0]] else commands
-    inherited = {name: field for command in commands for name, field in fields_of(_OPTIONS_OF[command]).items()}
-    shared = {name for name in known if known[name] == inherited.get(name)}
-    links = ", ".join(f"[`{command}`](cli.md#{command.replace(' ', '-')})" for command in commands)
-    yield f"Options described in {links}: {', '.join(f'`{name}`' for name in known if name in shared)}.\n"
-    yield from (f"- `{name}`: {described(field)}" for name, field in known.items() if name not in shared)
-    yield ""
+    """List options by name."""
+    if is_dataclass(kind) and Option in (type(note) for each in fields(kind) for note in get_args(each.type)):
+        names = ", ".join(f"`{name}`" for name, field in fields_of(kind).items() if field.option.keyword)
+        yield f"Options, described in {_OPTIONS[kind.__name__]}: {names}.\n"
 
 
 def _origins() -> dict[str, str]:
