@@ -53,7 +53,7 @@ class FlightTable:
         return table.view(SampleTable)
 
     def to_pandas(self) -> Any:
-        """Return the table as a pandas.DataFrame; PandasError if pandas is not installed."""
+        """Return a pandas.DataFrame; PandasError without pandas."""
         return self.flights.to_pandas()
 
     def factor(self, name: str) -> np.ndarray[Any, Any]:
@@ -91,7 +91,7 @@ class FlightTable:
         return found
 
     def without_effect(self) -> list[str]:
-        """Return the factors of the grid whose values all give the same flights."""
+        """Return factors of the grid without effect."""
         return [] if self.campaign.draw else [name for name in self.campaign.grid if self._is_idle(name)]
 
     def _is_idle(self, factor: str) -> bool:

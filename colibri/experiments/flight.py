@@ -57,7 +57,7 @@ class Flight:
 
     @property
     def impact(self) -> str | None:
-        """The hardest contact with the ground beyond 3 m/s or 60°, or `None`."""
+        """Hardest ground contact beyond 3 m/s or 60°, or `None`."""
         impact: str | None = self.report["impact"]
         return impact
 
@@ -73,7 +73,7 @@ class Flight:
 
     @cached_property
     def estimate(self) -> SampleTable | None:
-        """One row per control sample: the state estimate; `None` with feedback of the true state."""
+        """On sensors the state estimate, one row per control sample; else `None`."""
         table = table_of(ESTIMATE.names, self.log.blocks(ESTIMATE))
         return table if self.plan.spec.feedback is Feedback.SENSORS else None
 
@@ -96,7 +96,7 @@ class Flight:
         raise OptionError(unknown("figure", what, known))
 
     def save(self, folder: str | Path) -> Path:
-        """Write log, table, report and provenance into a new or empty folder; return it.
+        """Write log, table, report and provenance to a new or empty folder.
 
         Raises:
             OptionError: The folder is not empty, or cannot be written.

@@ -125,7 +125,7 @@ class FlightPlan:
 
     @property
     def plant_vehicle(self) -> Vehicle:
-        """The vehicle that the plant flies, without the parts left out."""
+        """The plant's vehicle, without omitted parts."""
         return self.contents.plant_vehicle
 
     @property
@@ -145,7 +145,7 @@ class FlightPlan:
 
     @property
     def without_effect(self) -> dict[str, str]:
-        """The options without effect on this flight, and the reason of each."""
+        """Options without effect, with reasons."""
         name, whole = self.plant_vehicle_name, self.contents.whole
         return without_effect(FlownOptions(self.spec, name, self.vehicle, self.plant_vehicle, whole))
 

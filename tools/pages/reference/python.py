@@ -150,7 +150,7 @@ def _text(doc: str) -> str:
         section, entry = _SECTION.match(line), _ENTRY.match(line)
         if section:
             in_section, begin = True, "Raises " if section[1] == "Raises" else "- "
-            lines += [f"*{section[1]}*", ""] if begin == "- " else []
+            lines += [f"*{section[1]}*", ""] if section[1] not in ("Raises", "Attributes") else []
         elif in_section and entry:
             names = ", ".join(f"`{name}`" for name in entry[1].split(", "))
             lines.append(f"{begin}{names}: {entry[2]}")
