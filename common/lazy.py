@@ -21,6 +21,8 @@ def public(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
         return {alias.name: str(node.module) for node in imports for alias in node.names}
 
     def get(name: str) -> Any:
+        if name[:1] != "_" and name not in places() and (Path(modules[package].__path__[0]) / name).is_dir():
+            return import_module(f"{package}.{name}")  # a package within, `colibri.lpv` say
         if name != "__all__" and name not in places():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = sorted(places()) if name == "__all__" else getattr(import_module(places()[name]), name)

@@ -24,6 +24,7 @@ PACKAGES = (
     "colibri.certification",
     "colibri.cli",
     "colibri.doctor",
+    "colibri.lpv",
     "colibri.studies",
     "colibri.verification",
 )
