@@ -27,10 +27,10 @@ class TuningResults:
 
     Attributes:
         trials: Finished trials by number; the first is the original profile.
-        best: Trial with the least objective; with several, the one on the Pareto front nearest to the least of each,
-            relative to the front's ranges.
-        front: Trials that are not dominated.
-        importances: Importance of each number by objective, as fractions of one (PED-ANOVA); empty below eight trials.
+        best: Trial with the least objective; with several, the trial on the Pareto front nearest to all minima, relative
+            to the front's ranges.
+        front: Pareto front.
+        importances: Relative importance of each number by objective (PED-ANOVA); empty below eight trials.
         profile: The tuned profile.
         checked: Flights of both profiles with `check_seeds`, if there are any.
         verdict: Comparison of both; empty without them.
