@@ -27,8 +27,8 @@ class TuningResults:
 
     Attributes:
         trials: Finished trials by number; the first is the original profile.
-        best: Trial with the least objective; with several, the trial on the Pareto front nearest to all minima, relative
-            to the front's ranges.
+        best: Trial with the least objective; with several, that on the Pareto front nearest to all minima, relative to
+            the front's ranges.
         front: Pareto front.
         importances: Relative importance of each number by objective (PED-ANOVA); empty below eight trials.
         profile: The tuned profile.
