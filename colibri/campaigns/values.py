@@ -137,7 +137,10 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
         objects = [value for value in values if shown(value) == twice]
         if isinstance(objects[0], _PLAIN) or any(objects[0] == other for other in objects[1:]):
             raise CampaignError(f"{key}: {twice} is there twice")
-        return tuple(Level(f"{shown(value)} ({place})", {key: value}) for place, value in enumerate(values, 1))
+        names = [f"{getattr(value, '__module__', '')}.{shown(value)}" for value in values]
+        if first_twice(names):
+            names = [f"{shown(value)} ({place})" for place, value in enumerate(values, 1)]
+        return tuple(Level(name, {key: value}) for name, value in zip(names, values, strict=True))
     return values
 
 

@@ -63,8 +63,8 @@ def test_the_snippet_of_readme_runs(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_tutorial_of_a_law_of_one_s_own_comes_out_as_it_says(tmp_path: Path) -> None:
-    law, *trials, campaign = python_of("docs/your-own-law.md")
-    for name, text in {"my_law": law, "try_it": "\n".join(trials), "campaign": campaign}.items():
+    law, *trials, campaign, gate = python_of("docs/your-own-law.md")
+    for name, text in {"my_law": law, "try_it": "\n".join(trials), "campaign": campaign, "gate": gate}.items():
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     said = run(tmp_path, "try_it.py").splitlines()
     lost, height_m = said[0].split()
@@ -74,6 +74,10 @@ def test_the_tutorial_of_a_law_of_one_s_own_comes_out_as_it_says(tmp_path: Path)
     assert [float(line.split()[-1]) for line in said[2:4]] == pytest.approx([0.048, 0.012], abs=5e-4)
     assert said[4].split()[0] == "True"
     run(tmp_path, "campaign.py")
+    who = ("-c", "user.name=a", "-c", "user.email=a@b")
+    for words in (("init", "-q", "-b", "main"), ("add", "my_law.py"), (*who, "commit", "-q", "-m", "law")):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    assert run(tmp_path, "gate.py").startswith("lost 0, before 0; median ")
     page = (DOCS / "your-own-law.md").read_text(encoding="utf-8")
     promised = re.findall(r"^\| (\d+) \| 0 of 8 \| ([\d.]+) m \| ([\d.]+) m \| ([\d.]+) m \|$", page, re.MULTILINE)
     rows = [row.split(",") for row in (tmp_path / "out" / "spring" / "summary.csv").read_text().splitlines()[1:]]

@@ -84,3 +84,15 @@ def test_what_is_no_range_is_refused(given: Any, said: str) -> None:
 )
 def test_values_are_shown_as_a_file_has_them(value: Any, text: str) -> None:
     assert shown(value) == text
+
+
+@pytest.mark.parametrize(
+    ("modules", "names"),
+    [
+        (("before", "after"), ["before.Law", "after.Law"]),
+        (("law", "law"), ["Law (1)", "Law (2)"]),
+    ],
+)
+def test_classes_of_one_name_are_told_apart(modules: tuple[str, str], names: list[str]) -> None:
+    laws = [type("Law", (), {"__module__": module}) for module in modules]
+    assert [level.name for level in read_values("controller", laws)] == names
