@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 def run(spec: AutopilotSpec, link: UdpLink | BlockingReceiver, status: Status, stop: Stop) -> int:
     try:
         profile, vehicle = spec.load()
+        if spec.params and not spec.served:
+            from colibri.autopilot.parameters.chosen import with_parameters  # slow to load
+
+            profile, vehicle = with_parameters(profile, vehicle, spec.params, served=False)
         ground = _ground(spec, profile, vehicle, status, stop) if spec.served else None
         autopilot: Autopilot[Any] = ground.autopilot if ground else _alone(spec, profile, vehicle, status)
         end = _flier(spec, vehicle) if spec.simulator else _end(spec, autopilot.frame_interval_us)

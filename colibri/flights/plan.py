@@ -98,6 +98,13 @@ class FlightPlan:
         check_reach(spec.gcs, signed=spec.signing_key is not None, insecure=spec.insecure)
         contents = contents or contents_of(spec)
         profile, vehicle, plant_vehicle, track_file, _ = contents
+        if spec.params:
+            from colibri.autopilot.parameters.chosen import with_parameters  # slow to load
+
+            chosen = with_parameters(profile, vehicle, dict(spec.params), served=bool(spec.gcs))
+            if not spec.gcs:
+                profile, vehicle = chosen
+                contents = contents._replace(profile=profile, vehicle=vehicle)
         names = _names(spec, profile)
         if spec.feedback is Feedback.SENSORS:
             for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
@@ -188,7 +195,8 @@ class FlightPlan:
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
         """Return the specification of the autopilot, which calls the plant."""
         tlog = self.spec.tlog or bool(self.spec.gcs)
-        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog)
+        params = dict(self.spec.params)
+        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog, params=params)
 
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:

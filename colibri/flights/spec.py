@@ -1,12 +1,15 @@
 """All options of a flight."""
 
+from argparse import ArgumentTypeError
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from colibri.autopilot.spec import GroundSpec, LawSpec, Trajectory
-from colibri.common.errors import Error
+from colibri.common.errors import Error, shown
+from colibri.common.process.arguments import number
 from colibri.common.spec import Option, from_values
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import Vehicle
@@ -21,6 +24,27 @@ TRACK_HELP = (
 
 class OptionError(Error):
     """An option is unknown or has an invalid value."""
+
+
+def parameter(text: str) -> dict[str, float]:
+    """Read NAME=VALUE[,NAME=VALUE...]."""
+    try:
+        pairs = [pair.partition("=") for pair in text.split(",")]
+        return {name.strip(): number(value) for name, _, value in pairs}
+    except ValueError:
+        raise ArgumentTypeError(f'must be NAME=VALUE, "VEH_MASS=0.7" say, not "{text}"') from None
+
+
+def merged(given: Iterable[Any]) -> dict[str, float]:
+    """Return parameters of one table, or of several; a later value replaces an earlier one."""
+    tables = [given] if isinstance(given, Mapping) else [parameter(it) if isinstance(it, str) else it for it in given]
+    for table in tables:
+        if not isinstance(table, Mapping):
+            raise OptionError(f'params: must be a table of numbers, not {type(table).__name__} "{shown(table)}"')
+        for name, value in table.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+                raise OptionError(f'params: {name} must be a number, not {type(value).__name__} "{shown(value)}"')
+    return {str(name): value for table in tables for name, value in table.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +62,15 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     """The options of a flight."""
 
     track: Annotated[Any, Option(TRACK_HELP, "TRACK")]
+    params: Annotated[
+        tuple[Any, ...],
+        Option(
+            "set a parameter of the autopilot before the flight: of control law and vehicle model; with --gcs, of all",
+            "NAME=VALUE",
+            read=parameter,
+            flag="set",
+        ),
+    ] = ()
     integrator: Annotated[Literal["rk4", "adaptive"] | None, Option("of the plant (default: the profile's)")] = None
     link: Annotated[
         Literal["udp", "memory", "direct"],
@@ -54,6 +87,7 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     def __post_init__(self) -> None:
         """Sample a track that is an object or a function, and read the events."""
         super().__post_init__()
+        object.__setattr__(self, "params", merged(self.params))
         if not isinstance(self.track, str | Trajectory):
             from colibri.autopilot.guidance.trajectories.sampling import sampled_track  # slow to load
 

@@ -41,7 +41,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--resume", action="store_true", help="continue the campaign in --out")
     add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")
-    add_spec(parser, FlightSpec, leave_out=("track", "seed", "speed"), given_only=True, keywords_only=True)
+    add_spec(parser, FlightSpec, leave_out=("track", "seed", "speed", "params"), given_only=True, keywords_only=True)
     add_gate(add, None)
     add_junit(add)
     add_out(add, "out/campaign", "table, summary, figure and journal")
