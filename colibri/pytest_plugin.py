@@ -233,8 +233,9 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
 
 
 def _say_what_takes_long(config: pytest.Config) -> None:
-    """Say once that machine code is compiled, past the capture of output."""
-    if config.stash.get(_SAYS_COMPILING, False):
+    """Say once that machine code is compiled, past the capture of output; of several workers the first says it."""
+    worker: str = getattr(config, "workerinput", {}).get("workerid", "gw0")
+    if worker != "gw0" or config.stash.get(_SAYS_COMPILING, False):
         return
     config.stash[_SAYS_COMPILING] = True
     from colibri.common.jit import on_compile
