@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, TypeAlias
 import msgspec
 
 from colibri.common.config import plain, read_toml
-from colibri.common.errors import Error, shown, unknown
+from colibri.common.errors import shown, unknown
 from colibri.common.process.arguments import number
 from colibri.common.types import FourRotors, Vector
 from colibri.mavlink.hil import faults
@@ -21,6 +21,7 @@ from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.environment.weather import MAX_SPEED_M_S, RecordedWind, Wind
+from colibri.plant.errors import PlantError
 from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle
 
@@ -29,7 +30,7 @@ _SAMPLED_S = 0.02
 """Interval of samples of a wind that is a function."""
 
 
-class EventError(Error):
+class EventError(PlantError):
     """An event is unknown or has an invalid value, or the flight cannot have it."""
 
 

@@ -115,7 +115,19 @@ def test_what_changed_since_is_flown_again(tmp_path: Path, ran: Ran, monkeypatch
     profile, out = tmp_path / "mine.toml", tmp_path / "out"
     text = FLIGHT.read_text(encoding="utf-8")
     profile.write_text(text, encoding="utf-8")
-    command = ["compare", "--profile", profile, "--track", "hover", "--seeds", "1-2", "--duration", "0.5"]
+    command = [
+        "compare",
+        "--profile",
+        profile,
+        "--track",
+        "hover",
+        "--start",
+        "x=1",
+        "--seeds",
+        "1-2",
+        "--duration",
+        "0.5",
+    ]
 
     def flown(*options: str) -> tuple[str, list[str]]:
         said = ran(*command, "--out", out, *options).out
@@ -131,7 +143,9 @@ def test_what_changed_since_is_flown_again(tmp_path: Path, ran: Ran, monkeypatch
     assert "control" in said
     assert "NEES" not in said, "nothing is estimated"
     assert max(map(len, said.splitlines()[2:])) <= 80
-    profile.write_text("# a remark\n" + text.replace("poles = [-5.0, -6.0]", "poles = [-4.0, -6.0]"), encoding="utf-8")
+    profile.write_text(
+        "# a remark\n" + text.replace("\npoles = [-7.0, -8.0]", "\npoles = [-6.0, -8.0]"), encoding="utf-8"
+    )
     said, anew = flown("--resume")
     assert set(anew).isdisjoint(first)
     assert "--resume: 0 of 2 flights were flown already, by the same contents\n" in said

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.thesis.lpv_model import ATTITUDE_OUTPUT, Discretisation, attitude_model, discretise
+from colibri.common.matrices import dot
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
@@ -54,7 +55,7 @@ class LpvModel(NamedTuple):
 def model(vehicle: Any, point: Point = HOVER) -> LpvModel:
     """Return the model of a vehicle, by its name, file or object, at a scheduling point."""
     flown: Vehicle = load_vehicle(vehicle)
-    momentum = float(flown.rotor_momentum() @ np.array(point.rotor_speeds))
+    momentum = dot(flown.rotor_momentum(), np.array(point.rotor_speeds, dtype=np.float64))
     A, B = attitude_model(
         point.phi_rate_rad_s, point.theta_rate_rad_s, momentum, inertia_kg_m2=flown.body.inertia_kg_m2
     )

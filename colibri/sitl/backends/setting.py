@@ -103,7 +103,8 @@ def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
     try:
         setting = Setting(**values)
         mine = [it for it in setting.events if isinstance(it, PLANT_EVENTS)]
-        check_events(mine, load_vehicle(setting.vehicle), on_sensors=setting.feedback is Feedback.SENSORS)
+        if mine:
+            check_events(mine, load_vehicle(setting.vehicle), on_sensors=setting.feedback is Feedback.SENSORS)
     except EventError as error:
         raise SettingError(f"events: {error}") from None
     for event in setting.events:

@@ -111,7 +111,7 @@ def test_damaged_logs_get_one_line(flown: Path, capsys: pytest.CaptureFixture[st
 def test_a_log_that_ends_in_a_long_message_is_not_read_forever(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = flown / "long.ulg"
     path.write_bytes((flown / "flight.ulg").read_bytes()[:16] + b"\0" * 30_000 + b"\x64" + b"\0" * 7)
-    assert "long.ulg is no ULog" in said(["export", "--csv", str(path)], capsys)
+    assert "long.ulg is not a ULog" in said(["export", "--csv", str(path)], capsys)
 
 
 @pytest.mark.parametrize(

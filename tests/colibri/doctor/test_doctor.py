@@ -71,7 +71,7 @@ def test_the_port_of_the_plant_must_be_free(monkeypatch: pytest.MonkeyPatch, tak
     monkeypatch.setattr(network, "GROUND_PORT", taken)
     ground, _, plant = network.ports()
     assert ground.verdict is Severity.FINE
-    assert f"(process {os.getpid()}) waits there" in ground.found
+    assert f"(process {os.getpid()}) is listening" in ground.found
     assert plant.verdict is Severity.FAILED
     assert plant.found.startswith("taken by ")
     assert PLANT_PORT == 14560

@@ -171,7 +171,7 @@ def _with(content: bytes | None) -> Any:
         (_with(b"[1]"), "report.json: Expected `object`"),
         (_with(None), "flight.ulg is missing"),
         (lambda folder: (folder / "flight.ulg").write_bytes(b""), "flight.ulg: not a ULog"),
-        (lambda folder: (folder / "provenance.json").unlink(), "is no folder of a flight of this version"),
+        (lambda folder: (folder / "provenance.json").unlink(), "is not a flight folder of this version"),
     ],
 )
 def test_a_folder_without_flight_is_refused(hover: colibri.Flight, spoil: Any, said: str, tmp_path: Path) -> None:

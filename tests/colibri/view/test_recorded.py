@@ -73,7 +73,7 @@ def test_horizons_begin_at_the_vehicle_and_lead_ahead(folder: Path, recorded: Re
 
 
 def test_a_folder_without_a_flight_is_refused_in_one_line(tmp_path: Path, flight: Flight) -> None:
-    with pytest.raises(ViewError, match="no folder of a flight"):
+    with pytest.raises(ViewError, match="is not a flight folder"):
         RecordedFlight(tmp_path)
     copied = flight.save(tmp_path / "copy")
     (copied / "flight.ulg").write_bytes(beginning("Test", {}))

@@ -115,7 +115,7 @@ def test_a_caught_vehicle_goes_on_with_its_mission(sitl: Sitl) -> None:
     sitl.run(0.5)
     sitl.wait_until(lambda: state(sitl) == HOLDING, within=20.0)
     assert sitl.said("Restarted in flight: mission continues at item 0")
-    assert sitl.said("found falling")
+    assert sitl.said("Restarted in flight without a record: falling")
     assert sitl.is_at((0.0, 5.0, 12.0), 3.0, slow_m_s=1.0)
 
 

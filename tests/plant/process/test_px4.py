@@ -245,7 +245,7 @@ def test_a_px4_that_waits_to_be_called_is_called_over_udp(tmp_path: Path) -> Non
         url = link.url.replace("udpin", "udpout")
         with plant(tmp_path, url) as process:
             calling = process.wait_for("calling")
-            assert (calling["url"], calling["text"]) == (url, f"calling PX4 at {url}")
+            assert (calling["url"], calling["text"]) == (url, f"connecting to PX4 at {url}")
             assert process.events("listening") == []
             called = receive_soon(link, GIVE_UP_AFTER_S)
             for datagram in px4.hello():
