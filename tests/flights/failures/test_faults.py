@@ -35,20 +35,20 @@ def test_the_autopilot_knows_of_a_sagging_battery(sitl: Sitl) -> None:
 
 
 def test_a_slow_solver_acts_late_and_skips_samples(sitl_fleet: Callable[..., list[Sitl]]) -> None:
-    def flown(solve_ms: float) -> Sitl:
+    def flown(solve_ms: float, off_m: float = 0.1) -> Sitl:
         (sitl,) = sitl_fleet(1, airborne=5.0, system=1, params={"SIM_SOLVE_MS": solve_ms})
         sitl.run(0.5)
         sitl.goto(2.0, 0.0, 5.0, wait=False)
         sitl.run(6.0)
-        assert dist(sitl.position, (2.0, 0.0, 5.0)) < 0.1
+        assert dist(sitl.position, (2.0, 0.0, 5.0)) < off_m
         return sitl
 
-    prompt, in_time, late = flown(0.0), flown(8.0), flown(12.0)
+    prompt, in_time, late = flown(0.0), flown(8.0), flown(12.0, 0.3)
     missed = [sitl.inside.copter.parts.actuation.missed for sitl in (prompt, in_time, late)]
     assert missed[:2] == [0, 0]
     assert missed[2] == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
     assert len({sitl.sha256 for sitl in (prompt, in_time, late)}) == 3
-    assert flown(12.0).sha256 == late.sha256
+    assert flown(12.0, 0.3).sha256 == late.sha256  # it swings: half the rate, and late
 
 
 # A payload that is picked up and dropped in flight: its mass is estimated, in the air alone.
