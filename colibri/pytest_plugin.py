@@ -251,7 +251,6 @@ def _say_what_takes_long(config: pytest.Config) -> None:
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """Fail a test in one line if its flight cannot begin."""
     try:
         yield
     except SitlError as error:

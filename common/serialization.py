@@ -28,7 +28,6 @@ def _encoded(value: Any) -> Any:
 
 
 def _decoded(_kind: Any, value: Any) -> Any:
-    """Return an array, the only type that msgspec cannot decode itself."""
     shape, content = value
     return np.frombuffer(content, dtype=np.float64).reshape(shape).copy()
 

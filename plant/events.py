@@ -227,7 +227,6 @@ def _wind(given: Any, duration_s: float) -> Any:
 
 
 def _plain_wind(given: Wind | RecordedWind) -> Any:
-    """Return a wind as data; a file by its content."""
     if isinstance(given, Wind):
         return list(given)
     return {"path": "", "times_s": given.times_s, "velocities_enu_m_s": given.velocities_enu_m_s}

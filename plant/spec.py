@@ -73,7 +73,6 @@ class WorldSpec:
     ] = 0.0
 
     def __post_init__(self) -> None:
-        """Read and sort the events."""
         if self.events:
             object.__setattr__(self, "events", events_of(self.events, getattr(self, "duration", inf)))
 

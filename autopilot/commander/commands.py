@@ -160,7 +160,6 @@ class Commands:
         return Refusal("Preflight Fail: " + "; ".join(reasons), FAILED) if reasons else None
 
     def _judge_fence(self) -> None:
-        """Have readiness know the fence of this frame."""
         vehicle = self._pilot.sensed.vehicle
         if vehicle is not None:
             self._pilot.readiness.judge_fence(self._fence.arming_refusal(vehicle.position_enu_m))

@@ -184,5 +184,4 @@ def scaled(law: str, table: Mapping[str, Any], vehicle: Vehicle) -> dict[str, An
 
 
 def _rounded(value: Any) -> Any:
-    """Round to three digits: ratios are not known better."""
     return [_rounded(each) for each in value] if isinstance(value, list) else float(f"{value:.3g}")

@@ -22,7 +22,6 @@ class SolveTime:
     """
 
     def __init__(self, interval_us: int) -> None:
-        """Begin idle; a decision is due every `interval_us`."""
         self._interval_us = interval_us
         self._ready_us: int | None = None
         self._next = self._now = STILL

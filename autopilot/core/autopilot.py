@@ -106,7 +106,6 @@ class Autopilot(Generic[StagesT]):
     """
 
     def __init__(self, stages: StagesT, clock: Clock) -> None:
-        """Fly by `stages`; `clock`, in seconds, only measures computation times."""
         self.stages = stages
         self.frame_interval_us = stages.loop.frame_interval_us
         self._clock = clock

@@ -208,7 +208,6 @@ class Copter:
             self.guard(table.TELEMETRY, self._reporter.report, self.stations.go_on, *sampled)
 
     def _receive_from_stations(self, inbox: Iterable[Received], now_us: int) -> None:
-        """Handle the received datagrams; a datagram that raises is dropped."""
         if self.stations.hub.waiting:
             self.guard(table.DATAGRAM, self.stations.hub.work, _nothing, now_us)
         if not inbox:
@@ -226,7 +225,6 @@ class Copter:
         return True
 
     def _refuse(self, inbox: Iterable[Received]) -> list[Outgoing]:
-        """Deny commands before the first estimate."""
         if self._waiting_us is None:
             return []
         self.stations.refuse_commands("Not ready: no attitude and position estimate yet")

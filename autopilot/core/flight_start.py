@@ -54,7 +54,6 @@ class FlightStart:
             self._begin(frame, again=before_us is not None)
 
     def _resume(self, history: History, frame: StateFrame) -> None:
-        """Continue the flight of the killed autopilot."""
         parts, pilot, checkpoint = self._parts, self._parts.pilot, history.checkpoint
         if checkpoint.pilot.state.mode is not Mode.TRACK or checkpoint.task.began_us != 0:
             parts.tasks.forget_first()

@@ -58,7 +58,6 @@ class Flying:
         return self._guard(table.TASK, pilot.step, self._hold)
 
     def _hold(self) -> Guidance:
-        """Replace a task that has raised by hold."""
         if not self._parts.pilot.state.armed:
             return RESTS
         return self._guard(table.GUIDANCE, self._step_hold, self._last_resort)

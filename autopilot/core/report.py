@@ -21,7 +21,6 @@ class Reporter:
     """
 
     def __init__(self, parts: Parts) -> None:
-        """Report of a vehicle of these parts."""
         self._parts = parts
         self._health = HealthWatch()
         self._interval_s = parts.loop.control_interval_us * 1e-6
@@ -52,7 +51,6 @@ class Reporter:
     def _arming_inputs(
         self, state: VehicleState, estimate: Estimate | None, outside_fence: Refusal | None, charge_state: int
     ) -> ArmingInputs:
-        """Return the inputs of the arming checks."""
         parts, pilot = self._parts, self._parts.pilot
         sticks = pilot.sensed.steered.sticks
         return ArmingInputs(

@@ -58,13 +58,11 @@ class Supervision:
             self._caught_us = None
 
     def _execute(self, now_us: int, state: VehicleState) -> None:
-        """Have the pilot execute the failsafe that is due."""
         action = self._parts.supervisor.step(self._inputs(now_us, state), self._parts.pilot.flight)
         if action is not Action.NONE:
             self._parts.pilot.save(action)
 
     def _sensed(self, now_us: int) -> tuple[ClientInputs, bool]:
-        """Return the setpoints of clients, and whether the position is known."""
         parts = self._parts
         return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
 
@@ -86,7 +84,6 @@ class Supervision:
             parts.state_source.help_inertial(rotor_loss.watch.expected, armed=pilot.state.armed)
 
     def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
-        """Return the inputs of the failsafes' conditions."""
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
         sticks = stations.manual.latest(now_us, _EVER_US)
         decision = parts.actuation.decision

@@ -28,7 +28,6 @@ class VehicleTrial:
     """Tries the changes of one vehicle's parameters; the control law is tried by `Tuning` itself."""
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss, planned_at: Instants) -> None:
-        """Try for a vehicle of these parts."""
         self._loop, self._rotor_loss, self._planned_at = loop, rotor_loss, planned_at
 
     def is_ready(self, vehicle: Vehicle) -> bool:

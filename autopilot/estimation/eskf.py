@@ -262,7 +262,6 @@ class Filter:
         return sum(kind.resets for kind in self.kinds)
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:
-        """Return the white-noise variances, larger if the fix reports worse accuracy."""
         drift = self._noise.gps_drift
         return (
             self._horizontal + _excess(fix.horizontal_accuracy_m, self._horizontal + drift[0]),

@@ -187,7 +187,6 @@ def _cholesky(S: Array) -> Array:
 
 @compiled
 def _gain(C: Array, L: Array) -> Array:
-    """K = C S⁻¹ with S = L Lᵀ."""
     m = len(L)
     K = C.copy()
     for i in range(len(C)):
@@ -240,7 +239,6 @@ def _inject(x: Array, P: Array, error: Array) -> None:
 
 @compiled
 def _in_body(x: Array, earth: Array) -> Array:
-    """Rᵀ · earth."""
     w, a, b, c = x[6:10]
     e, n, u = earth
     body = np.empty(3)

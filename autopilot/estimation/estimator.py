@@ -72,7 +72,6 @@ class Estimator:
     """Estimates the state of one vehicle; `caught` if it started in a fall."""
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
-        """Load compiled code here, not in the first step."""
         self._sensors, self._gravity, self._origin = sensors, gravity_m_s2, origin
         self._interval_us = interval_us
         self._field = field_enu_gauss(origin)
@@ -257,7 +256,6 @@ class Estimator:
             self._take(now_us)
 
     def _take(self, now_us: int) -> None:
-        """Advance the filter by the oldest waiting sample."""
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
         time_us, values = self._buffer.take()
@@ -301,7 +299,6 @@ class Estimator:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
-        """Compute the estimate; restart on impossible numbers."""
         self._unpublished = False
         filter_, buffer = self.filter, self._buffer
         ahead = len(buffer.waiting)

@@ -49,7 +49,6 @@ class Calibration:
 
 
 def _kind_of(p: tuple[float, ...]) -> str | None:
-    """Return the kind of calibration; empty to cancel."""
     given = [0.0 if value != value else value for value in p]  # nan: not given
     chosen = [(place, value) for place, value in enumerate(given) if value != 0.0]
     if not chosen:

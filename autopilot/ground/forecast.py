@@ -21,7 +21,6 @@ class Forecaster:
     """Integrates the plans of one control law."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
-        """Plans without attitude lack `columns`."""
         self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg

@@ -126,7 +126,6 @@ def _integers(kinds: tuple[BindingDerivative, BindingDerivative, BindingDerivati
 
 
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
-    """Return the target, with yaw in the reference's full turn."""
     heading = target.heading
     turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
     if turns:

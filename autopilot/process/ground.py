@@ -168,7 +168,6 @@ class GroundService:
             self._keep()
 
     def _keep(self) -> None:
-        """Save the state for a restart after a kill."""
         copter, samples = self.copter, self.copter.samples
         if samples == self._kept_samples:  # between two control samples
             return

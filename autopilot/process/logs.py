@@ -147,7 +147,6 @@ class AutopilotLog:
         self.topics.close()
 
     def _begin_anew(self) -> None:
-        """Start a new flight, because the plant's time has restarted."""
         self.topics.close()
         self._received_bytes = self._said_bytes = 0
         self._status_us, self._thinning = -1, Thinning()
@@ -194,7 +193,6 @@ class AutopilotLog:
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))
 
     def _check_row(self, check: FilterCheck) -> tuple[float, ...]:
-        """Return the row of `FILTER`; absent measurements are nan."""
         nis, accepted = (dict(zip(self._kinds, each, strict=True)) for each in (check.nis, check.accepted))
         counts = (*(nis.get(kind, nan) for kind in MEASURED), *(accepted.get(kind, nan) for kind in MEASURED))
         return (check.time_us / 1e6, *check.state, *check.covariance, *counts)

@@ -72,7 +72,6 @@ def _end(spec: AutopilotSpec, frame_interval_us: int) -> AutopilotEnd:
 
 
 def _flier(spec: AutopilotSpec, vehicle: Vehicle) -> FlierEnd:
-    """Return the end for a simulator with PX4's rotor order."""
     rotors, order = vehicle.rotors, vehicle.rotors.numbering()
     return FlierEnd(
         system_id=spec.system_id,
@@ -90,7 +89,6 @@ def _alone(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Stat
 
 
 def _ground(spec: AutopilotSpec, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "GroundService":
-    """Load ground services only if used: they double the start-up time."""
     from colibri.autopilot.process.ground import GroundService
     from colibri.autopilot.process.stepped_links import UdpConductor
 

@@ -161,7 +161,6 @@ class StateFolder:
         return key
 
     def _read_timestamp(self) -> int:
-        """Return the last timestamp, because signatures must not repeat one."""
         if self._path is None:
             return 0
         path = self._path / TIMESTAMP
@@ -176,7 +175,6 @@ class StateFolder:
 
 
 def _replace(path: Path, content: bytes, opener: Callable[[str, int], int] = regular) -> None:
-    """Write a file atomically; ignore errors."""
     new = path.with_suffix(path.suffix + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -30,7 +30,6 @@ class UdpConductor:
     """A conductor in another process."""
 
     def __init__(self, link: UdpLink, ended: Callable[[], object]) -> None:
-        """Register with the conductor by an empty packet."""
         self._link = link
         self._ended = ended
         self._gathering = Gathering()

@@ -92,7 +92,6 @@ def _progress(parts: int) -> Iterator[Report]:
 
 
 def _tables(figures: Mapping[str, Any]) -> Iterator[Table]:
-    """Yield the tables of each part that was measured."""
     runs = f"{figures['settings']['runs']} runs"
     if stages := figures.get("stages"):
         horizons = {horizon: measured["us"] for horizon, measured in stages["horizons"].items()}

@@ -21,7 +21,6 @@ class FlightTable:
     """The results of a campaign's flights, in its order."""
 
     def __init__(self, campaign: Campaign, flown: Mapping[int, FlightResult], notes: Sequence[str] = ()) -> None:
-        """`notes` are lines on options without effect."""
         self.campaign = campaign
         self.notes = [*notes]
         self.flown = [flown[flight] for flight in sorted(flown)]

@@ -81,7 +81,6 @@ def _drop_what_cannot_be_printed() -> None:
 
 
 def _check_encoding(given: Sequence[str]) -> None:
-    """Reject words that UTF-8, and so the log, cannot encode."""
     for word in given:
         try:
             word.encode()

@@ -70,7 +70,6 @@ def run(args: Namespace) -> int:
 
 @contextmanager
 def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
-    """Show trials, the best objective and flights."""
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -184,7 +184,6 @@ class Companion:
         return inf if self._newest is None else (now_us - self._newest.at_us) * 1e-6
 
     def _acts_us(self, now_us: int) -> int:
-        """Predict the time of effect of a command sent now."""
         return now_us + self.peer.clock.round_trip_us // 2 + round(self._response.latency_s * 1e6)
 
     def _advance(self, now_us: int) -> None:

@@ -123,14 +123,12 @@ class Orders:
         self.height_enu_m = ground_enu_m + self._climb_m
 
     def _mode(self, mode: FlightMode) -> None:
-        """Request a mode until it is reported."""
         name = f"mode {mode.name}"
         taken = self._peer.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
         if not taken:
             self._repeat(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:
-        """Send a command, repeatedly only after a temporary rejection."""
         result = self._peer.results.get(name)
         if result is None:
             self._peer.ask(name, number, *params)

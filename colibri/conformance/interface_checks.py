@@ -83,7 +83,6 @@ def _halves(law: Controller[Any]) -> str:
 
 
 def _settings(subject: Subject) -> Row:
-    """Check for strict reading of the law's table: only a figure."""
     tried = "an unknown key in its table is refused"
     name = subject.name
     spoilt = {**subject.profile.table(name), "no_such_key": 1.0}

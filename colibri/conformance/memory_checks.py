@@ -94,7 +94,6 @@ def _chained(subject: Subject, *flights: list[FlownStep]) -> Taken:
 
 
 def _from_old(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Taken:
-    """Repeat from the original memory objects, the last step first."""
     law = subject.build()
     for at in reversed(range(len(steps))):
         yield at, steps[at].rotor_speeds, steps[at].again(law, steps[at].memory)[1].rotor_speeds

@@ -119,7 +119,6 @@ def _plan(_: Subject, law: Any, steps: list[FlownStep]) -> str:
 
 
 def _attitude(subject: Subject, law: Any, steps: list[FlownStep]) -> tuple[str, str]:
-    """Check demands alternating with references, and flight by demands alone."""
     rng, n = np.random.default_rng(subject.seed), law.preview.samples
     weight_n = subject.vehicle.body.mass_kg * subject.vehicle.gravity_m_s2
     memory = steps[0].memory

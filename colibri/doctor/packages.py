@@ -66,7 +66,6 @@ def _asked(extra: str = "") -> list[Requirement]:
 
 
 def _here(every: Iterable[Requirement], extra: str = "") -> list[Requirement]:
-    """Return the requirements that apply on this computer."""
     return [asked for asked in every if asked.marker is None or asked.marker.evaluate({"extra": extra})]
 
 

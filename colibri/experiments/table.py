@@ -17,7 +17,6 @@ class SampleTable(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array, (n,), of float64 by column name: `table["x"]`."""
 
     def __getitem__(self, key: Any) -> Any:
-        """Return a column as a plain array, rows as a table."""
         found = super().__getitem__(key)
         return found.view(np.ndarray) if isinstance(found, SampleTable) and found.dtype.names is None else found
 

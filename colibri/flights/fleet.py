@@ -78,7 +78,6 @@ def sitl(spec: FleetSpec, *, quiet: bool) -> int:
 
 
 def _check(spec: FleetSpec) -> str:
-    """Return a line on options without effect."""
     try:
         profile, assumed = spec.load()
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)

@@ -77,7 +77,6 @@ def provenance_of(plan: FlightPlan) -> Provenance:
 
 
 def _named(plan: FlightPlan) -> FlightSpec:
-    """Name objects and resolve defaults."""
     return replace(
         plan.spec,
         track=str(plan.spec.track),

@@ -223,7 +223,6 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
 
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
-    """Round a command as the link does."""
     (message,) = codec.decode(encode_actuators(codec, command))
     arrived = decode_actuators(message)
     assert arrived is not None, "what an autopilot commands can be flown"
@@ -231,7 +230,6 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
 
 
 def _changed(setups: Iterable[Setup]) -> list[str]:
-    """Return the profiles and vehicles whose files differ from the log."""
     changed = []
     for setup in setups:
         with suppress(Error):

@@ -58,7 +58,6 @@ class Links(NamedTuple):
     plant: Trouble
 
     def __getattr__(self, name: str) -> Any:
-        """Name the valid links in the error."""
         raise AttributeError(unknown("link", name, self._fields))
 
 
@@ -99,7 +98,6 @@ class Sitl(View, Stepped, Steered):
     if not TYPE_CHECKING:  # checkers know what there is
 
         def __setattr__(self, name: str, value: Any) -> None:
-            """Reject unknown attributes, so that a typo is an error."""
             if name[0] != "_" and "fleet" in self.__dict__ and not hasattr(self, name):
                 raise AttributeError(unknown("attribute to set", name, _SETTABLE))
             super().__setattr__(name, value)
@@ -300,7 +298,6 @@ class Sitl(View, Stepped, Steered):
             raise RefusedError(f"failure {unit} {kind}", result, self._why_not(Fault(*numbers, instance), values))
 
     def _why_not(self, fault: Fault, values: Sequence[float]) -> str:
-        """Return why the plant refuses a fault."""
         kinds = [kind_name(kind).lower() for unit, kind in TABLE if unit == fault.unit]
         if not kinds:
             return f"choose one of {', '.join(dict.fromkeys(_unit(unit) for unit, _ in TABLE))}"

@@ -246,7 +246,6 @@ def _dress(axes: Axes, quantity: str) -> None:
 
 
 def _spans(t: Array, holds: Any) -> list[tuple[float, float]]:
-    """Return begin and end of each interval of a condition, s."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]])))
     ends = np.append(t, 2.0 * t[-1] - t[-2])
     return [(float(t[begin]), float(ends[end])) for begin, end in edges.reshape(-1, 2)]

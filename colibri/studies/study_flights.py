@@ -104,7 +104,6 @@ def fly(common: Common, point: Point) -> Flown:
 
 
 def _top_speed(plan: FlightPlan, log: MemoryLog, t: Array) -> Array:
-    """Return the largest rotor speed, proportional to battery voltage."""
     vehicle = plan.plant_vehicle
     if vehicle.battery is None:
         return np.full_like(t, vehicle.rotors.max_speed)

@@ -134,7 +134,6 @@ def _space(tables: TuningTables) -> dict[str, Range]:
 
 
 def _had(base: Profile, name: str) -> Any:
-    """Return a profile's value of a number; 1 for a multiplier."""
     key = key_of(name)
     if key is None:
         raise KeyError(name)

@@ -127,7 +127,6 @@ def _dots(
     place: int,
     front: Sequence[FinishedTrial] | None = None,
 ) -> None:
-    """Draw an objective of each trial: pruned or dominated ones grey."""
     first = trials[0]
     strong = [trial for trial in trials if not trial.pruned and (front is None or trial in front)]
     weak = [trial for trial in trials if trial not in strong]
@@ -143,7 +142,6 @@ def _dots(
 
 
 def _scale_by_ratios(axes: Axes) -> None:
-    """Use a logarithmic axis with few plain numbers."""
     axes.set_xscale("log")
     low, high = axes.get_xlim()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < _MANY_DECADES * low else (1.0,)))

@@ -111,7 +111,6 @@ def _counts(tuning: Tuning, flown: Sequence[FlightResult], worst: Sequence[float
 
 
 def _is_pruned(tuning: Tuning, begun: Begun, counts: Array, new: int) -> bool:
-    """Report the last flights to Optuna; return whether to end early."""
     if not tuning.prune_after:
         return False
     for place in range(len(counts) - new, len(counts)):
@@ -120,7 +119,6 @@ def _is_pruned(tuning: Tuning, begun: Begun, counts: Array, new: int) -> bool:
 
 
 def _expected(tuning: Tuning, counts: Array, scale: Scale) -> float:
-    """Extrapolate to all seeds by the ratio to the original profile."""
     (objective,) = tuning.objectives
     whole = np.array(scale.each[0])
     pooled, same = objective.pooled(counts), objective.pooled(whole[: len(counts)])

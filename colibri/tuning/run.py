@@ -124,7 +124,6 @@ def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, to
 
 
 def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
-    """Claim `out` for this tuning."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         with FileLock(out):
@@ -136,7 +135,6 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
 
 
 def _identity(tuning: Tuning) -> dict[str, Any]:
-    """Return all inputs except the number of trials, which may grow."""
     return {
         **identity_of(tuning.campaign, tuning.common),
         "optuna": version("optuna"),

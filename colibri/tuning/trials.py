@@ -138,7 +138,6 @@ class Trials:
         return sorted(trials, key=lambda trial: int(trial.user_attrs[_NUMBER]))
 
     def _give_up_abandoned(self) -> None:
-        """Mark trials whose process has died as failed."""
         from optuna.trial import TrialState
 
         for trial in self._study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
@@ -197,7 +196,6 @@ def require_optuna() -> Any:
 
 @contextmanager
 def _unwarned() -> Iterator[None]:
-    """Silence Optuna's warnings of experimental features."""
     from optuna.exceptions import ExperimentalWarning
 
     with catch_warnings():

@@ -96,7 +96,6 @@ def _check_names(path: Path, known: Mapping[str, str]) -> None:
 
 
 def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[GoldenResult]) -> int:
-    """Write the hashes flown, keep the others, and print the changes."""
     path: Path = args.golden
     lost = [outcome for outcome in outcomes if outcome.error]
     if lost:

@@ -188,7 +188,6 @@ def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
 
 
 def _names(folders: Sequence[Path]) -> list[str]:
-    """Return short unique names: the last parts of the paths."""
     paths = [Path(realpath(folder)).parts for folder in folders]
     if len(set(paths)) < len(paths):
         raise ViewError(f"{folders[0]} is given twice: name two flights")

@@ -135,7 +135,6 @@ class Telemetry:
         self._values[name] = (now_s, value)
 
     def _reference(self) -> Vector:
-        """Extrapolate the last reference to the time of the last position."""
         said_s, (place, velocity) = self._values.get("reference", (-_STALE_S, (NOWHERE, NOWHERE)))
         age_s = self._moved_s - said_s
         x, y, z = np.add(place, np.multiply(age_s, velocity)).tolist()

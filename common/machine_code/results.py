@@ -106,12 +106,10 @@ class _Library(JITCodeLibrary):
 
 @cache
 def _name_runtime() -> None:
-    """Register numba's runtime with LLVM without compiling it."""
     for name, address in _nrt_python.c_helpers.items():
         add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 @cache
 def _is_loaded(name: str) -> bool:
-    """Check a symbol: LLVM aborts on a missing one."""
     return address_of_symbol(name) is not None

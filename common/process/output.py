@@ -24,7 +24,6 @@ class Output(io.RawIOBase):
     """
 
     def __init__(self, number: int, *, left_out: str = _LEFT_OUT, patient: bool = False) -> None:
-        """Write to descriptor `number`; `patient` waits at the end without bound."""
         self._number, self._left_out_text, self._patient = number, left_out, patient
         self._own = _opened_again(number)
         self._process = os.getpid()
@@ -79,7 +78,6 @@ class Output(io.RawIOBase):
                 return
 
     def _taken(self, data: bytes) -> int:
-        """Write as much as the reader accepts, and return that size."""
         try:
             if self._own is not None:
                 return os.write(self._own, data)

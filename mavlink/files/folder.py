@@ -213,7 +213,6 @@ class Folder:
 
 
 def _plain(name: str) -> str:
-    """Refuse a name that leads out of its folder."""
     if name in ("", ".", "..") or "/" in name:
         raise _RefusedError(FileRefusal.NOT_FOUND)
     return name

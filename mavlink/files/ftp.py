@@ -241,7 +241,6 @@ class Ftp:
         return None if self._has_room(request, self._sessions) else Nak(FtpError.NO_SESSIONS)
 
     def _has_room(self, request: Request, taken: dict[Key, _Session] | dict[Key, _Checksum]) -> bool:
-        """Make room for a client, if it must be."""
         of_channels = Counter(peer.channel for peer, _ in taken)
         own = of_channels[request.peer.channel]
         if len(taken) < MAX_SESSIONS or own >= MAX_SESSIONS_OF_A_CHANNEL:

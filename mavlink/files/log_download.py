@@ -114,7 +114,6 @@ class Logs:
             self._listings.pop(listing.peer, None)
 
     def _look(self, peer: Peer) -> list[Entry]:
-        """Fix the present logs' ids for this client."""
         found = self._files.list(self._folder)
         logs = () if isinstance(found, FileRefusal) else found
         self._budget.spend(ENTRY_US * len(logs))

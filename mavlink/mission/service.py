@@ -260,7 +260,6 @@ class MissionService:
         return ()
 
     def _partial(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
-        """Refuse partial lists: "not an official/standardised part of the mission service"."""
         return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type, "partial lists are not supported")
 
     def _refuse(self, peer: Peer, result: int, plan_type: int, why: str = "not known") -> list[Send]:
@@ -268,7 +267,6 @@ class MissionService:
         return [ack(peer, result, plan_type), *text]
 
     def _explained(self, sends: Iterable[Send | None]) -> list[Send]:
-        """Return answers to an upload, with the reason of a refusal."""
         reason = self._uploads.take_reason()
         text = self._text.say(WARNING, reason) if reason else ()
         return [*filter(None, sends), *text]

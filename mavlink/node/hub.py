@@ -254,7 +254,6 @@ class Hub:
         self._caught(type(service).__name__, error, instead)
 
     def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:
-        """Forward unchanged with its signature: all share the key."""
         for number in self._router.onward(message.source, target, channel.number):
             self._channels[number].say(message.frame)
 

@@ -209,7 +209,6 @@ def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> Re
 
 
 def _parameters(command: ReceivedCommand) -> tuple[str, ...]:
-    """Return the parameters as text, so that nan equals itself."""
     return tuple(map(repr, command[1:9]))
 
 

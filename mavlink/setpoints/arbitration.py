@@ -74,7 +74,6 @@ class StreamedService(ABC, Generic[Value]):
         """Return the setpoint in a message, if any; raise `Refused` if it is invalid."""
 
     def _latest(self, now_us: int, timeout_us: int) -> Value | None:
-        """Return the obeyed client's latest setpoint, if not older than `timeout_us`."""
         return None if self.source is None else self._value(self.source, now_us, timeout_us)
 
     def _value(self, peer: Peer, now_us: int, timeout_us: int) -> Value | None:

@@ -145,7 +145,6 @@ class StreamService:
         return self._report_interval(command.p2, command.peer) or []
 
     def _report_interval(self, asked: float, peer: Peer) -> Refusal | None:
-        """Send MESSAGE_INTERVAL; -1 if the message is not streamed."""
         message_id = _whole(asked)
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
             interval_us = HEARTBEAT_US

@@ -53,7 +53,6 @@ def vibration(s: TelemetrySnapshot) -> Fields:
 
 
 def _measured(s: TelemetrySnapshot) -> SensorFrame:
-    """Return the sensors' measurements; under state feedback, those of ideal sensors."""
     if s.sensed is not None:
         return s.sensed
     east, north, up = s.acceleration_enu_m_s2

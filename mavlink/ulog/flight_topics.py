@@ -72,7 +72,6 @@ class Topic:
 
     @cached_property
     def _runs(self) -> list[tuple[str, slice]]:
-        """Consecutive columns of one type, by the name of the first."""
         kinds = [(each.kind, name) for each in self.columns for name in each.names.split()]
         runs, begin = [], 1
         for _, run in groupby(kinds, key=lambda each: each[0]):

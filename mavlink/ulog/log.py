@@ -139,7 +139,6 @@ class MemoryLog(TopicLog):
 
 
 def _encoded(encoder: RowEncoder, table: Array) -> bytes:
-    """Return a block's messages behind a mark for resynchronising readers."""
     with np.errstate(all="ignore"):  # the numbers of a lost vehicle may exceed a single float
         return messages.SYNC + encoder.encode(table)
 

@@ -52,7 +52,6 @@ class Physics:
     """Dynamics of one vehicle in one weather."""
 
     def __init__(self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER) -> None:
-        """Load the compiled kernels here, not in the first step."""
         self._air = Air(weather)
         self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
         self._wind = self._parameters["wind_enu_m_s"][0]

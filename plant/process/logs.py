@@ -42,7 +42,6 @@ class PlantLogs:
     """The plant's files: `flight.ulg`, shared with the autopilot, and on request `flight.tlog`."""
 
     def __init__(self, folder: Path, vehicle: Vehicle, boot_unix_us: int = 0, *, tlog: bool = False) -> None:
-        """Write into `folder`; without `boot_unix_us`, times of `flight.tlog` are simulated."""
         self._folder, self._vehicle, self._boot_unix_us, self.has_tlog = folder, vehicle, boot_unix_us, tlog
         self._open()
 

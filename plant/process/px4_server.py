@@ -83,7 +83,6 @@ class Simulator:
             self._logs.close()
 
     def _fly(self) -> bool:
-        """Return whether the time is over, rather than PX4 gone."""
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
         world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
@@ -174,7 +173,6 @@ class Simulator:
                 self._logs.write_frames(self._time_us, list(frames))
 
     def _log_received(self) -> None:
-        """Log new received frames; another PX4 gets new files."""
         if self._logs and self._end.calls > self._logged_calls:
             self._logs.begin_again()
             self._logged_calls, self._time_us = self._end.calls, 0

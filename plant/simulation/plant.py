@@ -109,7 +109,6 @@ class Plant:
         return None
 
     def _happen(self) -> None:
-        """Let the events happen that are due."""
         events = self._events
         while events and events[0][0] <= self.world.time_us:
             self._change(events.popleft()[1])
@@ -162,6 +161,5 @@ class PlantBuilder:
 
 
 def _held(world: World, vehicle: Vehicle) -> ActuatorCommand:
-    """Return the command that keeps the rotors as they are."""
     a, b, c, d = (speed / vehicle.rotors.max_speed for speed in world.rotor_speeds)
     return ActuatorCommand(world.time_us, (a, b, c, d), armed=any(world.rotor_speeds))

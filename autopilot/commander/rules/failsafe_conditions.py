@@ -86,7 +86,6 @@ class Conditions:
         return found
 
     def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
-        """Return the start of an unchanged pose with non-zero rates."""
         state, now_us = inputs.state, inputs.now_us
         if state.position_enu_m != self._position or state.attitude != self._attitude or inputs.standing:
             self._position, self._attitude, self._pose_us = state.position_enu_m, state.attitude, now_us

@@ -66,7 +66,6 @@ class ReducedAttitude:
     def __init__(
         self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Tolerances
     ) -> None:
-        """Compute the gains in some ms, or raise a ThreeRotorsError."""
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
         a, b, o = (allocation[1:3, rotor] / allocation[0, rotor] for rotor in self.trio[1:4])

@@ -99,7 +99,6 @@ class ThreeRotors:
         return commands
 
     def _turn(self, commands: Array, up: Array) -> None:
-        """Predict rotor speeds, and the acceleration by their thrust."""
         before, self._speeds = self._speeds, follow(self._speeds, commands, self._lag)
         thrust_n = 0.5 * dot(self._full_n, before**2 + self._speeds**2)
         self._explained = thrust_n / self._weight_n * self._gravity * up

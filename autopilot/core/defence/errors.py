@@ -55,7 +55,6 @@ class Defence:
     """
 
     def __init__(self, pilot: Pilot, say: Callable[[int, str], None], *, strict: bool) -> None:
-        """Report by `say`; `strict`: raise every exception."""
         self._pilot, self._say, self._strict = pilot, say, strict
         self._checkpoint: Callable[[], object] | None = None
         self._records: list[ErrorRecord] = []
@@ -123,7 +122,6 @@ class Defence:
 
 
 def _bytes(make: Callable[[], object] | None) -> bytes:
-    """Return the result of `make` as bytes; empty after an exception."""
     try:
         made = None if make is None else make()
         return b"" if made is None else to_bytes(made)

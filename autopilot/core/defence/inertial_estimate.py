@@ -30,7 +30,6 @@ class InertialEstimate:
     """
 
     def __init__(self, estimate: Estimate, gravity_m_s2: float) -> None:
-        """Begin with an estimate."""
         self.frame = estimate.frame
         self._gravity = gravity_m_s2
         self._gyro_bias, self._accel_bias = estimate.gyro_bias_rad_s, estimate.accel_bias_m_s2

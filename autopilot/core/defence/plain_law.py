@@ -34,7 +34,6 @@ class PlainLaw:
     """The plain law of one vehicle; it remembers the acceleration that has held the velocity up to now."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Fly `vehicle` with this control interval; load compiled code."""
         self._interval_s = interval_s
         self._max_speed = vehicle.rotors.max_speed
         self._min_squared = square(vehicle.rotors.idle_speed / self._max_speed)

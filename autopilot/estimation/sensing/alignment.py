@@ -118,7 +118,6 @@ def attitude_of(force: NDArray[np.float64], field: NDArray[np.float64], earth_fi
 
 
 def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return magnetic east, north and up as columns."""
     up = up / norm(up)
     east = np.cross(field, up)
     east = east / norm(east)

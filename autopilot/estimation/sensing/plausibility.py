@@ -21,7 +21,6 @@ class Watch:
     """Checks one sensor; `is_new` is false for values that simulators repeat."""
 
     def __init__(self, source: str, minimum: float, maximum: float, patience_us: float) -> None:
-        """Values that stay identical for `patience_us` are rejected as frozen."""
         self._source, self._minimum, self._maximum, self._patience_us = source, minimum, maximum, patience_us
         self._last: tuple[float, ...] = ()
         self._changed_us = 0

@@ -57,7 +57,6 @@ def _whole(minimum: int, maximum: int) -> _Check:
 
 
 def _a_speed(value: float) -> bool:
-    """-1 keeps the speed, -2 selects the default."""
     return isnan(value) or value in (-1.0, -2.0) or (value > 0.0 and isfinite(value))
 
 

@@ -76,7 +76,6 @@ def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Leg
 
 
 def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[LegPhase, ...]:
-    """Fly to a place and stay; stay_s 0 flies through."""
     place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
@@ -152,7 +151,6 @@ _LEGS: Mapping[int, Leg] = {
 
 
 def _off_the_ground(height_m: float, context: ItemContext) -> tuple[LegPhase, ...]:
-    """Take off first: MAVSDK's missions begin with a waypoint."""
     mission_context, defaults = context.mission_context, context.defaults
     if not mission_context.landed:
         return ()

@@ -50,7 +50,6 @@ class OrbitTask(EndlessTask):
         return PositionMotion(target, context.behaviour.limits, Pace.WAITING)
 
     def _angle_of(self, place: Vector) -> float:
-        """Return the direction from the centre, counter-clockwise from east."""
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
     def _rate_of(self, context: TaskContext) -> float:

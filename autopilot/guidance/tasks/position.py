@@ -196,7 +196,6 @@ class TrackTask:
         planner_for_law: Planner | None = None,
         start: Reference | None = None,
     ) -> None:
-        """`planner_for_law` is for a law with another preview interval."""
         self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law

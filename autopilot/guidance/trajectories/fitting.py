@@ -105,7 +105,6 @@ def _widened(excess: Array, neighbours: int) -> Array:
 
 
 def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
-    """Return the track held above the floor, and its original dips."""
     track = through(waypoints)
     dips = found = _dips(track, waypoints, floor_m)
     heights = np.empty((0, 2))

@@ -27,7 +27,6 @@ class PiecewisePolynomial:
     coefficients: Array
 
     def __call__(self, t: TaylorSeries) -> tuple[TaylorSeries, ...]:
-        """Return each axis at `t`, extrapolated at the ends."""
         piece = self._piece(t.coefficients[0])
         tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
         return tuple(_horner(self.coefficients[piece, :, axis], tau) for axis in range(self.coefficients.shape[2]))

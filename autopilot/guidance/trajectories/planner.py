@@ -53,7 +53,6 @@ class Planner:
         self._ahead = (time_us, grid_us, self.horizon_at(time_us, grid_us))
 
     def _tabulate(self, block: int) -> Horizon:
-        """Tabulate a block and its horizon; differences need the sample before."""
         first, lead = block * self._length, min(block, 1)
         samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
         interval_s = self.preview.interval_us * 1e-6

@@ -55,7 +55,6 @@ class TaylorSeries:
         return TaylorSeries(shifted)
 
     def __mul__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
-        """Cauchy product, or multiplication by constants."""
         if not isinstance(other, TaylorSeries):
             return TaylorSeries(self.coefficients * other)
         a, b = self.coefficients, other.coefficients

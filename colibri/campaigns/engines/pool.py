@@ -86,7 +86,6 @@ _given: tuple[Callable[[Any, Any], Any], Any]
 
 
 def _begin(packed: bytes, has_begun: Any) -> None:
-    """Prepare a worker, which ends with its parent."""
     global _given
     has_begun.set()
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -71,7 +71,6 @@ def _pair(text: str, expected: str) -> tuple[str, str]:
 
 
 def _value(text: str) -> Any:
-    """Parse a number or a truth value; other texts are kept."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

@@ -101,7 +101,6 @@ class Shown(NamedTuple):
 
 @contextmanager
 def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
-    """Show simulated time and speed on standard error."""
     if quiet:
         yield Shown(unseen, unseen, unseen)
         return

@@ -87,7 +87,6 @@ class _Found(NamedTuple):
 
 
 def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Found:
-    """Search a table of lags, then refine around its best latency."""
     table = [(lag_s, behind_s) for lag_s in _TIME_CONSTANTS_S for behind_s in acceleration_lags_s]
     left = np.array([[_unexplained(commands, measured, axis, lags) for lags in table] for axis in range(3)])
     best = int(left.min(axis=1).sum(axis=0).argmin())
@@ -100,7 +99,6 @@ def _found(commands: Array, measured: Array, acceleration_lags_s: Array) -> _Fou
 
 
 def _unexplained(commands: Array, measured: Array, axis: int, lags_s: tuple[float, float]) -> Array:
-    """Return the unexplained part of a rate's variance at each latency."""
     modelled, compared = _lagged(commands[:, axis], *lags_s), measured[_LATENCIES:, axis]
     left = np.array([(compared - _late(modelled, late)).var() for late in range(_LATENCIES)])
     return left / max(float(compared.var()), 1e-12)

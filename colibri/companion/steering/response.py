@@ -130,7 +130,6 @@ def _change(y: Array, axis: int, command: float, h: float, model: ResponseModel)
 
 @compiled
 def _turn(y: Array, rate: Array, h: float) -> None:
-    """Turn the attitude at a rate over h, in place."""
     w, x, a, b = y[6], y[7], y[8], y[9]
     p, q, r = 0.5 * h * rate[0], 0.5 * h * rate[1], 0.5 * h * rate[2]
     y[6] = w - x * p - a * q - b * r
@@ -144,7 +143,6 @@ def _turn(y: Array, rate: Array, h: float) -> None:
 
 @compiled
 def _push(y: Array, lift: float, disturbance: Array, drag: Array, gravity_m_s2: float, h: float) -> None:
-    """Advance velocity and position over h, in place."""
     R = rotation_matrix((y[6], y[7], y[8], y[9]))
     along = np.empty(3)
     for i in range(3):

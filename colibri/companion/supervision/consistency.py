@@ -69,7 +69,6 @@ def _mean(a: Vector, b: Vector) -> Vector:
 
 
 def _turned(q: Quaternion, by_rad: Vector) -> Quaternion:
-    """Turn an attitude by a small rotation of the body."""
     w, x, y, z = q
     p, q_, r = (0.5 * angle for angle in by_rad)
     return normalized(

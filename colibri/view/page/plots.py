@@ -89,7 +89,6 @@ class Plots:
     def _framed(
         self, times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
     ) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-        """Return data and series with time first and the mark last."""
         seconds = uplot.Series(label="s")
         if not self._marked:
             return (times_s, *values), (seconds, *lines)

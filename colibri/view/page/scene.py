@@ -118,7 +118,6 @@ class VehicleScene:
         )
 
     def _build(self, colour: Colour) -> tuple[list[viser.BoxHandle], list[viser.CylinderHandle]]:
-        """Draw body, arms and rotors; return blades and discs."""
         scene, at, scale = self._scene, f"{self._root}/vehicle", self._scale
         radius = self._airframe.radius_m * scale
         scene.add_box(f"{at}/body", dimensions=(0.9 * radius, 0.6 * radius, 0.3 * radius), color=colour)
@@ -242,7 +241,6 @@ def add_ground(scene: viser.SceneApi, ground_m: float, extent_m: float) -> None:
 
 
 def _show(handle: Any, points: Any, layers: frozenset[str], layer: str) -> None:
-    """Update lines or arrows; hide empty ones."""
     visible = layer in layers and points is not None and len(points) > 0
     if handle.visible != visible:
         handle.visible = visible

@@ -49,7 +49,6 @@ def stop(server: PageServer) -> None:
 
 @contextmanager
 def _guarded() -> Iterator[list[str]]:
-    """Add access control to servers started in this block."""
     begun: list[str] = []
     unguarded = websockets.asyncio.server.serve
 

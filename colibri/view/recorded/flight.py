@@ -205,7 +205,6 @@ def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, he
 
 
 def _events(decisions: LogColumns) -> list[tuple[float, str]]:
-    """Return times and texts of QP failures and fallbacks."""
     statuses = {code: status for status, code in STATUS_CODES.items()}
     fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}
     events = []

@@ -59,7 +59,6 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
 
 
 def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
-    """Return the search direction by the two-loop recursion."""
     direction, weights = -gradient, []
     for step, change, product in reversed(pairs):
         weights.append(dot(step, direction) / product)
@@ -73,7 +72,6 @@ def _direction(gradient: Array, pairs: deque[_Pair]) -> Array:
 
 
 def _searched(function: Function, start: _Point, direction: Array, length: float) -> _Point | None:
-    """Bisect along a direction for the weak Wolfe conditions."""
     slope = dot(start.gradient, direction)
     low, high, best = 0.0, inf, None
     for _ in range(_TRIALS if slope < 0.0 else 0):
