@@ -158,7 +158,6 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tuple[list[Path], str]:
-    """Return the folders of a failed test's flights, and a text for the report."""
     link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
     again = f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
     folder, crash = _folder(item), getattr(report.longrepr, "reprcrash", None)

@@ -41,7 +41,6 @@ def exp(x: Array) -> Array:
 
 
 def _both(x: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return each angle's quarter turn, and sine and cosine of its remainder."""
     x = np.where(np.abs(x) > one.MAX_RAD, x % (2.0 * pi), x)
     n: Array = np.floor(x * one.QUARTERS_PER_RAD + 0.5)
     head, tail = one.reduced(x, n)

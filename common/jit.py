@@ -72,7 +72,6 @@ def _opened(field: Packed) -> Any:
 
 
 def _layout(parameters: Any) -> np.dtype[np.void]:
-    """Return the type of a record: float64 except for typed arrays and nested records."""
     formats, offsets, end = [], [], 0
     for value in parameters:
         part = _layout(value) if hasattr(value, "_fields") else np.dtype(getattr(value, "dtype", np.float64))

@@ -109,7 +109,6 @@ class Commands:
         return denied("pause", f"{command.p1:g} is not 0, to pause, or 1, to go on")
 
     def _change_speed(self, command: ReceivedCommand) -> Refusal | None:
-        """Set the ground speed; -1 keeps it, -2 selects the parameters' speed."""
         kind, speed, _, relative = command[1:5]
         if kind not in _OVER_GROUND and not isnan(kind):
             return Refusal(f"speed refused: type {kind:g} is not 0 or 1, over ground", UNSUPPORTED)

@@ -217,7 +217,6 @@ class Missions:
 
 
 def _first(found: Iterable[tuple[int, Vector]], fault: Callable[[Vector], str]) -> str:
-    """Return the first item whose place has a fault; empty if none has."""
     return next((_of_item(seq, reason) for seq, place in found if (reason := fault(place))), "")
 
 

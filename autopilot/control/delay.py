@@ -118,7 +118,6 @@ class DelayCompensation:
         return motion.carry(x, durations_s, speeds, self._disturbance, voltage_v, self._model)
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[ActuatorCommand]:
-        """Return the command acting at a time, then those that follow until another."""
         acting = [self._sent[0]]
         for it in self._sent:
             acts_us = it.time_us + self.delay_us

@@ -122,7 +122,6 @@ class GeometricController:
         return force, jerk
 
     def _rotor_speeds(self, thrust_n: float, moment_n_m: Array) -> Array:
-        """Return the rotor speeds within their limits: tilting moments first, then thrust, then yaw."""
         least, most = self._squared
         squared = mix_with_priority(thrust_n, moment_n_m, self._from_thrust, self._from_moments, least, most)
         speeds: Array = np.sqrt(squared) * self._top_speed

@@ -84,7 +84,6 @@ def _module(where: str) -> ModuleType:
 
 
 def _of_file(path: Path) -> ModuleType:
-    """Load a file, again after a change; its neighbours can be imported."""
     changed = path.stat().st_mtime_ns
     if path in _modules and _modules[path][0] == changed:
         return _modules[path][1]

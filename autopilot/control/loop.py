@@ -250,7 +250,6 @@ class ControlLoop:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    """Return the longest divisor of the control interval up to the profile's, whole ms."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us

@@ -159,7 +159,6 @@ class Autopilot(Generic[StagesT]):
         return ControlSample(now_us, state, guidance, stages.decide(now_us, ahead, guidance))
 
     def _ahead(self, known: StateFrame, state: VehicleState) -> VehicleState:
-        """Predict the state at the time when a command sent now takes effect."""
         stages = self.stages
         if stages.delay.delay_us == 0:
             return state

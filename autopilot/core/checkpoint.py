@@ -100,7 +100,6 @@ class Checkpointer:
     """Records and restores one vehicle's flight."""
 
     def __init__(self, fingerprint: int, parts: Parts) -> None:
-        """Record the state of these parts of a vehicle; `fingerprint` is `fingerprint_of` it."""
         self._fingerprint = fingerprint
         self._parts = parts
 

@@ -68,7 +68,6 @@ class FlightStart:
         parts.lines.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame, *, again: bool) -> None:
-        """Start a new flight; `again`: after another one, whose services are reset."""
         parts, loop, rests = self._parts, self._parts.loop, self._parts.state_source.rests
         if again:
             parts.stations.system.reboot()

@@ -67,7 +67,6 @@ class Supervision:
         return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
 
     def _watch_rotors(self, state: VehicleState) -> None:
-        """Detect a lost rotor, after which there is but one way to fly."""
         parts, pilot = self._parts, self._parts.pilot
         estimate, rotor_loss = parts.state_source.estimate, parts.rotor_loss
         if not pilot.state.armed:

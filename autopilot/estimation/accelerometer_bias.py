@@ -205,7 +205,6 @@ def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bia
 
 @compiled
 def _felt(rows: Array, k: int, gravity: float) -> Array:
-    """Return the mean specific force along body x and y since the previous fix."""
     R, dt = _between(rows, k), rows[k, TIME] - rows[k - 1, TIME]
     force = np.zeros(2)
     for i in range(3):

@@ -166,7 +166,6 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
 
 @compiled
 def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
-    """Multiply P by the transition matrix from the left: half turn, velocity, half turn."""
     for column in range(ERRORS):
         g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
         t0, t1, t2 = P[6, column], P[7, column], P[8, column]

@@ -219,7 +219,6 @@ def _join(P: Array, C: Array, K: Array, S: Array) -> None:
 
 @compiled
 def _inject(x: Array, P: Array, error: Array) -> None:
-    """Add the error, and turn its attitude part into the new body frame."""
     x[:6] += error[:6]
     x[10:] += error[9:]
     a, b, c = 0.5 * error[6], 0.5 * error[7], 0.5 * error[8]

@@ -15,7 +15,6 @@ class Failures:
     """Forwards faults to the plant, and its results back."""
 
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
-        """`relays` tells whether the plant accepts faults; sensor faults require sensor feedback."""
         self._relays = relays
         self._parts = [part for part in Equipment if part is not Equipment.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []

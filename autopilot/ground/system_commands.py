@@ -71,7 +71,6 @@ class SystemCommands:
         return None
 
     def _storage(self, command: ReceivedCommand) -> Refusal | None:
-        """Parameters are stored on change, so only the reset has an effect."""
         if command.p1 == 2.0:
             if self._pilot.state.armed:
                 return Refusal("parameters refused: the rotors are armed")

@@ -176,7 +176,6 @@ def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, wante
 
 @compiled
 def _approach(distance: float, stopping: float, max_speed: float, gain: float) -> tuple[float, float]:
-    """Return the speed towards a place at `distance`, and its derivative with distance."""
     near = stopping / gain**2
     if distance <= near:
         speed, slope = gain * distance, gain

@@ -16,7 +16,6 @@ class ErrorLog:
     """The exceptions of one process."""
 
     def __init__(self, folder: Path | None, status: Status) -> None:
-        """Append to `errors.jsonl` in `folder`; without one, tracebacks go to standard error."""
         self._path = None if folder is None else folder / FILE
         self._status = status
         self._said: set[str] = set()

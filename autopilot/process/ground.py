@@ -50,7 +50,6 @@ class GroundService:
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files, or raise GroundError; a `conductor` replaces all ground stations."""
         self._spec = spec
         self._profile = profile
         self._vehicle = vehicle

@@ -214,7 +214,6 @@ def _estimate_row(estimate: Estimate) -> tuple[float, ...]:
 
 
 def _first(references: Horizon) -> tuple[float, ...]:
-    """Return position, velocity, acceleration, yaw and yaw rate of the first reference."""
     position, velocity, acceleration, _, _, yaw, yaw_rate, _ = references
     p, v, a = position.item, velocity.item, acceleration.item
     return (p(0), p(1), p(2), v(0), v(1), v(2), a(0), a(1), a(2), yaw.item(0), yaw_rate.item(0))

@@ -113,7 +113,6 @@ def _angles_off(estimated: list[float], true: list[float]) -> Vector:
 
 
 def _errors(check: Array, real: Array) -> Errors:
-    """Return true minus estimated; attitude as a rotation vector in the estimated body frame."""
     u, v, w, _, _, _, *place = real[1:10].tolist()
     rw, rx, ry, rz = real[10:14].tolist()
     ew, ex, ey, ez = check[7:11].tolist()

@@ -143,7 +143,6 @@ class FlightReader:
                 yield part
 
     def _part(self, samples: Array, decisions: Array, yaw_rad: float) -> Samples:
-        """Join rows of the plant with the decisions that led to them."""
         start_reference = [0.0, 0.0, self.plan.start_yaw_rad]
         begins = len(decisions) < len(samples)
         columns = [

@@ -186,7 +186,6 @@ def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
 def _timed(
     stage: Stage, times_us: list[float], keep: Callable[..., object], flying: Callable[[], bool]
 ) -> Iterator[None]:
-    """Time every call of a method in flight, but steps without a decision."""
     untimed = getattr(stage.owner, stage.method)
 
     def timed(self: Any, *args: Any, **kwargs: Any) -> Any:

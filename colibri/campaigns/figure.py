@@ -137,7 +137,6 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
 
 
 def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
-    """Draw one dot per flight; lost flights are at the upper edge."""
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
@@ -158,7 +157,6 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
 
 
 def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
-    """Draw a row of dots per combination, with a bar at the median."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
     make_room_for_names(figure, names)

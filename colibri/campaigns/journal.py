@@ -114,7 +114,6 @@ def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
 
 
 def _origin(law: Any) -> Any:
-    """Return the file and, if readable, the source of a user-supplied callable."""
     try:
         return [*origin_of_factory(law), getsource(law)]
     except (OSError, TypeError):

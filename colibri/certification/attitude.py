@@ -150,7 +150,6 @@ def _gyroscopic(inertia: AnyArray, p: Any, q: Any, r: Any) -> AnyArray:
 
 
 def _rotors(n: AttitudeNumbers) -> AnyArray:
-    """Return the rotors' part of |G|, small enough to be a remainder."""
     ix, iy, _ = n.momentum_n_m_s / n.inertia_kg_m2
     return np.array([[0, ix, 0], [iy, 0, 0], [0, 0, 0]])
 

@@ -110,7 +110,6 @@ def table(found: Certificate, law: AttitudeLaw, flown: FlownErrors) -> list[tupl
 
 
 def _relative(weight: Array, other: Array) -> Array:
-    """Return the generalised eigenvalues of a weight to another, on the other's range."""
     values, vectors = np.linalg.eigh(other)
     seen = vectors[:, values > _SEEN * values[-1]]
     found: Array = eigh(seen.T @ weight @ seen, seen.T @ other @ seen, eigvals_only=True)

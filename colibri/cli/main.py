@@ -73,7 +73,6 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _drop_what_cannot_be_printed() -> None:
-    """Discard the rest of standard output; Python would report it again at exit."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -298,7 +298,6 @@ class Companion:
             self.ended = how_it_ended(before, why, self.limit, fault, waits_for)
 
     def _may_hand_over(self, now_us: int) -> bool:
-        """At the end of a track wait until the vehicle is slow."""
         if not self._brakes or self._newest is None or self.limit is not None or self._stopped:
             return True
         slow = dist(self._newest.state.velocity_enu_m_s, (0.0, 0.0, 0.0)) < _SLOW_M_S
@@ -384,7 +383,6 @@ class Companion:
         )
 
     def _approach_m(self) -> float:
-        """Return the way to the track's first point, m; nan before the first state."""
         if self._newest is None:
             return nan
         here, stay = self._newest.state.position_enu_m, self._settings.stay

@@ -144,7 +144,6 @@ class VehiclePeer:
         return ReceivedState(at_us, state)
 
     def _recognise(self, now_us: int) -> None:
-        """Request the version of an ambiguous vehicle; without answer decide by its HEARTBEAT."""
         if self.stack is not None:
             if self._parameters is None:
                 self._meet(self.stack)

@@ -72,7 +72,6 @@ def _words(speeds: Array) -> str:
 
 
 def _given(step: FlownStep) -> Any:
-    """Return a step's memory as it was at that time, if possible."""
     return own_copy(step.memory) if step.pickled is None else loads(step.pickled)
 
 
@@ -84,7 +83,6 @@ def _twice(subject: Subject, steps: list[FlownStep], _: list[FlownStep]) -> Take
 
 
 def _chained(subject: Subject, *flights: list[FlownStep]) -> Taken:
-    """Repeat flights in turn by a new law, whose compiled parts are not loaded."""
     law, memories = subject.build(), [_given(flight[0]) for flight in flights]
     for at, steps in enumerate(zip_longest(*flights)):
         for number, step in enumerate(steps):

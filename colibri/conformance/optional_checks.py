@@ -56,7 +56,6 @@ def _mass(subject: Subject, law: Any, steps: list[FlownStep]) -> str:
 
 
 def _kept(subject: Subject, law: Any, steps: list[FlownStep], get: str, put: str, values: list[float]) -> str:
-    """Check a value in memory: read, replace, fly on, with the old memory unchanged."""
     step = steps[-1]
     before = getattr(law, get)(step.memory)
     if not isinstance(before, int | float) or not isfinite(before) or before < 0.0:
@@ -170,7 +169,6 @@ def _axis(phi: float, theta: float, psi: float) -> Any:
 
 
 def _compiled(subject: Subject, _: Any, steps: list[FlownStep]) -> str:
-    """Compare with a law that loads its compiled parts late, and twice."""
     late: Any = subject.build()
     for at, step in enumerate(steps):
         decision = step.again(late, step.memory)[1]

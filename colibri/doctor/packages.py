@@ -59,7 +59,6 @@ def extras() -> Iterator[Finding]:
 
 
 def _asked(extra: str = "") -> list[Requirement]:
-    """Return the requirements on this computer; with an extra, its additional ones."""
     every = [Requirement(line) for line in distribution(PACKAGE).requires or []]
     always = _here(every)
     return [asked for asked in _here(every, extra) if asked not in always] if extra else always
@@ -70,7 +69,6 @@ def _here(every: Iterable[Requirement], extra: str = "") -> list[Requirement]:
 
 
 def _wrong(asked: Requirement) -> str:
-    """Describe how a package differs from its requirement; empty if it satisfies it."""
     has = version_of(asked.name)
     if has is None:
         return f"{asked.name} is missing"

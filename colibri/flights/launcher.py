@@ -50,7 +50,6 @@ class Child:
     """A plant or an autopilot as a child of this process, which ends with it."""
 
     def __init__(self, spec: ProcessSpec, *, fork: bool = False, log: Path | None = None) -> None:
-        """Start it; its output goes to file `log` or to pipe `stdout`."""
         self.name = name_of(spec)
         self.forked = fork and can_fork()
         self._rest = b""
@@ -113,7 +112,6 @@ def _forked(spec: ProcessSpec, stdout: int, stderr: int) -> BaseProcess:
 
 
 def _started(spec: ProcessSpec, stdout: int, stderr: int) -> "subprocess.Popen[bytes]":
-    """Start a command; -P keeps modules of the working directory from shadowing Python's."""
     import subprocess
 
     text = to_json(spec)

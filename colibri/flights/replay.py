@@ -139,7 +139,6 @@ def _read(path: Path) -> _Flight:
 
 
 def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
-    """Yield time, datagram and command, up to the first frame missing in the log."""
     (setup, *_) = flight.inputs.setups.values()
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
@@ -189,7 +188,6 @@ def _compare(flight: _Flight) -> Replayed:
 
 
 def _answers(flight: _Flight) -> Iterator[Answer]:
-    """Answer each frame with the autopilot as set up at its last start."""
     setups, inbox = flight.inputs.setups, flight.inputs.datagrams
     autopilot: Autopilot[Any] | None = None
     known: StateFrame | None = None

@@ -37,7 +37,6 @@ class ObjectSnapshot:
     """The state of some objects and of all their references."""
 
     def __init__(self, roots: Iterable[object], shared: Iterable[object] = ()) -> None:
-        """Keep the state of `roots`; `shared` objects are constant and not followed."""
         restores: list[Restore] = []
         seen = {id(each): each for each in shared}
         todo: list[Any] = [*roots]

@@ -85,7 +85,6 @@ class FlightSpec(VehiclesSpec, GroundSpec):
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False
 
     def __post_init__(self) -> None:
-        """Sample a track that is an object or a function, and read the events."""
         super().__post_init__()
         object.__setattr__(self, "params", merged(self.params))
         if not isinstance(self.track, str | Trajectory):

@@ -107,6 +107,5 @@ def _write_texts(axes: "Axes", timeline: "Axes", numbered: Sequence[tuple[int, t
 
 
 def _line(text: str, width: int) -> str:
-    """Shorten a text to one line; a $ would start a formula."""
     line = " ".join(text.split())
     return (line if len(line) <= width else f"{line[: width - 1]}…").replace("$", r"\$")

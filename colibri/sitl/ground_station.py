@@ -202,7 +202,6 @@ class Station(Inbox):
         return conversation.held.value
 
     def _converse(self, conversation: Conversation, what: str) -> None:
-        """Fly until a conversation has ended; its messages precede others in the frame."""
         self._client.begin(conversation)
         try:
             while conversation.result is None:

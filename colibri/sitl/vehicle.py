@@ -376,5 +376,4 @@ def _unit(number: int) -> str:
 
 
 def _without_kind(unit: str) -> str:
-    """Remove the prefix of a unit: system_motor is motor, sensor_gps is gps."""
     return unit.lower().removeprefix("system_").removeprefix("sensor_")

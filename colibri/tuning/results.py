@@ -155,7 +155,6 @@ class TuningResults:
 
 
 def _front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
-    """Return the trials that are not dominated; of equal ones the first."""
     front: list[FinishedTrial] = []
     for trial in sorted(trials, key=lambda trial: (trial.values, trial.number)):
         if not any(all(a <= b for a, b in zip(other.values, trial.values, strict=True)) for other in front):

@@ -30,5 +30,4 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
 
 
 def _gauss(field_nt: float) -> float:
-    """Round far below the model's accuracy: the last bits of libm differ by computer."""
     return round(field_nt, _DECIMALS_NT) * _GAUSS_PER_NT

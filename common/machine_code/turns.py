@@ -13,7 +13,6 @@ class Turn:
     """The right to do some work, by a lock on a file, until `end` or the end of the process."""
 
     def __init__(self, file: Path, waiting: Callable[[], object]) -> None:
-        """Wait for the lock; call `waiting` first if another process has it."""
         self._before: set[int] | None = None
         self._file: int | None = None
         try:

@@ -15,7 +15,6 @@ class FolderLock:
     """An exclusive lock on a folder, released by the system when the process ends."""
 
     def __init__(self, folder: Path, option: str) -> None:
-        """Lock `folder`, created if missing, or raise `FolderInUseError` with the command-line `option`."""
         folder.mkdir(parents=True, exist_ok=True)
         self._folder: int | None = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:

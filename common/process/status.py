@@ -43,7 +43,6 @@ class Silent(Status):
 
 
 def _print(stream: TextIO, line: str) -> None:
-    """Print a line; if the reader has gone, discard all further output."""
     try:
         stream.write(line + "\n")
         stream.flush()

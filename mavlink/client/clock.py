@@ -108,7 +108,6 @@ class VehicleClock:
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
-        """Whether delay cannot explain the change of the offset: the vehicle was restarted."""
         best = self._best
         if best is None:
             return False

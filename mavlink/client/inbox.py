@@ -13,7 +13,6 @@ class Heard(dict[str, list[Any]]):
     """Fields of received messages by name; empty for messages not received yet."""
 
     def __missing__(self, name: str) -> list[Any]:
-        """Return an empty list, or raise `ValueError` for a name outside the dialect."""
         names = [it.msgname for it in mav.mavlink_map.values()]
         if name not in names:
             raise ValueError(unknown("message", name, names))
@@ -25,7 +24,6 @@ class Inbox:
     """The messages received from a vehicle."""
 
     def __init__(self, remembers: int = 20_000) -> None:
-        """Keep at most `remembers` messages of a name; on overflow delete the older half."""
         self._remembers = remembers
         self.heard = Heard()  # fields by name, the latest last
         self.counts: Counter[str] = Counter()

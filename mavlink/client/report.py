@@ -97,7 +97,6 @@ class VehicleReport:
         self.mode_reports_us = [at_us for at_us in self.mode_reports_us if now_us - at_us < 1_000_000] + [now_us]
 
     def _is_newest(self, message: Message) -> bool:
-        """Whether this is the newest message so far: a link may reorder two modes."""
         sequence = sequence_of(message.frame)
         if self._sequence is not None and (sequence - self._sequence) % 256 >= _OLDER_FROM:
             return False

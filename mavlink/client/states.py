@@ -62,7 +62,6 @@ class StateAssembler:
         return state
 
     def _of_attitude(self, name: str, fields: Any, now_us: int) -> TimedState | None:
-        """Return the state of an attitude, with the last position extrapolated to its time."""
         if name == "ATTITUDE_QUATERNION":
             self._quaternion_us = now_us
             ned_frd: Quaternion = (fields.q1, fields.q2, fields.q3, fields.q4)

@@ -58,7 +58,6 @@ class FlightLog:
         self._write_at_us = now_us + WRITE_EVERY_US
 
     def _write(self) -> None:
-        """Write pending bytes; on a full disk, remove the oldest logs first."""
         data = bytes(self._waiting)
         self._waiting.clear()
         if self.name is None:

@@ -32,7 +32,6 @@ class FlierEnd:
     """The autopilot's end: returns each new frame once, remembers the last answer."""
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
-        """`to_motors` converts rotor speeds 0..1 in the vehicle file's order to the simulator's."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
         self.refused: int | None = None  # always None

@@ -207,7 +207,6 @@ class Uploads:
         return send
 
     def _answer_again(self, fields: Any, peer: Peer, now_us: int) -> Send | None:
-        """Repeat the MISSION_ACK if the last item comes again: it may have been lost."""
         answer = self._answers.get(fields.mission_type)
         if answer is None or answer.peer != peer or answer.seq != fields.seq:
             return None

@@ -213,7 +213,6 @@ class Hub:
             self._queue(message, channel)
 
     def _queue(self, message: Message, channel: Channel) -> None:
-        """Handle a message at once, or have it wait behind those of its channel."""
         waiting = self.waiting.get(channel.number)
         if waiting is None and self._budget.allows(self._now_us):
             self._handle(message, channel.number)
@@ -258,7 +257,6 @@ class Hub:
             self._channels[number].say(message.frame)
 
     def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, owner: bool) -> None:
-        """Obey SETUP_SIGNING of the owner to this component: it "should never be broadcast"."""
         fields, signing = message.fields, self._signing
         addressed = target[0] == self._own[0] and self._router.concerns_us(target)
         if addressed and not owner:

@@ -77,5 +77,4 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 
 
 def _shortest(parameter: Parameter, value: float) -> float:
-    """Return the number before its rounding to 32 bits, if seven digits suffice."""
     return value if parameter.kind == ParamType.INT else float(f"{value:.7g}")

@@ -181,7 +181,6 @@ class StreamService:
         return None
 
     def _encode(self, name: str) -> list[Fields]:
-        """Return the fields of a message for this frame, encoded once for all channels."""
         encoded = self._encoded.get(name)
         if encoded is None:
             fields = None if self._snapshot is None else self._telemetry[name](self._snapshot)

@@ -130,6 +130,5 @@ def _moving_ned(setpoint: Setpoint) -> tuple[float, ...]:
 
 
 def _ignored(values: tuple[float, ...]) -> int:
-    """Return POSITION_TARGET_TYPEMASK; bit 9 is not a field but the force flag."""
     force_bit = 9
     return sum(1 << (bit + (bit >= force_bit)) for bit, value in enumerate(values) if isnan(value))

@@ -26,7 +26,6 @@ class Recorder:
     def __init__(
         self, log: TopicLog, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool
     ) -> None:
-        """Record `vehicle`, without battery if the plant records it in the same file."""
         self._log, self._vehicle, self._system_id, self._parameters = log, vehicle, system_id, parameters
         self._with_battery = with_battery
         self._samples, self._sensings = SampleBlocks(), SensingBlocks()

@@ -108,7 +108,6 @@ class Codec:
     """
 
     def __init__(self, system_id: int, component_id: int, *, keep_unknown: bool = False) -> None:
-        """Create a codec; with `keep_unknown`, it returns messages outside the dialect, unchecked, as `UNKNOWN`."""
         self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
         self._sequence = 0

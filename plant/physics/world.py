@@ -135,7 +135,6 @@ class Physics:
             self._wind[:] = world.wind_enu_m_s
 
     def _target(self, command: ActuatorCommand) -> FourRotors:
-        """Return the commanded rotor speeds: at least idle while armed, zero while not."""
         target = _STANDING
         if command.armed:
             c1, c2, c3, c4 = command.controls

@@ -100,7 +100,6 @@ def _control(pulse_us: int) -> float:
 
 
 def _encode(world: World, physics: Physics) -> bytes:
-    """Return the JSON of a world; ArduPilot's parser rejects a space behind a colon."""
     frame = state_frame(world)
     values = {
         "timestamp": world.time_us / _SECOND_US,

@@ -181,7 +181,6 @@ class Simulator:
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:
-        """Wait, and receive meanwhile: an answer must not be matched to the next frame."""
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             if self._end.lockstep:
                 sleep(min(early_s, MAX_WAIT_S))

@@ -63,7 +63,6 @@ def _switched_on(part: Gps, setting: SensorSurroundings, chance: Chance) -> Meas
 
 
 def _moved(fix: GpsFix, error: Vector) -> GpsFix:
-    """Displace a fix by metres east, north and up; its stated accuracy stays."""
     return replace(fix, place=geodetic_of(error, fix.place))
 
 

@@ -46,7 +46,6 @@ class Faults:
             self._physics.weaken_rotor(rotor, fault.values[0] if fault.kind == WRONG else 1.0)
 
     def _on_battery(self, fault: Fault, world: World) -> World:
-        """Take charge from the battery, or restore it; the flight's own consumption stays."""
         assert self._battery is not None, "what there is none of does not fail"
         left, resistance = fault.values[:2] if fault.kind == WRONG else (0.0, 1.0)
         used_ah = world.charge_used_ah - self._taken_ah

@@ -137,7 +137,6 @@ class PlantBuilder:
         integrator: Integrator = "rk4",
         origin: Geodetic = DEFAULT_ORIGIN,
     ) -> None:
-        """Load the compiled kernels; `vehicle` and `starts` already include their part of `spec`."""
         weather = spec.weather
         self.vehicle = vehicle
         self.starts = starts

@@ -81,7 +81,6 @@ def _linearise(motion: Array, speeds: Array, model: Model, out: StepTransition) 
 
 @inlined
 def _differentiate(motion: Array, speeds: Array, model: Model, out: StepTransition) -> None:
-    """Fill V, W, G, drag, spin and up at the middle of each step."""
     airframe, inertia, allocation, h = model.airframe, model.inertia, model.allocation, model.interval_s
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     V, W, G = out.V, out.W, out.G

@@ -219,7 +219,6 @@ class LpvMpc(TrackingLaw[LawMemory]):
     def _choose(
         self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        """Return squared rotor speeds, the plan to continue, its age, and diagnostics."""
         target, force, path = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):

@@ -165,7 +165,6 @@ def _take_in(
     battery: Packed,
     memory: Packed,
 ) -> tuple[int, float]:
-    """Advance the `DetectorState` by a sample; return the likeliest lost rotor and its evidence."""
     kept, known = memory[0], numbers[0]
     speeds_before, before = kept.speeds.copy(), kept.motion.copy()
     put(_followed(speeds_before, controls, open_v, known.lag, battery), kept.speeds)

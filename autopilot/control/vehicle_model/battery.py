@@ -75,7 +75,6 @@ class BatteryModel:
         return before + part * (after - before)
 
     def _balanced(self, battery: Battery, point: int) -> float:
-        """Return the common speed at a charge step, equal in parts to the voltage."""
         if point in self._max_speeds:
             return self._max_speeds[point]
         open_v = open_voltage_v(battery, self._step_ah * point)

@@ -72,7 +72,6 @@ class InertialEstimate:
         return p + k * (fy * uz - fz * uy), q + k * (fz * ux - fx * uz), r + k * (fx * uy - fy * ux)
 
     def _by_pressure(self, frame: SensorFrame, z: float, climb_m_s: float) -> tuple[float, float]:
-        """Return height and climb, corrected by the barometer; the first pressure sets its offset."""
         if not frame.has(Updated.BAROMETER) or not 0.0 < frame.pressure_pa < 2e5:
             return z, climb_m_s
         height_m, before_us, self._pressure_us = altitude_m(frame.pressure_pa), self._pressure_us, frame.time_us

@@ -226,7 +226,6 @@ class MissionExecutor:
         return True
 
     def _begin(self, now_us: int) -> None:
-        """Start the next phase; `arrived` and `turns` still belong to the previous one."""
         self._since_us = now_us
         if self._phases and self._phases[0].order is not None:
             self._order = self._phases[0].order

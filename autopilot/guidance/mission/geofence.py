@@ -184,7 +184,6 @@ def _zones(items: Sequence[MissionItem]) -> Iterator[Sequence[MissionItem]]:
 
 
 def _rank(zone: Sequence[MissionItem]) -> float:
-    """Return the group of an inclusion zone; exclusion zones come after all groups."""
     return _group(zone[0]) if zone[0].command in INCLUSIONS else inf
 
 

@@ -98,7 +98,6 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
 
 
 def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
-    """Return yaw along the horizontal velocity, its rate and acceleration; held at standstill."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
     moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
     direction = atan2(TaylorSeries(np.where(moving, vy, 0.0)), TaylorSeries(np.where(moving, vx, 0.0)))
@@ -118,7 +117,6 @@ def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
 
 
 def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
-    """Return continuous yaw; unknown values repeat the previous known one, or the first."""
     if not known.any():
         return np.zeros_like(yaw)
     latest = np.maximum.accumulate(np.where(known, np.arange(len(yaw)), np.argmax(known)))

@@ -103,7 +103,6 @@ def read_options(name: str, kind: type[TrackOptions], text: str | None) -> Track
 
 
 def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
-    """Split options; the first may be a value alone, for the lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
         key, equals, value = item.partition("=")

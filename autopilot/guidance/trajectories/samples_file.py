@@ -69,7 +69,6 @@ def columns_of(times_s: Array, motion: Mapping[str, Array]) -> str:
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:
-    """Compare columns by the trapezoidal rule, for positions with the end correction."""
     x, v, a = np.moveaxis(motion, 1, 0)
     goes = np.diff(x, axis=0) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
     for columns, change, rate, rounding, unit in (

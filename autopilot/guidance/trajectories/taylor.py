@@ -121,7 +121,6 @@ def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
 
 
 def _sin_cos(x: TaylorSeries) -> tuple[TaylorSeries, TaylorSeries]:
-    """Compute both from s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
     s[0], c[0] = elementwise.sin(a[0]), elementwise.cos(a[0])

@@ -82,7 +82,6 @@ class FigureSeries:
 
 
 def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
-    """Join the columns one by one: all at once would double the memory."""
     return {name: np.concatenate([part[:, column] for part in parts]) for column, name in enumerate(names)}
 
 

@@ -36,7 +36,6 @@ class Extremes:
         return [self._points[: self._count], rest]
 
     def _halve(self) -> None:
-        """Join spans in pairs, some at a time to bound the memory."""
         for first in range(0, self._count, _AT_ONCE):
             points = self._points[first : first + _AT_ONCE]
             self._points[first // 2 : (first + len(points)) // 2] = _extremes(points, 4)

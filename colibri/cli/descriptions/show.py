@@ -34,7 +34,6 @@ def run(args: Namespace) -> int:
 
 
 def _show_law(args: Namespace) -> None:
-    """Print what the vehicle can do, and the numbers that follow, with their formulas."""
     from colibri.autopilot.control.profile import load_profile
     from colibri.autopilot.control.scaling import capability_of, formulas
     from colibri.plant.vehicle.description import load_vehicle

@@ -66,7 +66,6 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
 
 
 def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
-    """Write the results of a flight that ended badly, if it has a log."""
     if not (plan.out / FILE).exists():
         return
     from colibri.analysis.outcome import keep_what_there_is
@@ -75,7 +74,6 @@ def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
 
 
 def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool) -> "Report":
-    """Write and print the results. Modules are loaded only now, after the flight."""
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
     from colibri.analysis.series.figure_series import FigureSeries

@@ -123,7 +123,6 @@ def _refined(
 
 
 def _late(rates: Array, late: int) -> Array:
-    """Delay rates by `late` samples; the result begins at the largest latency."""
     return rates[_LATENCIES - late : len(rates) - late]
 
 

@@ -181,7 +181,6 @@ class LawPilot:
         return motion.carry(x, interval_s, speeds[None], _NO_DISTURBANCE, voltage_v, self._motion)
 
     def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
-        """Replace the references' heading by the vehicle's own, turning at its rate."""
         (phi, theta, psi), (_, q, r) = state.euler, state.rate_flu_rad_s
         turns = (sin(phi) * q + cos(phi) * r) / max(cos(theta), _MIN_UPRIGHT)  # THESIS [2.7]
         yaw = np.asarray(psi + turns * self._ahead_s, dtype=np.float64)

@@ -153,7 +153,6 @@ class Predictor:
         return there
 
     def _acting(self, from_us: int, until_us: int = 0) -> list[SentCommand]:
-        """Return the command in effect at a time, and its successors until another time."""
         acting = [self._sent[0]]
         for it in self._sent:
             if it.acts_us <= from_us:

@@ -112,7 +112,6 @@ def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, pac
 
 @compiled
 def _change(y: Array, axis: int, command: float, h: float, model: ResponseModel) -> float:
-    """Return the change of a body rate over h; advance its acceleration in place."""
     limit, lag_s = model.max_acceleration_rad_s2[axis], model.time_constant_s[axis]
     rate, acceleration, behind_s = y[10 + axis], y[14 + axis], model.acceleration_lag_s[axis]
     if behind_s == 0.0:

@@ -83,7 +83,6 @@ def _climbs_above_sea(now: CheckFacts) -> bool:
 
 
 def _inside_fence(now: CheckFacts) -> bool:
-    """Whether the box lies inside the vehicle's fence, measured from home: here the origin."""
     values = now.parameters or {}
     if values.get("FENCE_ENABLE", 1.0) == 0.0:
         return True

@@ -67,7 +67,6 @@ class ControlPanel:
         follow.on_update(lambda event: self._by_hand(event, Done("follow", follow.value)))
 
     def _by_hand(self, event: viser.GuiEvent[Any], done: Done) -> None:
-        """Queue an action of a browser; changes by the page itself have no client."""
         if event.client_id is not None:
             self.done.put(done)
 

@@ -149,7 +149,6 @@ class Page:
         return [VehicleScene(scene, number, each.airframe, self._scale) for number, each in enumerate(self._sources)]
 
     def _look(self, middle: tuple[float, float, float], extent_m: float) -> None:
-        """Set the initial camera: from the south-west, with the whole flight in view."""
         camera = self.server.initial_camera
         camera.position = tuple(np.add(middle, np.array([-1.2, -1.8, 1.0]) * extent_m).tolist())
         camera.look_at = middle

@@ -199,7 +199,6 @@ class SurroundingsScene:
         return self._scene.add_line_segments(at, lines, colors=colour, thickness=width, thickness_units="screen")
 
     def _marks(self, name: str, marks: tuple[Mark, ...], colour: Colour, *, below: bool = False) -> None:
-        """Draw balls with labels above; below for home, where a landing has its own."""
         for number, mark in enumerate(marks):
             at = f"{self._root}/{name}{number}"
             self._add("mission, fence", self._scene.add_icosphere(at, 0.12, colour, position=mark.place_enu_m))

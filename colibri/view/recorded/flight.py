@@ -173,7 +173,6 @@ def airframe_of(vehicle: Vehicle) -> VehicleShape:
 
 
 def _read(log: FlightFile, topic: Topic, apart_s: float) -> LogColumns:
-    """Read a topic with samples at least `apart_s` apart, at most `MAX_ROWS`."""
     (times_s,) = read_series(log, topic, "t")
     if not len(times_s):
         raise RecordingError(f"no {topic.name}: the flight ended before it began")
@@ -191,7 +190,6 @@ def _reference(plan: FlightPlan, times_s: Array, decisions: LogColumns) -> Array
 
 
 def _ground_m(vehicle: Vehicle, place: Array) -> float:
-    """Return the ground's height; below the flight for a vehicle without ground."""
     return vehicle.ground_height_m if vehicle.ground else min(0.0, float(place[:, 2].min()))
 
 

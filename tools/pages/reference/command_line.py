@@ -41,21 +41,32 @@ def _page() -> Iterator[str]:
     for group, names in (*GROUPS.items(), ("the two processes of a flight", tuple(PROCESSES))):
         yield f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in names)
     yield ""
-    for name, parser in parsers().items():
-        yield from _section(name, parser)
+    every = parsers()
+    of_fly = {row for _, row in _rows(every["fly"])}
+    for name, parser in every.items():
+        yield from _section(name, parser, of_fly if name != "fly" else set())
 
 
-def _section(name: str, parser: ArgumentParser) -> Iterator[str]:
+def _rows(parser: ArgumentParser) -> Iterator[tuple[str, str]]:
+    """Yield the name of each option, and its row."""
+    for action in arguments_of(parser):
+        if action.dest != "help":
+            name = action.option_strings[0] if action.option_strings else action.dest
+            yield name, f"| {_names(action)} | {_help(action, parser)} |"
+
+
+def _section(name: str, parser: ArgumentParser, of_fly: set[str]) -> Iterator[str]:
     does = COMMANDS[name].does if name in COMMANDS else PROCESSES[name]
     yield f"## colibri {name}\n"
     yield f"{does[0].upper()}{does[1:]}.\n"
     if name in COMMANDS:
         yield f"```sh\n{dedent(COMMANDS[name].examples).strip()}\n```\n"
     yield "| | |\n|---|---|"
-    for action in arguments_of(parser):
-        if action.dest != "help":
-            yield f"| {_names(action)} | {_help(action, parser)} |"
+    rows = list(_rows(parser))
+    yield from (row for _, row in rows if row not in of_fly)
     yield ""
+    if shared := [f"`{option}`" for option, row in rows if row in of_fly]:
+        yield f"As in [`fly`](#colibri-fly): {', '.join(shared)}.\n"
 
 
 def _names(action: Action) -> str:
