@@ -42,6 +42,19 @@ PATIENTLY = Repeat(500_000, 60)
 few = settings(max_examples=10, deadline=None)
 
 
+class TryingVehicle(Vehicle):
+    """A vehicle that tries proposed parameters once a step, as in flight."""
+
+    def __init__(self, parameters: Parameters, *services: Any) -> None:
+        super().__init__(*services)
+        self._parameters = parameters
+
+    def poll(self, now_us: int) -> list[tuple[int | None, bytes]]:
+        if self._parameters.proposed:
+            self._parameters.settle()
+        return super().poll(now_us)
+
+
 class Rig:
     def __init__(self, seed: int = 0, loss: float = 0.0, unruly: float = 0.0, rules: Rules | None = None) -> None:
         self.obeyed: list[Received] = []
@@ -56,7 +69,7 @@ class Rig:
             memory.write(("logs", name), 0, data)
         services = (self.commands, ParameterService(self.parameters), self.ground.service, Logs(memory, ("logs",)))
         self.client = Client(255, 190)
-        self.link = Link(Vehicle(*services), [self.client], seed, loss=loss, unruly=unruly)
+        self.link = Link(TryingVehicle(self.parameters, *services), [self.client], seed, loss=loss, unruly=unruly)
 
     def ended(self, conversation: Conversation) -> int | None:
         self.client.begin(conversation)
