@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
-from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting, roughness
+from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
 from colibri.autopilot.estimation.eskf_predict import look_ahead
 from colibri.autopilot.estimation.estimate import Estimate, FilterCheck, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
+from colibri.autopilot.estimation.inertial_watch import InertialWatch
 from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Value
 from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
@@ -43,13 +44,6 @@ _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes, because frames with a fix have enough work."""
-_ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25
-"""White noise of a sensor that has failed."""
-_MIN_BIAS_M_S2 = 0.3
-_ROUGH_CHECKS, _ROUGH_PART = 3, 0.6
-"""In a row, because a knock is rough for one."""
-_BOTH_REJECTED_US = 300_000
-"""GPS velocity and barometer contradict the same way for so long: the accelerometer is their one common cause."""
 _NOTHING = InertialReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
@@ -110,8 +104,7 @@ class Estimator:
         self._estimate: Estimate | None = None
         self._tests: Tests | None = None
         self._resets = 0
-        self._rough = [0, 0]
-        self._biased, self._bias_m_s2 = False, 0.0
+        self._inertial_watch = InertialWatch(self._inertial)
 
     @property
     def last(self) -> Estimate | None:
@@ -291,9 +284,7 @@ class Estimator:
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
         if found is not None and not (modelled.force_modelled or modelled.rate_modelled):
             self.filter.reset_accel_bias(found, now_us)
-            size = float(np.abs(self.filter.x[13:16]).max())
-            self._inertial.accelerometer.failed |= self._biased and size > 1.2 * self._bias_m_s2
-            self._biased, self._bias_m_s2 = size > _MIN_BIAS_M_S2, size
+            self._inertial_watch.look_at_bias(float(np.abs(self.filter.x[13:16]).max()))
         turned = turned_since(self.filter, now_us)
         if turned is not None and not modelled.rate_modelled:
             self.filter.reset_gyro_bias(*turned, now_us)
@@ -347,7 +338,7 @@ class Estimator:
         at_us = now_us - _CHECK_AT_US
         if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
-        self._check_inertial(now_us)
+        self._inertial_watch.look(self._buffer, self.filter, now_us, rate_known=self._reading.rate_good)
         return self.filter.check(self.filter_us)
 
     def _replace(self, before: InertialReading) -> None:
@@ -357,32 +348,13 @@ class Estimator:
         if rate_modelled != before.rate_modelled:
             self.filter.replace_rate(modelled=rate_modelled)
 
-    def _check_inertial(self, now_us: int) -> None:
-        """Mark an inertial sensor as failed after long noise, or contradiction by two others."""
-        buffer, rough, inertial = self._buffer, self._rough, self._inertial
-        parts = roughness(buffer.samples, buffer.first, len(buffer.waiting), _ROUGH_M_S2, _ROUGH_RAD_S)
-        for sensor, part in enumerate(parts):
-            rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
-        inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS
-        if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
-            inertial.gyroscope.failed = inertial.gyroscope.noisy = True
-            inertial.gyroscope.value = buffer.mean_rate()
-        velocity, pressure = self.filter.velocity, self.filter.barometer.kind
-        known = self._reading.rate_good
-        if known and velocity.rejected_us is not None and pressure.rejected_us is not None:
-            both_us = now_us - max(velocity.rejected_us, pressure.rejected_us)
-            alike = velocity.test.innovation[2] * pressure.test.innovation[0] > 0.0
-            inertial.accelerometer.failed |= alike and both_us > _BOTH_REJECTED_US
-
     def expect(self, expected: Expected | None) -> None:
         """Set the motion that the rotors cause, for inertial sensors that have failed."""
         self._inertial.expected = expected
 
     def trust_inertial(self) -> None:
         """Use inertial sensors again that have failed."""
-        for axes in (self._inertial.accelerometer, self._inertial.gyroscope):
-            axes.failed = axes.noisy = False
-        self._biased = False
+        self._inertial_watch.trust()
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading
@@ -419,4 +391,4 @@ class Estimator:
         self._take(self._interval_us)
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)
-        self._check_inertial(self._interval_us)
+        self._inertial_watch.look(self._buffer, self.filter, self._interval_us, rate_known=True)

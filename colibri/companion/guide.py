@@ -1,15 +1,14 @@
 """The companion without socket or clock: bytes and time in, bytes out."""
 
-from math import dist, hypot, inf, nan
+from math import dist, inf, nan
 
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.common.earth.geodesy import enu_of
 from colibri.common.rotations import tilt_deg
-from colibri.companion.home import local_origin
-from colibri.companion.identification import steps
+from colibri.companion.home import moved_m
+from colibri.companion.identification.step_flight import StepFlight
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
 from colibri.companion.setpoint_forms import message_of, row_of
@@ -74,7 +73,6 @@ class Companion:
         self._next_us = 0
         self._newest: ReceivedState | None = None
         self._asked: LawDemand | None = None
-        self._jumped_m = 0.0
         self._consistency = Consistency()
         self._law_error = self._fault = ""
         self._passed_us: int | None = None
@@ -86,8 +84,7 @@ class Companion:
         self.errors = TrackErrors()
         self.said: list[str] = []
         self.rows: list[LogRow] = []
-        self.commanded: list[tuple[float, float, float, float]] = []
-        self.measured: list[tuple[float, float, float, float]] = []
+        self.steps = StepFlight() if settings.identifies else None
 
     @property
     def interval_us(self) -> int:
@@ -153,20 +150,14 @@ class Companion:
 
     def _take_in(self, received: ReceivedState) -> None:
         at_us, state = received
-        if self._newest is not None:
-            if at_us <= self._newest.at_us:
-                return
-            before = self._newest.state
-            passed_s = (at_us - self._newest.at_us) * 1e-6
-            there = tuple(p + passed_s * v for p, v in zip(before.position_enu_m, before.velocity_enu_m_s, strict=True))
-            if passed_s < 1.0:
-                self._jumped_m = max(self._jumped_m, dist(there, state.position_enu_m))
+        if self._newest is not None and at_us <= self._newest.at_us:
+            return
         self._newest = received
         self._consistency.add(at_us, state)
         self._predictor.corrected_in_s = _CORRECTED_IN * self.peer.clock.round_trip_us * 1e-6
         self._predictor.observe(at_us, state)
-        if self._settings.identifies and self._on_way:
-            self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))
+        if self.steps is not None:
+            self.steps.add(at_us, state)
         past = self._history.at(at_us)
         if self.phase is CompanionPhase.FLYING and past is not None and past.track_enu_m is not None:
             self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
@@ -211,7 +202,7 @@ class Companion:
             self.limit = exceeded(facts, self._settings.limits, self._box)
             if self.limit is not None:
                 self.said.append(f"{self.limit.name}: {self.limit.words(facts, self._settings.limits)}")
-        self._jumped_m = 0.0
+        self._consistency.jumped_m = 0.0
 
     def _rehearse(self, now_us: int) -> None:
         """Add the failures of a law that runs but does not fly; its time counts from when all checks passed."""
@@ -257,12 +248,9 @@ class Companion:
             return self._passed_us is not None and (now_us - self._passed_us) * 1e-6 >= self._duration_s
         if not self._on_way or self._asked is None:
             return False
-        if self._settings.identifies:
-            return self._identified_s(now_us) >= steps.duration_s()
+        if self.steps is not None:
+            return self.steps.is_over(now_us)
         return self._pilot.finished or self._asked.track_s >= self._settings.duration_s
-
-    def _identified_s(self, now_us: int) -> float:
-        return (now_us - self._since_us - _STEADY_US) * 1e-6
 
     def _enter(self, phase: CompanionPhase, why: PhaseCondition, now_us: int) -> None:
         waits_for = self.waits_for
@@ -320,8 +308,10 @@ class Companion:
             self._pilot.begin(self._predictor.at(acts_us))
         if self.phase is CompanionPhase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
             self._on_way = True
-            if not self._settings.identifies:
+            if self.steps is None:
                 self._pilot.fly_track(self._settings.stay)
+            else:
+                self.steps.begin(self._since_us + _STEADY_US)
         y = self._predictor.at(acts_us)
         try:
             asked = self._pilot.step(y)
@@ -335,8 +325,10 @@ class Companion:
             self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
         if self.phase is CompanionPhase.TAKING_OVER and not rehearses:
             asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
-        if self.phase is CompanionPhase.FLYING and self._on_way and self._settings.identifies:
-            asked = self._with_step(asked, now_us)
+        if self.phase is CompanionPhase.FLYING and self.steps is not None:
+            arrives_us = now_us + self.peer.clock.round_trip_us // 2
+            rates = self.steps.rates(asked.rate_flu_rad_s, now_us, arrives_us)
+            asked = asked._replace(rate_flu_rad_s=rates)
         thrust = self._thrust.command(asked.thrust_n / (self._weight_n * self._predictor.thrust_scale))
         if flies:
             lift = (
@@ -352,18 +344,13 @@ class Companion:
         name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
         return [self.peer.client.encode(name, *fields)]
 
-    def _with_step(self, asked: LawDemand, now_us: int) -> LawDemand:
-        p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
-        self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
-        return asked._replace(rate_flu_rad_s=(p, q, r))
-
     def _check_facts(self, now_us: int) -> CheckFacts:
         peer = self.peer
         assert peer.stack is not None, "it is connected"
         return CheckFacts(
             stack=peer.stack,
             systems=tuple(peer.client.vehicles),
-            home_moved_m=self._home_moved_m(),
+            home_moved_m=moved_m(self._settings.home, peer.report),
             thrust=self._thrust,
             parameters=peer.parameter_values,
             clock_known=peer.clock.known,
@@ -388,13 +375,6 @@ class Companion:
         here, stay = self._newest.state.position_enu_m, self._settings.stay
         return dist(here, self._pilot.start_enu_m if stay is None else stay.place(here))
 
-    def _home_moved_m(self) -> float:
-        """Return by how much the vehicle's home, or its local frame, has moved since a mission was placed."""
-        planned, now = self._settings.home, local_origin(self.peer.report)
-        if planned is None or now is None:
-            return 0.0
-        return max(abs(now.up_m - planned.up_m), hypot(*enu_of(now.origin, planned.origin)))
-
     def _flight_facts(self, now_us: int) -> FlightFacts:
         newest, flies = self._newest, self.phase is CompanionPhase.FLYING
         reference = None
@@ -407,7 +387,7 @@ class Companion:
             position_enu_m=newest.state.position_enu_m if newest else (nan, nan, nan),
             tilt_deg=tilt_deg(newest.state.attitude) if newest else 0.0,
             reference_enu_m=reference,
-            jumped_m=self._jumped_m,
+            jumped_m=self._consistency.jumped_m,
             law_error=self._law_error,
             pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
             gap_s=self._pace.gap_s(now_us) if flies else 0.0,

@@ -1,8 +1,9 @@
 """Request a vehicle's home and the origin of its local frame."""
 
+from math import hypot
 from typing import NamedTuple
 
-from colibri.common.earth.geodesy import Geodetic
+from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.client.report import VehicleReport
 from colibri.mavlink.wire.dialect import mav
@@ -42,3 +43,11 @@ class HomeSeeker:
                 number = float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))
                 self._peer.ask(name, mav.MAV_CMD_REQUEST_MESSAGE, number)
         return self._peer.poll(now_us)
+
+
+def moved_m(planned: LocalOrigin | None, report: VehicleReport) -> float:
+    """Return by how much the vehicle's home, or its local frame, has moved since a mission was placed, m."""
+    now = local_origin(report)
+    if planned is None or now is None:
+        return 0.0
+    return max(abs(now.up_m - planned.up_m), hypot(*enu_of(now.origin, planned.origin)))

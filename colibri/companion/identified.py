@@ -20,9 +20,10 @@ class Identified(NamedTuple):
 
 def identified(companion: Companion) -> Identified:
     """Fit the response to a companion's steps."""
-    stack = companion.peer.stack
+    stack, steps = companion.peer.stack, companion.steps
     assert stack is not None, "it has flown"
-    commanded, measured = (np.reshape(rows, (-1, 4)) for rows in (companion.commanded, companion.measured))
+    assert steps is not None, "it was an identification"
+    commanded, measured = (np.reshape(rows, (-1, 4)) for rows in (steps.commanded, steps.measured))
     found = fit(RateLog(commanded[:, 0], commanded[:, 1:], measured[:, 0], measured[:, 1:]))
     p, q, r = found.time_constant_s.tolist()
     response = stack.response._replace(time_constant_s=(p, q, r), latency_s=found.latency_s)

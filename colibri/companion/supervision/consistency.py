@@ -8,8 +8,8 @@ from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.client.states import TimedState
 
 WINDOW_S = 0.15
-MAX_GAP_S = 0.1
-"""States further apart are not compared."""
+MAX_GAP_S, MAX_JUMP_GAP_S = 0.1, 1.0
+"""States further apart are not compared, or not for jumps."""
 MAX_TURN_RAD, MAX_WAY_M = 0.15, 0.15
 """Largest contradiction in a window: 1 rad/s, 1 m/s."""
 _WINDOWS = 2
@@ -22,10 +22,15 @@ class _Start(NamedTuple):
 
 
 class Consistency:
-    """Integrates body rates and velocity over windows; `contradiction` is in words, empty if there is none."""
+    """Integrates body rates and velocity over windows.
+
+    Attributes:
+        contradiction: In words; empty without one.
+        jumped_m: Largest jump of the position, m, until its reader clears it.
+    """
 
     def __init__(self) -> None:
-        self.contradiction = ""
+        self.contradiction, self.jumped_m = "", 0.0
         self._start: _Start | None = None
         self._last: _Start | None = None
         self._turned: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -35,6 +40,8 @@ class Consistency:
     def add(self, at_us: int, state: TimedState) -> None:
         now, last = _Start(at_us, state), self._last
         self._last = now
+        if last is not None and (at_us - last.at_us) * 1e-6 < MAX_JUMP_GAP_S:
+            self._judge_jump(last, now)
         if last is None or self._start is None or not 0.0 < (at_us - last.at_us) * 1e-6 <= MAX_GAP_S:
             self._begin(now)
             self._windows, self.contradiction = 0, ""
@@ -48,6 +55,12 @@ class Consistency:
         if (at_us - self._start.at_us) * 1e-6 >= WINDOW_S:
             self._judge(state)
             self._begin(now)
+
+    def _judge_jump(self, last: _Start, now: _Start) -> None:
+        passed_s = (now.at_us - last.at_us) * 1e-6
+        (x, y, z), (vx, vy, vz) = last.state.position_enu_m, last.state.velocity_enu_m_s
+        there = (x + passed_s * vx, y + passed_s * vy, z + passed_s * vz)
+        self.jumped_m = max(self.jumped_m, dist(there, now.state.position_enu_m))
 
     def _begin(self, now: _Start) -> None:
         self._start, self._turned, self._moved = now, now.state.attitude, now.state.position_enu_m

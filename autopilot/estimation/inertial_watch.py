@@ -1,0 +1,50 @@
+"""Failures of inertial sensors that show in their noise, in biases that grow, or against two other sensors."""
+
+from colibri.autopilot.estimation.delay_buffer import DelayBuffer, roughness
+from colibri.autopilot.estimation.eskf import Filter
+from colibri.autopilot.estimation.sensing.inertial import Inertial
+
+_ROUGH_M_S2, _ROUGH_RAD_S = 2.0, 0.25
+"""White noise of a sensor that has failed."""
+_ROUGH_CHECKS, _ROUGH_PART = 3, 0.6
+"""In a row, because a knock is rough for one."""
+_MIN_BIAS_M_S2, _GROWN = 0.3, 1.2
+_BOTH_REJECTED_US = 300_000
+"""GPS velocity and barometer contradict the same way for so long: the accelerometer is their one common cause."""
+
+
+class InertialWatch:
+    """Marks the inertial sensors of one vehicle as failed."""
+
+    def __init__(self, inertial: Inertial) -> None:
+        self._inertial = inertial
+        self._rough = [0, 0]
+        self._bias_m_s2 = 0.0
+
+    def look(self, buffer: DelayBuffer, filter_: Filter, now_us: int, *, rate_known: bool) -> None:
+        """Check the waiting samples, and the tests of the filter; `rate_known`: the gyroscope is usable."""
+        inertial, rough = self._inertial, self._rough
+        parts = roughness(buffer.samples, buffer.first, len(buffer.waiting), _ROUGH_M_S2, _ROUGH_RAD_S)
+        for sensor, part in enumerate(parts):
+            rough[sensor] = rough[sensor] + 1 if part > _ROUGH_PART else 0
+        inertial.accelerometer.failed |= rough[0] >= _ROUGH_CHECKS
+        if rough[1] >= _ROUGH_CHECKS and not inertial.gyroscope.failed:
+            inertial.gyroscope.failed = inertial.gyroscope.noisy = True
+            inertial.gyroscope.value = buffer.mean_rate()
+        velocity, pressure = filter_.velocity, filter_.barometer.kind
+        if rate_known and velocity.rejected_us is not None and pressure.rejected_us is not None:
+            both_us = now_us - max(velocity.rejected_us, pressure.rejected_us)
+            alike = velocity.test.innovation[2] * pressure.test.innovation[0] > 0.0
+            inertial.accelerometer.failed |= alike and both_us > _BOTH_REJECTED_US
+
+    def look_at_bias(self, bias_m_s2: float) -> None:
+        """Compare the accelerometer's largest bias after a reset with that after the last one."""
+        grown = bias_m_s2 > _GROWN * self._bias_m_s2
+        self._inertial.accelerometer.failed |= self._bias_m_s2 > _MIN_BIAS_M_S2 and grown
+        self._bias_m_s2 = bias_m_s2
+
+    def trust(self) -> None:
+        """Use the sensors again that have failed."""
+        for sensor in (self._inertial.accelerometer, self._inertial.gyroscope):
+            sensor.failed = sensor.noisy = False
+        self._bias_m_s2 = 0.0
