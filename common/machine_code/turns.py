@@ -3,17 +3,22 @@
 import fcntl
 import os
 import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
+_handlers: dict[int, Any] = {}
+"""Handlers of the process, while its signals are held. Not a mask: other threads would still receive them."""
+_held: list[int] = []
 
 
 class Turn:
     """The right to do some work, by a lock on a file, until `end` or the end of the process."""
 
     def __init__(self, file: Path, waiting: Callable[[], object]) -> None:
-        self._before: set[int] | None = None
+        self._holds = self._within_another = False
         self._file: int | None = None
         try:
             self._file = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -30,15 +35,34 @@ class Turn:
 
     def hold_signals(self) -> None:
         """Deliver signals until `end` only: an exception of their handlers would be lost in a callback of C."""
-        handled = {number for number in _SIGNALS if callable(signal.getsignal(number))}
-        before = signal.pthread_sigmask(signal.SIG_UNBLOCK, handled)  # what an outer turn has held is delivered here
-        signal.pthread_sigmask(signal.SIG_BLOCK, handled)
-        self._before = {int(number) for number in before}
+        if threading.current_thread() is threading.main_thread():  # where handlers run
+            self._holds, self._within_another = True, bool(_handlers)
+            _deliver()
+            for number in _SIGNALS:
+                if callable(handler := signal.getsignal(number)):
+                    _handlers[number] = handler
+                    signal.signal(number, _hold)
 
     def end(self) -> None:
         if self._file is not None:
             os.close(self._file)
             self._file = None
-        if self._before is not None:
-            before, self._before = self._before, None
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if self._holds:
+            self._holds = False
+            if not self._within_another:
+                _deliver()
+
+
+def _hold(number: int, _frame: object) -> None:
+    _held.append(number)
+
+
+def _deliver() -> None:
+    """Restore the handlers, and call those of the signals that came meanwhile."""
+    for number, handler in _handlers.items():
+        signal.signal(number, handler)
+    _handlers.clear()
+    numbers = [*dict.fromkeys(_held)]
+    _held.clear()
+    for number in numbers:
+        signal.raise_signal(number)
