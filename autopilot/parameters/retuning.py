@@ -103,7 +103,7 @@ class Retuning:
             return True
         try:
             ready = self._trial.is_ready(self._numbers.applied(values)[1])
-        except Exception:  # `prepare` says why
+        except Exception:  # of somebody else's law; `prepare` meets it again, and reports it
             return True
         if not ready:
             self._budget.spend(_SLICE_US)

@@ -24,7 +24,7 @@ def with_limits(metrics: Iterable[Metric], limits: Iterable[ReportLimit]) -> tup
 
 
 def handed_over(table: FlightTable, args: Namespace) -> int:
-    """Write what `--json` and `--junit` ask for, say which limits are exceeded, and return the exit code."""
+    """Write the files of `--json` and `--junit`, report exceeded limits, and return the exit code."""
     lost = loss_exceeds(
         args.fail_lost, sum(each.verdict is not Verdict.FLOWN for each in table.flown), len(table.flown)
     )
@@ -76,7 +76,7 @@ def _value(cell: str) -> Any:
 
 
 def _write_junit(table: FlightTable, reasons: list[list[str]], path: Path, *, lost: bool) -> None:
-    """Write one test case a flight; a flight that `--fail-lost` lets be lost is skipped."""
+    """Write one test case for each flight; flights lost within `--fail-lost` are skipped."""
     suite = ElementTree.Element("testsuite", name=table.campaign.name, tests=str(len(reasons)))
     factors = len(table.campaign.factors) + 2
     counts = {"failure": 0, "skipped": 0}

@@ -66,7 +66,7 @@ def _of_function(name: str, given: Any, times_s: Array) -> Motion:
         try:
             values = _parts(whole(t)) if whole else {part: function(t) for part, function in functions.items()}
             samples.append({part: _numbers(value, 1 if part == "yaw" else 3) for part, value in values.items()})
-        except Exception as error:
+        except Exception as error:  # of the user's function
             if t == 0.0 and (series := _of_series(whole or functions["position"], times_s)) is not None:
                 return series
             words = f"{type(error).__name__}: {' '.join(str(error).split())}"
@@ -80,7 +80,7 @@ def _of_series(formula: Callable[[Any], Any], times_s: Array) -> Motion | None:
     """Sample a formula as in a class of track options, of which all derivatives are known."""
     try:
         motion = _of_formula(Track(in_series(formula), duration_s=float(times_s[-1])), times_s)
-    except Exception:
+    except Exception:  # the user's formula may raise anything, and the caller reports what it raised for a number
         return None
     right = motion["position"].shape[1] == len("xyz") and all(np.isfinite(each).all() for each in motion.values())
     return motion if right else None
