@@ -70,7 +70,7 @@ class Capability(NamedTuple):
     gravity_m_s2: float
 
 
-class Row(NamedTuple):
+class ScalingRule(NamedTuple):
     """A number of a law."""
 
     formula: str
@@ -127,26 +127,30 @@ def _max_rate(vehicle: Capability, ratios: LpvMpcScaling) -> list[float]:
 
 
 _LPV_MPC = {
-    "guidance.poles": Row("poles / √slow", _slowed("poles", -0.5)),
-    "guidance.max_acceleration_m_s2": Row("acceleration × climb, at most max_g × g / √slow", _acceleration),
-    "guidance.approach_speed_m_s": Row("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
-    "observer.acceleration_rad_s": Row("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
-    "observer.moment_rad_s": Row("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),
-    "observer.max_acceleration_m_s2": Row("wind × g", lambda vehicle, ratios: ratios.wind * vehicle.gravity_m_s2),
-    "observer.max_moment_n_m": Row("lost_lift × lift", lambda vehicle, ratios: ratios.lost_lift * vehicle.lift_n_m),
-    "plan.max_rate_rad_s": Row("√(2 turn_rad × turn), at most max_rate_rad_s", _max_rate),
-    "weights.position": Row("position / √slow", _slowed("position", -0.5)),
-    "weights.rate": Row("rate × slow³", _slowed("rate", 3.0)),
-    "fallback.poles": Row("fallback_poles / √slow", _slowed("fallback_poles", -0.5)),
-    "fallback.turn_1_s": Row("turn_1_s / slow", _slowed("turn_1_s", -1.0)),
-    "fallback.rate_1_s": Row("rate_1_s / slow", _slowed("rate_1_s", -1.0)),
+    "guidance.poles": ScalingRule("poles / √slow", _slowed("poles", -0.5)),
+    "guidance.max_acceleration_m_s2": ScalingRule("acceleration × climb, at most max_g × g / √slow", _acceleration),
+    "guidance.approach_speed_m_s": ScalingRule("√(2 braking_m × max_acceleration_m_s2)", _approach_speed),
+    "observer.acceleration_rad_s": ScalingRule("acceleration_rad_s / √slow", _slowed("acceleration_rad_s", -0.5)),
+    "observer.moment_rad_s": ScalingRule("moment_rad_s / slow", _slowed("moment_rad_s", -1.0)),
+    "observer.max_acceleration_m_s2": ScalingRule(
+        "wind × g", lambda vehicle, ratios: ratios.wind * vehicle.gravity_m_s2
+    ),
+    "observer.max_moment_n_m": ScalingRule(
+        "lost_lift × lift", lambda vehicle, ratios: ratios.lost_lift * vehicle.lift_n_m
+    ),
+    "plan.max_rate_rad_s": ScalingRule("√(2 turn_rad × turn), at most max_rate_rad_s", _max_rate),
+    "weights.position": ScalingRule("position / √slow", _slowed("position", -0.5)),
+    "weights.rate": ScalingRule("rate × slow³", _slowed("rate", 3.0)),
+    "fallback.poles": ScalingRule("fallback_poles / √slow", _slowed("fallback_poles", -0.5)),
+    "fallback.turn_1_s": ScalingRule("turn_1_s / slow", _slowed("turn_1_s", -1.0)),
+    "fallback.rate_1_s": ScalingRule("rate_1_s / slow", _slowed("rate_1_s", -1.0)),
 }
 _GEOMETRIC = {
-    "position_frequency_rad_s": Row("position_rad_s / slow", _slowed("position_rad_s", -1.0)),
-    "attitude_frequency_rad_s": Row("attitude_rad_s / slow", _slowed("attitude_rad_s", -1.0)),
-    "yaw_frequency_rad_s": Row("yaw_rad_s / slow", _slowed("yaw_rad_s", -1.0)),
+    "position_frequency_rad_s": ScalingRule("position_rad_s / slow", _slowed("position_rad_s", -1.0)),
+    "attitude_frequency_rad_s": ScalingRule("attitude_rad_s / slow", _slowed("attitude_rad_s", -1.0)),
+    "yaw_frequency_rad_s": ScalingRule("yaw_rad_s / slow", _slowed("yaw_rad_s", -1.0)),
 }
-LAWS: dict[str, tuple[type[Table], dict[str, Row]]] = {
+LAWS: dict[str, tuple[type[Table], dict[str, ScalingRule]]] = {
     "lpv-mpc": (LpvMpcScaling, _LPV_MPC),
     "geometric-se3": (GeometricScaling, _GEOMETRIC),
 }

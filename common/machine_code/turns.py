@@ -3,7 +3,6 @@
 import fcntl
 import os
 import signal
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,13 +34,16 @@ class Turn:
 
     def hold_signals(self) -> None:
         """Deliver signals until `end` only: an exception of their handlers would be lost in a callback of C."""
-        if threading.current_thread() is threading.main_thread():  # where handlers run
-            self._holds, self._within_another = True, bool(_handlers)
+        within_another = bool(_handlers)
+        try:
             _deliver()
             for number in _SIGNALS:
                 if callable(handler := signal.getsignal(number)):
-                    _handlers[number] = handler
                     signal.signal(number, _hold)
+                    _handlers[number] = handler
+        except ValueError:
+            return  # not the main thread, where handlers run
+        self._holds, self._within_another = True, within_another
 
     def end(self) -> None:
         if self._file is not None:
