@@ -105,7 +105,7 @@ def speed(results: Sequence[StudyResult]) -> dict[str, Figure]:
         axes.set_yscale("log")
     grid[2][0].set_ylim(0.0, 190.0)
     grid[-1][0].set_xlabel("top speed of the reference (m/s)")
-    put_head(figure, f"Lemniscates ever faster, after {SETTLED_AFTER_S:.0f} s", columns=3)
+    put_head(figure, f"Lemniscates of increasing speed, after {SETTLED_AFTER_S:.0f} s", columns=3)
     return {"speed": figure}
 
 
@@ -120,7 +120,7 @@ def robustness(results: Sequence[StudyResult]) -> dict[str, Figure]:
         axes.set_ylabel(track, fontweight="bold")
     for (axes,) in grid[:-1]:
         axes.set_xlabel("")
-    put_head(figure, "Position error with a plant that is not as planned", columns=2)
+    put_head(figure, "Position error with a wrong model of the plant", columns=2)
     return {"robustness": figure}
 
 
