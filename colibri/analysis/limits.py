@@ -12,7 +12,17 @@ KEYS = (
     *(RMSE, "max_error_after_20s_m", "rmse_m", "max_error_m", "control_rmse_m"),
     *("estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw", "nees_mean"),
-    *("max_tilt_deg", "ground_contact_s", "effort_n_m", "max_slack", "qp_failures", "fallbacks", "resent"),
+    *(
+        "max_tilt_deg",
+        "ground_contact_s",
+        "ground_hits",
+        "limit_cycle_rad_s",
+        "effort_n_m",
+        "max_slack",
+        "qp_failures",
+        "fallbacks",
+        "resent",
+    ),
     *("qp_iterations.mean", "qp_iterations.p99", "qp_iterations.max"),
     *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
 )

@@ -15,6 +15,9 @@ LOST_M = 5.0
 """A settled vehicle further from its reference is lost."""
 _TOUCHED_S = 1.0
 """Longest contact with the ground below the reference before the vehicle counts as lost."""
+_LAST_PART = 2.0 / 3.0
+LIMIT_CYCLE_RAD_S = 1.5
+"""A swing above it is a limit cycle: vehicles swing at 3 to 8 rad/s if their rotors are much slower than assumed."""
 _TURNING_S = 1.0
 """A vehicle that begins upside down may be so again during its recovery."""
 _INSTANT_S = 1e-6
@@ -53,6 +56,20 @@ def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
 def ground_contact_s(vehicle: Vehicle, flight: FlightSeries) -> float | None:
     """Return the time on the ground after the first lift-off."""
     return None if vehicle.ground is None else _lasted_s(_touches_again(flight), flight)
+
+
+def ground_hits(vehicle: Vehicle, flight: FlightSeries) -> int | None:
+    """Return how often the vehicle came down on the ground below a reference in the air."""
+    if vehicle.ground is None:
+        return None
+    hits = _touches_again(flight) & flight.aloft
+    return int(np.count_nonzero(hits[1:] & ~flight.touches[:-1]))
+
+
+def limit_cycle_rad_s(flight: FlightSeries) -> float | None:
+    """Return the swing of the thrust axis over the last third: the median of that in each second, RMS."""
+    swings = [swing for at_s, swing in flight.swings_rad_s.items() if at_s > _LAST_PART * flight.t[-1]]
+    return float(np.median(swings)) if swings else None
 
 
 def impact(flight: FlightSeries) -> str | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.estimation import FIGURES, read_estimation, rms
-from colibri.analysis.lost import Lost, ground_contact_s, impact
+from colibri.analysis.lost import LIMIT_CYCLE_RAD_S, Lost, ground_contact_s, ground_hits, impact, limit_cycle_rad_s
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
@@ -55,7 +55,9 @@ def report(
         "lost": None if lost is None else lost.why,
         "lost_at_s": None if lost is None else lost.at_s,
         "ground_contact_s": ground_contact_s(plan.plant_vehicle, flight),
+        "ground_hits": ground_hits(plan.plant_vehicle, flight),
         "impact": impact(flight),
+        "limit_cycle_rad_s": limit_cycle_rad_s(flight),
         "wall_time_s": wall_time_s,
         "real_time_factor": sim_time_s / wall_time_s if wall_time_s else None,
         "rmse_m": rms(error),
@@ -115,6 +117,9 @@ def report_rows(figures: Report) -> dict[str, str]:
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
     lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
     lost |= {} if figures["impact"] is None else {"impact": figures["impact"]}
+    hits, swing_rad_s = figures.get("ground_hits"), figures.get("limit_cycle_rad_s") or 0.0
+    lost |= {"ground hits": f"{hits}, {figures['ground_contact_s']:.2f} s on the ground"} if hits else {}
+    lost |= {"limit cycle": f"{swing_rad_s:.1f} rad/s, RMS"} if swing_rad_s > LIMIT_CYCLE_RAD_S else {}
     has_qp = figures["solver"] is not None or figures["solve_time_us"]["max"] > 0.0
     step_us, interval_us = figures["control_step_us"]["p50"], figures["control_interval_us"]
     slow = f"{step_us / 1e3:.1f} ms a control step, every {interval_us / 1e3:g} ms" if step_us > interval_us else ""

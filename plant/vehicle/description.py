@@ -38,9 +38,16 @@ class Body(Table, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        ix, iy, iz = sorted(self.inertia_kg_m2)
-        if ix + iy < iz:
-            raise ValueError("inertia_kg_m2: no body has one moment of inertia above the sum of the other two")
+        largest = max(self.inertia_kg_m2)
+        excess = 2.0 * largest - sum(self.inertia_kg_m2)
+        if excess > 0.0:
+            signs = [-1.0 if moment == largest else 1.0 for moment in self.inertia_kg_m2]
+            near = [moment + sign * excess / 3.0 for moment, sign in zip(self.inertia_kg_m2, signs, strict=True)]
+            near = [moment * (1.0 if sign < 0.0 else 1.001) for moment, sign in zip(near, signs, strict=True)]
+            valid, rest = ", ".join(f"{moment:.4g}" for moment in near), sum(self.inertia_kg_m2) - largest
+            raise ValueError(
+                f"inertia_kg_m2: {largest:.4g} exceeds {rest:.4g}, the sum of the other two (nearest valid: [{valid}])"
+            )
 
 
 class RotorLag(Table, frozen=True, kw_only=True):

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from colibri.analysis.limits import KEYS, ReportLimit, exceeded
-from colibri.analysis.lost import Lost, ground_contact_s, impact, lost
+from colibri.analysis.lost import (
+    LIMIT_CYCLE_RAD_S,
+    Lost,
+    ground_contact_s,
+    ground_hits,
+    impact,
+    limit_cycle_rad_s,
+    lost,
+)
 from colibri.analysis.recording import COLUMNS, Samples
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.flights.plan import FlightPlan
@@ -71,8 +79,18 @@ def test_a_hard_contact_is_an_impact(columns: dict[str, float], found: str | Non
     assert impact(flown(z=lambda t: np.where(t > 5.0, -0.5, 2.0), **columns)) == found
 
 
+@pytest.mark.parametrize(("rate_rad_s", "swings"), [(0.5, False), (5.0, True)])
+def test_a_swing_beside_the_track_is_a_limit_cycle(rate_rad_s: float, swings: bool) -> None:
+    found = limit_cycle_rad_s(flown(phi=lambda t: rate_rad_s / 20.0 * np.sin(20.0 * t)))
+    assert found is not None
+    assert found == pytest.approx(rate_rad_s / 2.0**0.5, rel=0.05)
+    assert (found > LIMIT_CYCLE_RAD_S) is swings
+    assert limit_cycle_rad_s(flown(until_s=0.5)) is None
+
+
 def test_a_short_touch_of_the_ground_is_no_loss(plan: FlightPlan) -> None:
     flight = flown(z=lambda t: np.where(abs(t - 5.0) < 0.3, 0.0, 2.0))
+    assert ground_hits(plan.plant_vehicle, flight) == 1
     assert lost(plan, flight) is None
     assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(0.59, abs=0.02)
 

@@ -12,6 +12,8 @@ from colibri.plant.vehicle.description import Vehicle
 
 _ABOVE_GROUND_M = 0.1
 """Below a higher reference the vehicle must not touch the ground."""
+_WINDOW_S = 1.0
+_GRAVITY_M_S2 = 9.81
 
 
 class FlightSeries:
@@ -21,6 +23,8 @@ class FlightSeries:
         moment_n_m: Norm of U2, U3 and U4, (n,).
         upright: Cosine of the tilt, (n,).
         contact_speed_m_s: Speed at each sample before a contact with the ground.
+        swings_rad_s: Swing of the thrust axis in each second, by its end: the RMS of its rate of turn that the track
+            does not explain, never above that of the rate itself.
         touches, aloft: Masks of samples on the ground, and with the reference above it, (n,).
     """
 
@@ -34,6 +38,7 @@ class FlightSeries:
         self.constrained = Active(*np.zeros(len(Active._fields), dtype=np.int64).tolist())
         self.max_slack = -np.inf
         self.contact_speed_m_s: dict[int, float] = {}
+        self.swings_rad_s: dict[float, float] = {}
         self._last_speed = np.nan
         self.path_lag_s: float | None = None
         self.trajectory_sha256 = ""
@@ -43,6 +48,7 @@ class FlightSeries:
     def add(self, part: Samples) -> None:
         at = slice(self._samples, self._samples + len(part.table))
         up = _up(part)
+        self.swings_rad_s |= _swings(part)
         self.t[at] = part["t"]
         self.position_error_m[at] = part.position_error_m
         self.moment_n_m[at] = np.linalg.norm(part.columns(INPUT[1:]), axis=1)
@@ -76,6 +82,26 @@ def read_flight(reader: FlightReader, *others: Callable[[Samples], None]) -> Fli
 def _up(part: Samples) -> Array:
     phi, theta = part["phi"], part["theta"]
     return np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
+
+
+def _swings(part: Samples) -> dict[float, float]:
+    t = part["t"]
+    step_s = float(t[-1] - t[0]) / max(len(t) - 1, 1)
+    window = max(round(_WINDOW_S / step_s), 2) if step_s else len(t)
+    if len(t) < window + 2:
+        return {}
+    phi, theta, psi = (part[name] for name in ("phi", "theta", "psi"))
+    east = np.cos(phi) * np.sin(theta) * np.cos(psi) + np.sin(phi) * np.sin(psi)
+    north = np.cos(phi) * np.sin(theta) * np.sin(psi) - np.sin(phi) * np.cos(psi)
+    rates = np.diff(np.stack([east, north, np.cos(phi) * np.cos(theta)], axis=1), axis=0)[1:-1] / step_s
+    needed = np.diff(part.columns(("x_ref", "y_ref", "z_ref")), 2, axis=0) / (step_s * step_s)
+    needed[:, 2] += _GRAVITY_M_S2
+    needed /= np.linalg.norm(needed, axis=1, keepdims=True) + 1e-9
+    departures = rates - np.diff(needed, axis=0) / step_s
+    whole = len(rates) // window * window
+    shape = (2, -1, window * 3)
+    squares = np.square(np.stack([rates[:whole], departures[:whole]])).reshape(shape).sum(axis=2) / window
+    return dict(zip(t[window : whole + 1 : window].tolist(), np.sqrt(squares.min(axis=0)).tolist(), strict=True))
 
 
 def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:

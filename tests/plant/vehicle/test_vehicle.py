@@ -56,7 +56,7 @@ def test_rotor_momentum_by_the_sense_of_rotation() -> None:
         ("mass_kg = 0.698", "mass_kg = nan", "body"),
         ("mass_kg = 0.698", "mass_kg = 100.0", "rotors.max_speed: hover needs"),
         ("[0.0034, 0.0034, 0.006]", "[0.0034, 0.0034]", "body.inertia_kg_m2"),
-        ("[0.0034, 0.0034, 0.006]", "[0.0034, 0.0034, 0.1]", "inertia_kg_m2: no body"),
+        ("[0.0034, 0.0034, 0.006]", "[0.0034, 0.0034, 0.1]", r"nearest valid: \[0.0345"),
         ('speed_unit = "rad/s"', 'speed_unit = "hertz"', "rotors.speed_unit"),
         ('["ccw", "cw", "ccw", "cw"]', '["ccw", "ccw", "ccw", "ccw"]', "position_m, direction"),
         ("[-0.171, 0.0]", "[0.171, 0.0]", "position_m, direction"),
