@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 
@@ -14,6 +14,7 @@ from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
 from colibri.common.spec import Option
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.services.identity import IdentityName
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
@@ -149,7 +150,7 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     ] = None
     tlog: Annotated[bool, Option("append the frames of ground stations to flight.tlog in --out, too")] = False
     home: Annotated[HomePlace, Option("the origin", "LAT,LON,ALT,YAW", read=read_home)] = DEFAULT_HOME
-    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
     state: Annotated[Path | None, Option("folder of parameters, logs and files (default: not kept)", "DIR")] = None
     strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
     params: Annotated[Mapping[str, int | float], Option("initial values of parameters", on_command_line=False)] = field(

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from colibri.autopilot.spec import GroundSpec
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.spec import Option
 from colibri.flights.spec import VehiclesSpec
+from colibri.mavlink.services.identity import IdentityName
 
 PLANT_PORT = 14560
 GROUND_PORT = 14550
@@ -29,7 +30,7 @@ class FleetSpec(VehiclesSpec, GroundSpec):
     spacing: Annotated[
         float, Option("how far each vehicle of a fleet stands east of the one before", "M", "m", least=0.0)
     ] = 3.0
-    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
     state: Annotated[Path, Option("for parameters and logs", "DIR")] = Path("out/sitl")
     out: Annotated[
         Path | None,

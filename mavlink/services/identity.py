@@ -5,10 +5,12 @@ as `generic` only common ones. Either way AUTOPILOT_VERSION and the text at the 
 """
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.wire.dialect import bits, mav
 
+IdentityName: TypeAlias = Literal["px4", "generic"]
 Triple = tuple[int, int, int]
 
 PRODUCT = b"Colibri"
@@ -23,14 +25,22 @@ CAPABILITIES = bits(
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """An identity; `speaks` is the release of the emulated interface."""
+    """An identity.
+
+    Attributes:
+        autopilot: MAV_AUTOPILOT.
+        product: Name of the emulated program in texts; empty without one.
+        speaks: Release of the emulated interface.
+    """
 
     name: str
     autopilot: int
+    product: str = ""
     speaks: Triple | None = None
+    capabilities: int = CAPABILITIES
 
 
-PX4 = Identity("px4", mav.MAV_AUTOPILOT_PX4, speaks=(1, 15, 0))
+PX4 = Identity("px4", mav.MAV_AUTOPILOT_PX4, "PX4", speaks=(1, 15, 0))
 GENERIC = Identity("generic", mav.MAV_AUTOPILOT_GENERIC)
 IDENTITIES = {identity.name: identity for identity in (PX4, GENERIC)}
 
@@ -52,11 +62,11 @@ def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fi
     custom = (patch, minor, major, *PRODUCT[:5])
     uid2 = (*PRODUCT, *(0,) * (UID2_BYTES - len(PRODUCT) - 1), system_id)
     shown = own if identity.speaks is None else _packed(identity.speaks)
-    return (CAPABILITIES, shown, own, 0, 0, custom, custom, (0,) * 8, 0, 0, system_id, uid2)
+    return (identity.capabilities, shown, own, 0, 0, custom, custom, (0,) * 8, 0, 0, system_id, uid2)
 
 
 def banner(identity: Identity, version: str) -> str:
-    spoken = "" if identity.speaks is None else f", speaking as {identity.name.upper()}"
+    spoken = "" if identity.speaks is None else f", speaking as {identity.product}"
     return f"Colibri {version}{spoken}"
 
 

@@ -1,8 +1,8 @@
-"""Messages and fields of MAVLink's common set that pymavlink lacks, as its generator would define them.
+"""Messages and fields that pymavlink's dialect lacks, as its generator would define them.
 
-Source: mavlink.io/en/messages/common.html. CRC_EXTRA follows from the definition, so a mistake makes peers drop the
-message. Extension fields are not part of it: receivers cut or zero-fill them
-(mavlink.io/en/guide/serialization.html#message-extensions).
+Source: mavlink.io/en/messages/common.html, and ardupilotmega.html for ArduPilot's. CRC_EXTRA follows from the
+definition, so a mistake makes peers drop the message. Extension fields are not part of it: receivers cut or zero-fill
+them (mavlink.io/en/guide/serialization.html#message-extensions).
 """
 
 from re import findall
@@ -44,6 +44,25 @@ MISSING = (
     ),
     Definition(
         291, "ESC_STATUS", "uint8_t index, uint64_t time_usec, int32_t[4] rpm, float[4] voltage, float[4] current"
+    ),
+    Definition(152, "MEMINFO", "uint16_t brkval, uint16_t freemem"),
+    Definition(
+        *(163, "AHRS"),
+        "float omegaIx, float omegaIy, float omegaIz, float accel_weight, float renorm_val, float error_rp, "
+        "float error_yaw",
+    ),
+    Definition(
+        *(164, "SIMSTATE"),
+        "float roll, float pitch, float yaw, float xacc, float yacc, float zacc, float xgyro, float ygyro, "
+        "float zgyro, int32_t lat, int32_t lng",
+    ),
+    Definition(168, "WIND", "float direction, float speed, float speed_z"),
+    Definition(178, "AHRS2", "float roll, float pitch, float yaw, float altitude, int32_t lat, int32_t lng"),
+    Definition(183, "AUTOPILOT_VERSION_REQUEST", "uint8_t target_system, uint8_t target_component"),
+    Definition(
+        *(193, "EKF_STATUS_REPORT"),
+        "uint16_t flags, float velocity_variance, float pos_horiz_variance, float pos_vert_variance, "
+        "float compass_variance, float terrain_alt_variance",
     ),
     Definition(397, "COMPONENT_METADATA", "uint32_t time_boot_ms, uint32_t file_crc, char[100] uri"),
 )

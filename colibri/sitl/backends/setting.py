@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from colibri.autopilot.commander.rules.modes import Mode as FlightMode
 from colibri.autopilot.spec import AutopilotSpec, LawSpec
@@ -14,6 +14,7 @@ from colibri.common.earth.home import home as read_home
 from colibri.common.errors import unknown
 from colibri.common.spec import Option, part_of, read_values
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.services.identity import IdentityName
 from colibri.plant.events import PLANT_EVENTS, EventError, Mode, check_events
 from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec, WorldSpec
@@ -69,7 +70,7 @@ class Setting(WorldSpec, LawSpec):
             read=_numbers,
         ),
     ] = field(default_factory=dict)
-    identity: Annotated[Literal["px4", "generic"], Option("towards ground stations")] = "px4"
+    identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
     system: Annotated[int, Option("MAVLink system id", least=1, most=255)] = 1
     strict: Annotated[bool, Option("fail the test if a part of the autopilot raises, instead of replacing it")] = True
     ready: Annotated[bool, Option("begin the test after the first HEARTBEAT")] = True

@@ -1,4 +1,4 @@
-"""Messages that pymavlink lacks: defined so that peers understand them."""
+"""Messages that pymavlink's dialect lacks: defined so that peers understand them."""
 
 from typing import Any
 
@@ -7,7 +7,19 @@ import pytest
 from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.missing_messages import MISSING, Definition, add_to
 
-KNOWN = {"COMMAND_CANCEL": (14, 4), "ESC_INFO": (251, 46), "ESC_STATUS": (10, 57), "COMPONENT_METADATA": (182, 108)}
+KNOWN = {
+    "COMMAND_CANCEL": (14, 4),
+    "ESC_INFO": (251, 46),
+    "ESC_STATUS": (10, 57),
+    "COMPONENT_METADATA": (182, 108),
+    "MEMINFO": (208, 4),
+    "AHRS": (127, 28),
+    "SIMSTATE": (154, 44),
+    "WIND": (1, 12),
+    "AHRS2": (47, 24),
+    "AUTOPILOT_VERSION_REQUEST": (85, 2),
+    "EKF_STATUS_REPORT": (71, 22),
+}
 """CRC_EXTRA and length of the payload, as MAVLink's own generator gives them."""
 
 
