@@ -79,7 +79,7 @@ def _choices(kind: Any, key: str) -> str:
 
 
 Negative: TypeAlias = Annotated[float, msgspec.Meta(lt=0.0)]
-Degrees: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, lt=90.0)]
+Degrees: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=180.0)]
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
-from colibri.autopilot.control.lpv_mpc.feed_forward import rate_between
+from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
 from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
@@ -133,6 +133,7 @@ def _add_motion(
     cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
     s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
     heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
+    on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
     for k in range(used):
         row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
     for k in range(used):
@@ -185,6 +186,14 @@ def _nearest(angle: float) -> float:
 def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
+    c = -0.5
+    for i in range(3):
+        c += 0.5 * (wanted[0, i] * R[0][i] + wanted[1, i] * R[1][i] + wanted[2, i] * R[2][i])
+    if c < 0.0:  # more than a quarter turn: the same axis, its whole angle
+        length = sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2])
+        angle = atan2(sqrt(max(1.0 - c * c, 0.0)), c)
+        for i in range(3):
+            error[i] *= angle / max(length, 1e-9)
     return error
 
 

@@ -15,10 +15,14 @@ import numpy as np
 from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance
 from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force, overcome_drag
 from colibri.common.jit import Packed, compiled
-from colibri.common.kernels import cos, sin
-from colibri.common.matrices import norm, put
+from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
+HEADING_ABOVE = 0.3  # least vertical part of body z at which the yaw has a meaning
+_TWIST_RAD_S = 4.0  # of the return to it
+_LEAST_N = 1e-9
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
@@ -66,13 +70,14 @@ def follow(
     put(yaw, target.yaw_rad)
     approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
-    ask(near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
+    ask(rigid, near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)
     put(demanded_force(rigid, near, disturbance, law, limits, vehicle), force)
 
 
 @compiled
 def ask(
+    rigid: Array,  # (13,)
     velocity: Array,  # ENU, (n, 3)
     acceleration: Array,  # ENU, (n, 3)
     yaw_rad: Array,  # (n,)
@@ -89,8 +94,7 @@ def ask(
             out.forces[n, i] = airframe.mass_kg * (acceleration[n, i] - disturbance.acceleration[i])
         out.forces[n, 2] += airframe.mass_kg * airframe.gravity_m_s2
     overcome_drag(velocity, airframe, limits, out.forces)
-    for n in range(yaw_rad.shape[0]):
-        point(out.forces[n], yaw_rad[n], out.attitudes[n])
+    stand_along(rigid, yaw_rad, limits, model.interval_s, out)
     turn(out, disturbance.moment, from_wrench, packed)
 
 
@@ -147,6 +151,81 @@ def point(force: Array, yaw_rad: float, attitude: Array) -> None:
     attitude[0, 0], attitude[1, 0], attitude[2, 0] = x0, x1, x2
     attitude[0, 1], attitude[1, 1], attitude[2, 1] = z1 * x2 - z2 * x1, z2 * x0 - z0 * x2, z0 * x1 - z1 * x0
     attitude[0, 2], attitude[1, 2], attitude[2, 2] = z0, z1, z2
+
+
+@compiled
+def stand_along(rigid: Array, yaw_rad: Array, limits: ForceLimits, interval_s: float, out: Flat) -> None:
+    """Write attitudes with body z along the forces, at the yaw where that has a meaning.
+
+    A small force has no useful direction: there the turn goes on. Beyond `HEADING_ABOVE` the attitude turns the
+    shortest way, and afterwards returns to the yaw at a limited rate.
+    """
+    before = np.empty((3, 3))
+    R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
+    for i in range(3):
+        for j in range(3):
+            before[i, j] = R[i][j]
+    ahead, carried, exact = before[:, 2].copy(), np.empty((3, 3)), True
+    for n in range(yaw_rad.shape[0]):
+        force, attitude = out.forces[n], out.attitudes[n]
+        total = norm(force)
+        if total < limits.min_up_n:
+            for i in range(3):
+                ahead[i] = force[i] + (limits.min_up_n - total) * ahead[i]
+            length = max(norm(ahead), _LEAST_N)
+            total = max(dot(force, ahead) / length, limits.min_n)
+            for i in range(3):
+                force[i] = total * ahead[i] / length
+        steep = force[2] < HEADING_ABOVE * total
+        if not steep:
+            point(force, yaw_rad[n], attitude)
+        if steep or not exact:
+            carry(before, force, carried)
+            exact = not steep and settle(carried, attitude, _TWIST_RAD_S * interval_s)
+            if not exact:
+                for i in range(3):
+                    put(carried[i], attitude[i])
+        along = dot(attitude[:, 2].copy(), before[:, 2].copy())
+        for i in range(3):
+            ahead[i] = 2.0 * along * attitude[i, 2] - before[i, 2]
+        before = attitude
+
+
+@compiled
+def carry(before: Array, force: Array, attitude: Array) -> None:
+    """Write the attitude, (3, 3), that turns body z the shortest way to a force, (3,)."""
+    total = norm(force)
+    z0, z1, z2 = force[0] / total, force[1] / total, force[2] / total
+    x, y, z = before[:, 0], before[:, 1], before[:, 2]
+    c = z0 * z[0] + z1 * z[1] + z2 * z[2]
+    if c < -0.9999:  # half a turn: about body x
+        for i in range(3):
+            attitude[i, 0], attitude[i, 1], attitude[i, 2] = x[i], -y[i], -z[i]
+        return
+    for column in range(2):
+        b0, b1, b2 = before[0, column], before[1, column], before[2, column]
+        part = (z0 * b0 + z1 * b1 + z2 * b2) / (1.0 + c)
+        attitude[0, column] = b0 - part * (z[0] + z0)
+        attitude[1, column] = b1 - part * (z[1] + z1)
+        attitude[2, column] = b2 - part * (z[2] + z2)
+    attitude[0, 2], attitude[1, 2], attitude[2, 2] = z0, z1, z2
+
+
+@compiled
+def settle(attitude: Array, wanted: Array, most_rad: float) -> bool:
+    """Turn an attitude about its body z towards another of the same z; return whether that is reached."""
+    s, c = 0.0, 0.0
+    for i in range(3):
+        c += attitude[i, 0] * wanted[i, 0]
+        s += attitude[i, 1] * wanted[i, 0]
+    twist = atan2(s, c)
+    if abs(twist) <= most_rad:
+        return True
+    s, c = sin(most_rad) if twist > 0.0 else -sin(most_rad), cos(most_rad)
+    for i in range(3):
+        x, y = attitude[i, 0], attitude[i, 1]
+        attitude[i, 0], attitude[i, 1] = c * x + s * y, c * y - s * x
+    return False
 
 
 @compiled

@@ -92,6 +92,7 @@ class LawInputs(NamedTuple):
     observed: Observed
     psi: float  # yaw, rad, unwrapped
     max_n: float  # largest thrust
+    airborne: bool
 
 
 class LpvMpc(TrackingLaw[LawMemory]):
@@ -126,12 +127,14 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self._min_squared = square(self.tracker.lag.min_speed)
         min_n = self._span_n * self._min_squared
         min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
-        tilt_tangent = tan(radians(settings.guidance.max_tilt_deg))
+        max_tilt_deg = settings.guidance.max_tilt_deg
+        tilt_tangent = tan(radians(max_tilt_deg)) if max_tilt_deg < 90.0 else -1.0
         self._force = ForceLimits(tilt_tangent, min_n, min_n, min_up_n)
         limits = np.empty((self._mpc.horizon, 2))
         self._now = packed(Now(np.empty(RIGID), np.empty(ROTORS), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
+        self.agile = max_tilt_deg > 90.0
         self._model_kg = self._mpc.model["airframe"]["mass_kg"]
 
     def warm_up(self) -> None:
@@ -193,7 +196,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
             battery.numbers,
             self._now,
         )
-        return LawInputs(observed, float(state.euler[2]), max_n)
+        return LawInputs(observed, float(state.euler[2]), max_n, state.airborne)
 
     def _filled(self, inputs: LawInputs) -> Now:
         return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
@@ -223,8 +226,9 @@ class LpvMpc(TrackingLaw[LawMemory]):
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
-        most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
-        planning.limit_first(self._now, most, _LIMITED_STEPS)
+        if not (self.agile and inputs.airborne):
+            most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
+            planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None
         plan, diagnostics = self._mpc.plan(self._now, target, last, inputs.psi, path, on_track=on_track)
         if plan is not None:

@@ -131,7 +131,7 @@ class Mpc:
                         self._terminal(each, settings.count_every, thrust_n),
                         numbers.allocation[0].copy(),
                         levels,
-                        cos(radians(settings.max_tilt_deg)),
+                        cos(radians(settings.max_tilt_deg)) if settings.max_tilt_deg < 180.0 else -9.0,
                         np.array(settings.max_rate_rad_s),
                     ),
                     shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),

@@ -10,13 +10,14 @@ from colibri.common.jit import compiled
 from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
+_LEAST_N = 1e-9
 _DRAG_PASSES = 2  # drag depends on the direction of the force against it
 
 
 class ForceLimits(NamedTuple):
     """Limits of the demanded force."""
 
-    tilt_tangent: float  # of the largest tilt
+    tilt_tangent: float  # of the largest tilt; negative without a limit
     min_n: float
     max_n: float
     min_up_n: float  # of references: a smaller vertical force has no useful direction
@@ -24,7 +25,13 @@ class ForceLimits(NamedTuple):
 
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force in place: height before position."""
+    """Limit a force in place: height before position; without a tilt limit its direction stays."""
+    if limits.tilt_tangent < 0.0:
+        total = norm(force)
+        if total > limits.max_n:
+            for i in range(3):
+                force[i] *= limits.max_n / total
+        return
     force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
     horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
     left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
@@ -43,7 +50,7 @@ def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, fo
         put(force, free)
         limit_force(force, limits)
         for _ in range(_DRAG_PASSES):
-            thrust = norm(force)
+            thrust = max(norm(force), _LEAST_N)
             up = (force[0] / thrust, force[1] / thrust, force[2] / thrust)
             drag = drag_force(airframe, velocities[n], up, thrust)
             for i in range(3):
