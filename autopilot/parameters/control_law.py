@@ -49,7 +49,13 @@ def _references(prefix: str) -> list[Number]:
             "Approach speed to a far reference",
         ),
         Number(
-            f"{prefix}_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Maximum demanded tilt", decimals=1
+            f"{prefix}_TILT_MAX",
+            ("guidance", "max_tilt_deg"),
+            "deg",
+            5.0,
+            180.0,
+            "Maximum tilt; above 90: none",
+            decimals=1,
         ),
     ]
 
@@ -101,7 +107,7 @@ LPV_MPC = [
     ),
     Number("LPV_THR_MIN", ("guidance", "min_thrust"), "norm", 0.01, 0.9, "Minimum thrust-to-weight of references"),
     *_observed("LPV"),
-    Number("LPV_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of tilt", decimals=1),
+    Number("LPV_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 180.0, "Soft limit of tilt; 180: none", decimals=1),
     *_limits("LPV", "plan"),
     Number("LPV_PATH_MIN", ("path", "min_speed"), "norm", 0.05, 1.0, "Minimum path speed; 1: on the clock"),
     Number("LPV_PATH_REWARD", ("path", "reward"), "1/s", 0.01, 1e4, "Path progress reward"),

@@ -99,7 +99,10 @@ def built(*, controller: Any, profile: Any = None, vehicle: Any = None) -> Contr
 
 def profile_for(controller: str) -> str:
     """Return the law's own profile, else one with its numbers, else the default."""
-    profiles, controller = {name: load_profile(name) for name in profile_names()}, table_of(controller)
+    profiles, controller = (
+        {name: load_profile(name) for name in [_DEFAULT_PROFILE, *profile_names()]},
+        table_of(controller),
+    )
     own = [name for name, profile in profiles.items() if profile.controller == controller]
     known = [name for name, profile in profiles.items() if controller in profile.controllers]
     return next(iter([*own, *known, _DEFAULT_PROFILE]))

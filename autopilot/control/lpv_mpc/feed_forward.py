@@ -14,8 +14,8 @@ import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance
 from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force, overcome_drag
-from colibri.common.jit import Packed, compiled
 from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array

@@ -67,7 +67,9 @@ class TargetBuilder:
         near, flat, last_flat, target = self._near, self._flat, _flat(3), self._target
         feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, self._law, near)
-        feed_forward.ask(now.rigid, near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
+        feed_forward.ask(
+            now.rigid, near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat
+        )
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], feasible, self._law, near)
         feed_forward.ask(now.rigid, *ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]

@@ -28,7 +28,7 @@ BAD_OPTIONS = [
     ("loop", 'unknown track "loop" (choose spiral, expanding-spiral, line, wave'),
     ("circle:speed=fast", "track circle: speed=fast: Expected `float`, got `str`"),
     ("waypoints:nowhere.csv", "nowhere.csv: No such file or directory"),
-    ("spiral --profile fast", 'unknown profile "fast" (choose flight, path, se3, '),
+    ("spiral --profile fast", 'unknown profile "fast" (choose agile, flight, path, se3, '),
     ("spiral --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose'),
     ("spiral --vehicle \udcfc.toml", "\\udcfc.toml is not UTF-8 by"),
     ("spiral --solver simplex", "unknown solver simplex: installed are"),

@@ -70,7 +70,7 @@ MESSAGES = [
     ("companion hover --vehicle udpin:nowhere", "expected"),
     (
         "compare --profile fast --out out",
-        'unknown profile "fast" (choose flight, path, se3, thesis, thesis-euler, a .toml file)',
+        'unknown profile "fast" (choose agile, flight, path, se3, thesis, thesis-euler, a .toml file)',
     ),
     (
         "compare --profile thesis:pid --out out",

@@ -22,6 +22,7 @@ MODEL = model_of(load_vehicle("hummingbird"), INTERVAL_S)
 PACKED = packed(MODEL)
 FROM_WRENCH = exact_inverse(MODEL.allocation)
 WIDE = ForceLimits(tan(1.2), 0.2, 19.0, 0.2)
+LEVEL = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
 CALM = Disturbance(np.zeros(3), np.zeros(3))
 GUIDANCE = Approach(
     k1_s2=30.0,
@@ -54,7 +55,7 @@ def circle(radius_m: float, period_s: float) -> tuple[np.ndarray, ...]:
 def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> None:
     p, v, a, yaw = circle(3.0, 3.0)
     asked = flat()
-    feed_forward.ask(v, a, yaw, disturbance, WIDE, FROM_WRENCH, PACKED, asked)
+    feed_forward.ask(LEVEL, v, a, yaw, disturbance, WIDE, FROM_WRENCH, PACKED, asked)
     commands, limits = np.empty((STEPS, ROTORS)), np.tile([0.01, 1.0], (STEPS, 1))
     feed_forward.lead(asked.squared, MODEL.lag.left, limits, commands)
     R = asked.attitudes[0]
