@@ -10,9 +10,9 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail
 
 FLIGHTS: dict[str, dict[str, Any]] = {
     "profile flight": {},
+    "profile thesis": {"profile": "thesis"},
     "profile flight on sensors": {"feedback": "sensors", "turbulence": "light"},
     "profile path": {"profile": "path"},
-    "profile thesis": {"profile": "thesis"},
     "flight tests": {"sitl": True},
 }
 
