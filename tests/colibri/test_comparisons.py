@@ -78,7 +78,7 @@ def test_controllers_side_by_side(tmp_path: Path, ran: Ran) -> None:
     contenders = ["--profile", "thesis", "--profile", "thesis:global-lpv-mpc"]
     said = ran("compare", *contenders, "--track", "line", "--track", "spiral", "--out", tmp_path, code=1).out
     lines = (tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == ",".join(COLUMNS)
+    assert lines[0] == ",".join(map(identifier, COLUMNS))
     assert [line.split(",")[:2] for line in lines[1:]] == [
         ["thesis", "line"],
         ["thesis", "spiral"],

@@ -39,14 +39,18 @@ def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, rea
 
 
 @pytest.mark.long
-def test_daqp_and_clarabel_give_the_same_inputs(tmp_path: Path) -> None:
-    """Catching the lemniscate up, where limits bind, and along it: every input to 1e-4 N and N m."""
-    flown = []
-    for solver in ("daqp", "clarabel"):
-        fly(tmp_path / solver, "lemniscate", "--link", "direct", "--duration", "8", "--solver", solver)
-        flown.append(rows(tmp_path / solver / "flight.csv"))
+def test_daqp_and_clarabel_give_the_same_inputs() -> None:
+    """Every input to 1e-5 N and N m, at the start, where limits bind, and along the track.
+
+    At a tolerance of 1e-10: at the profile's 1e-8, the gap of an interior point alone moves an input by 3e-4.
+    """
+    profile = colibri.load_profile("flight").replace("controllers.lpv-mpc.qp.tolerance", 1e-10)
+    daqp, clarabel = (
+        colibri.fly("lemniscate", profile=profile, solver=solver, link="direct", duration=8).samples
+        for solver in ("daqp", "clarabel")
+    )
     for number in range(1, 5):
-        assert flown[1][f"U{number}"] == pytest.approx(flown[0][f"U{number}"], abs=1e-4)
+        assert clarabel[f"U{number}"] == pytest.approx(daqp[f"U{number}"], abs=1e-5)
 
 
 WRONG: dict[str, tuple[str, Any]] = {
@@ -147,7 +151,7 @@ def test_an_impossible_track_is_followed_upright(lap_s: float, count: int, lasts
     flown = fly_family(f"lemniscate:lap={lap_s}", count, lasts_s)
     assert max(it.tilt_deg.max() for it in flown) < 75.0
     assert max(it.error_m[it.t > CAUGHT_UP_S].max() for it in flown) < 12.0
-    assert min(it.z_m.min() for it in flown) > 1.5  # it begins at 2 m
+    assert min(it.z_m.min() for it in flown) > 1.0  # the track is at 3 m
     assert max(it.z_m.max() for it in flown) < 4.5
 
 

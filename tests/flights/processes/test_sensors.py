@@ -16,7 +16,7 @@ ON_SENSORS = ("spiral", "--feedback", "sensors")
 def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
     """20 % lost, 10 % duplicated, 10 % reordered, both ways: the flight is the one in memory, noise and all."""
     duration = ("--duration", "1.6")
-    fly(tmp_path / "good", *ON_SENSORS, "--link", "memory", "--seed", "3", "--start", "psi=90", *duration)
+    fly(tmp_path / "good", *ON_SENSORS, "--link", "memory", "--seed", "3", "--start", "x=0,y=-1,psi=90", *duration)
     hummingbird = ("--vehicle", "hummingbird", "--integrator", "rk4", "--start", "y=-1,psi=90", "--seed", "3")
     (tmp_path / "logs").mkdir()
     plant, url = start_plant(tmp_path / "logs", tmp_path / "bad", *hummingbird, *duration)
