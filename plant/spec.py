@@ -9,10 +9,11 @@ from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
 from colibri.common.spec import Option
+from colibri.plant.environment.noise import Noise
 from colibri.plant.environment.weather import NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
 from colibri.plant.events import EVENT, FORMS, event, events_of
 from colibri.plant.physics.start import Start
-from colibri.plant.texts import COLUMNS, GUST, gust, start_values
+from colibri.plant.texts import COLUMNS, GUST, gust, noise_values, start_values
 from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle
 
@@ -46,6 +47,15 @@ class WorldSpec:
         Intensity | None,
         Option("Dryden turbulence on top of the wind, by MIL-F-8785C at low altitude; --seed chooses the sample"),
     ] = None
+    noise: Annotated[
+        Mapping[str, float],
+        Option(
+            "white noise on the body, force (N) and moment (N m), and on the motors (parts of each command), each for "
+            "a root of hertz and held over a frame: 0.1 is 1.6 N at 250 Hz; --seed chooses the sample",
+            "KEY=VALUE,...",
+            read=noise_values,
+        ),
+    ] = field(default_factory=dict)
     events: Annotated[
         tuple[Any, ...],
         Option(f"at T seconds: {FORMS}; or a file with tables [[events]]", EVENT, read=event, flag="event"),
@@ -80,6 +90,11 @@ class WorldSpec:
     def weather(self) -> Weather:
         """Wind, gusts and turbulence."""
         return Weather(self.wind, self.gusts, self.turbulence, self.seed)
+
+    @property
+    def disturbance(self) -> Noise | None:
+        """The plant's noise, if any."""
+        return Noise(self.noise, self.seed) if any(self.noise.values()) else None
 
     def started(self, usual: Start) -> Start:
         """Return `usual` with the given values replaced."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from colibri.common.errors import unknown
 from colibri.common.files import read_text
 from colibri.common.process.arguments import number
+from colibri.plant.environment.noise import NOISES
 from colibri.plant.environment.weather import MAX_SPEED_M_S, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
 
@@ -23,6 +24,21 @@ def _start_value(pair: str) -> tuple[str, float]:
         return key, number(value)
     except ValueError:
         raise ArgumentTypeError(f"{key}: must be a number, not {value or 'empty'}") from None
+
+
+def noise_values(text: str) -> dict[str, float]:
+    values: dict[str, float] = {}
+    for pair in text.split(","):
+        key, _, value = pair.partition("=")
+        if key not in NOISES:
+            raise ArgumentTypeError(unknown("key", key, NOISES))
+        try:
+            values[key] = number(value)
+        except ValueError:
+            values[key] = -1.0
+        if values[key] < 0.0:
+            raise ArgumentTypeError(f'{key}: must be a number of at least 0, not "{value}"')
+    return values
 
 
 _FULL_TURN_DEG = 360.0

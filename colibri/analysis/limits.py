@@ -9,7 +9,8 @@ from colibri.common.process.arguments import number
 
 RMSE = "rmse_after_20s_m"
 KEYS = (
-    *(RMSE, "max_error_after_20s_m", "rmse_m", "max_error_m", "control_rmse_m"),
+    *(RMSE, "max_error_after_20s_m", "mean_error_m", "rmse_m", "max_error_m", "control_rmse_m"),
+    *("mean_error_in_window_m", "rmse_in_window_m", "max_error_in_window_m"),
     *("estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw", "nees_mean"),
     *(

@@ -23,6 +23,8 @@ from colibri.mavlink.ulog.log import TopicReader
 Report: TypeAlias = dict[str, Any]
 
 _SMALL_M = 0.01
+_INSTANT_S = 1e-6
+"""Times are whole microseconds."""
 
 
 def report(
@@ -32,7 +34,7 @@ def report(
     wall_time_s, frames, resent = summary or (None, None, None)
     error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])
-    settled = error[t >= SETTLED_AFTER_S]
+    settled, within = error[t >= SETTLED_AFTER_S], _within(plan, t, error)
     return {
         "track": str(plan.spec.track),
         "track_note": plan.track_note,
@@ -60,10 +62,15 @@ def report(
         "limit_cycle_rad_s": limit_cycle_rad_s(flight),
         "wall_time_s": wall_time_s,
         "real_time_factor": sim_time_s / wall_time_s if wall_time_s else None,
+        "mean_error_m": float(error.mean()),
         "rmse_m": rms(error),
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": rms(settled) if len(settled) else None,
         "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
+        "window_s": None if plan.spec.window is None else list(plan.spec.window),
+        "mean_error_in_window_m": float(within.mean()) if len(within) else None,
+        "rmse_in_window_m": rms(within) if len(within) else None,
+        "max_error_in_window_m": float(within.max()) if len(within) else None,
         **_estimation_figures(plan, log, settled),
         "max_tilt_deg": degrees(acos(max(-1.0, min(1.0, float(flight.upright.min()))))),
         "effort_n_m": rms(flight.moment_n_m),
@@ -81,6 +88,14 @@ def report(
         "path_lag_s": flight.path_lag_s,
         "trajectory_sha256": flight.trajectory_sha256,
     }
+
+
+def _within(plan: FlightPlan, t: Array, error: Array) -> Array:
+    """Return the errors in the window of the options; none without one."""
+    if (window := plan.spec.window) is None:
+        return error[:0]
+    within: Array = error[(t >= window.begin_s - _INSTANT_S) & (t <= window.end_s + _INSTANT_S)]
+    return within
 
 
 def _estimation_figures(plan: FlightPlan, log: TopicReader, settled: Array) -> Report:
@@ -123,9 +138,12 @@ def report_rows(figures: Report) -> dict[str, str]:
     has_qp = figures["solver"] is not None or figures["solve_time_us"]["max"] > 0.0
     step_us, interval_us = figures["control_step_us"]["p50"], figures["control_interval_us"]
     slow = f"{step_us / 1e3:.1f} ms a control step, every {interval_us / 1e3:g} ms" if step_us > interval_us else ""
+    within = figures.get("rmse_in_window_m")  # reports of earlier versions lack it
+    lost |= {"position error, mean": length(figures["mean_error_m"])} if "mean_error_m" in figures else {}
     return lost | {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
+        **({} if within is None else _window_rows(figures)),
         **_estimation_rows(figures),
         "position error, maximum": length(figures["max_error_m"]),
         **({} if figures["path_lag_s"] is None else {"behind the clock at the end": f"{figures['path_lag_s']:.2f} s"}),
@@ -139,6 +157,13 @@ def report_rows(figures: Report) -> dict[str, str]:
         "samples flown by a fallback": ", ".join(fallbacks) or "0",
         "trajectory": figures["trajectory_sha256"][:16],
     }
+
+
+def _window_rows(figures: Report) -> dict[str, str]:
+    begin_s, end_s = figures["window_s"]
+    names = ("mean_error_in_window_m", "rmse_in_window_m", "max_error_in_window_m")
+    values = ", ".join(length(figures[name]) for name in names)
+    return {f"mean, RMS, maximum from {begin_s:g} to {end_s:g} s": values}
 
 
 def _estimation_rows(figures: Report) -> dict[str, str]:

@@ -30,11 +30,13 @@ class FlownOptions(NamedTuple):
     @property
     def has_drag(self) -> bool:
         drag = self.plant_vehicle.drag
-        return drag is not None and (any(drag.linear_n_s_m) or drag.rotor_coefficient > 0.0)
+        coefficients = (*drag.linear_n_s_m, *drag.quadratic_n_s2_m2, drag.rotor_coefficient) if drag else ()
+        return any(coefficients)
 
     @property
     def is_random(self) -> bool:
-        return self.spec.feedback is Feedback.SENSORS or (self.spec.turbulence is not None and self.has_drag)
+        turbulent = self.spec.turbulence is not None and self.has_drag
+        return self.spec.feedback is Feedback.SENSORS or turbulent or any(self.spec.noise.values())
 
     @property
     def has_parts(self) -> bool:
@@ -65,7 +67,8 @@ RULES = (
         "events", _NO_DRAG, lambda it: it.has_drag or any(not isinstance(event, Blow) for event in it.spec.events)
     ),
     EffectRule("turbulence", _NO_DRAG, lambda it: it.has_drag),
-    EffectRule("seed", "only sensors, and turbulence on drag, are random", lambda it: it.is_random),
+    EffectRule("seed", "only sensors, turbulence on drag, and noise are random", lambda it: it.is_random),
+    EffectRule("noise", "each is 0", lambda it: any(it.spec.noise.values())),
     EffectRule("without", "vehicle {vehicle} has no such part", lambda it: it.has_parts),
     EffectRule(
         "start",

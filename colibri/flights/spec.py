@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from colibri.autopilot.spec import GroundSpec, LawSpec, Trajectory
 from colibri.common.errors import Error, shown
@@ -24,6 +24,27 @@ TRACK_HELP = (
 
 class OptionError(Error):
     """An option is unknown or has an invalid value."""
+
+
+class Window(NamedTuple):
+    """A part of a flight, s."""
+
+    begin_s: float
+    end_s: float
+
+    def __str__(self) -> str:
+        return f"{self.begin_s!r}:{self.end_s!r}"
+
+
+def window_of(text: str) -> Window:
+    begin, _, end = text.partition(":")
+    try:
+        read = Window(number(begin), number(end))
+    except ValueError:
+        read = Window(0.0, 0.0)
+    if not 0.0 <= read.begin_s < read.end_s:
+        raise ArgumentTypeError(f'must be BEGIN:END in s, "10:30" say, not "{text}"')
+    return read
 
 
 def parameter(text: str) -> dict[str, float]:
@@ -81,12 +102,20 @@ class FlightSpec(VehiclesSpec, GroundSpec):
         Option("times real time, or max (default: max; 1 with --gcs)", "N", above=0.0, endless=True),
     ] = None
     duration: Annotated[float, Option("simulated time", "S", "s", above=0.0)] = 100.0
+    window: Annotated[
+        Window | None,
+        Option(
+            "also report mean, RMS and maximum of the error in this part of the flight, s", "BEGIN:END", read=window_of
+        ),
+    ] = None
     out: Annotated[Path, Option("folder for logs and figures", "DIR", keyword=False)] = Path("out")
     tlog: Annotated[bool, Option("write each MAVLink frame to flight.tlog; always with --gcs", keyword=False)] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "params", merged(self.params))
+        if self.window is not None and self.window.begin_s > self.duration:
+            raise OptionError(f'window: "{self.window}" begins after the flight, which ends at {self.duration:g} s')
         if not isinstance(self.track, str | Trajectory):
             from colibri.autopilot.guidance.trajectories.sampling import sampled_track  # slow to load
 

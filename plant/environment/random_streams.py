@@ -15,6 +15,7 @@ class RandomStream(IntEnum):
     SENSORS = 0
     WEATHER = 1
     FAULTS = 2
+    NOISE = 3
 
 
 class Chance:

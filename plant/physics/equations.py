@@ -39,6 +39,7 @@ class PlantParameters(NamedTuple):
     lag_up_s: float = inf  # time constant; inf: the rotors follow at once
     lag_down_s: float = inf
     linear_drag_n_s_m: Vector = (0.0, 0.0, 0.0)  # of the airframe, along the FLU axes
+    quadratic_drag_n_s2_m2: Vector = (0.0, 0.0, 0.0)  # of the airframe, along the FLU axes
     rotor_drag: float = 0.0  # in its plane, N per m/s and per speed unit
     power: FourRotors = (0.0, 0.0, 0.0, 0.0)  # electrical, W per speed unit cubed
     full_voltage_v: float = 1.0  # open-circuit
@@ -51,6 +52,8 @@ class PlantParameters(NamedTuple):
     damping_n_s_m: float = 0.0  # against sinking in and coming out
     friction: float = 0.0
     slip_damping_n_s_m: float = 0.0  # friction of a creeping point, below Coulomb's limit
+    noise_n: Vector = (0.0, 0.0, 0.0)  # random force on the body, FLU
+    noise_n_m: Vector = (0.0, 0.0, 0.0)  # random moment on the body, FLU
 
 
 class Wrench(NamedTuple):
@@ -100,11 +103,13 @@ def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, 
 def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: PlantParameters) -> Wrench:
     """Return the drag of airframe and rotors; `air` is the velocity through the air, FLU.
 
-    The airframe's is linear, a rotor's -c Ω (v + ω × r) in its plane: Faessler, Franchi, Scaramuzza (RA-L 2018),
-    RotorS.
+    The airframe's is -(l + q |v|) v along each axis, a rotor's -c Ω (v + ω × r) in its plane: Faessler, Franchi,
+    Scaramuzza (RA-L 2018), RotorS.
     """
-    linear = parameters.linear_drag_n_s_m
-    fx, fy, fz, yaw = -linear[0] * air[0], -linear[1] * air[1], -linear[2] * air[2], 0.0
+    linear, quadratic = parameters.linear_drag_n_s_m, parameters.quadratic_drag_n_s2_m2
+    speed = sqrt(air[0] * air[0] + air[1] * air[1] + air[2] * air[2])
+    fx, fy = -(linear[0] + quadratic[0] * speed) * air[0], -(linear[1] + quadratic[1] * speed) * air[1]
+    fz, yaw = -(linear[2] + quadratic[2] * speed) * air[2], 0.0
     for i in range(4):
         x, y = parameters.rotor_x_m[i], parameters.rotor_y_m[i]
         drag = -parameters.rotor_drag * speeds[i]
@@ -233,8 +238,9 @@ def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: PlantParameters
     rotors = rotor_wrench(speeds, parameters)
     drag = drag_wrench(_sum(velocity, (-wind[0], -wind[1], -wind[2])), rate, speeds, parameters)
     ground = contact_wrench(x[8], velocity, rate, R, parameters)
-    force_n = _sum(rotors.force_n, _sum(drag.force_n, ground.force_n))
-    return Wrench(force_n, _sum(rotors.moment_n_m, _sum(drag.moment_n_m, ground.moment_n_m)))
+    force_n = _sum(rotors.force_n, _sum(drag.force_n, _sum(ground.force_n, parameters.noise_n)))
+    moment_n_m = _sum(drag.moment_n_m, _sum(ground.moment_n_m, parameters.noise_n_m))
+    return Wrench(force_n, _sum(rotors.moment_n_m, moment_n_m))
 
 
 @compiled

@@ -26,7 +26,11 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
     if (lag := vehicle.rotors.lag) is not None:
         numbers = numbers._replace(lag_up_s=lag.time_constant_up_s, lag_down_s=lag.time_constant_down_s)
     if (drag := vehicle.drag) is not None:
-        numbers = numbers._replace(linear_drag_n_s_m=drag.linear_n_s_m, rotor_drag=drag.rotor_coefficient)
+        numbers = numbers._replace(
+            linear_drag_n_s_m=drag.linear_n_s_m,
+            quadratic_drag_n_s2_m2=drag.quadratic_n_s2_m2,
+            rotor_drag=drag.rotor_coefficient,
+        )
     if (ground := vehicle.ground) is not None:
         numbers = numbers._replace(
             contacts_m=ground.contacts_m(vehicle.rotors),

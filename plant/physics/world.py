@@ -11,6 +11,7 @@ from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
+from colibri.plant.environment.noise import Noise
 from colibri.plant.environment.turbulence import Eddies
 from colibri.plant.environment.weather import NO_WEATHER, RecordedWind, Weather, Wind
 from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, attitude_of, close_attitude, specific_force
@@ -51,10 +52,13 @@ def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER
 class Physics:
     """Dynamics of one vehicle in one weather."""
 
-    def __init__(self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER) -> None:
+    def __init__(
+        self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER, noise: Noise | None = None
+    ) -> None:
         self._air = Air(weather)
         self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
         self._wind = self._parameters["wind_enu_m_s"][0]
+        self._noise = noise
         self._integrate = solver(integrator)
         self._idle = vehicle.rotors.idle_speed
         self._top = vehicle.rotors.max_speed
@@ -69,7 +73,10 @@ class Physics:
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
         self._feel_wind(world)
-        x, voltage_v = self._integrate(self._vector(world), self._target(command), self._parameters, duration_us * 1e-6)
+        target = self._target(command)
+        if self._noise is not None:
+            target = self._disturb(self._noise, target, world.time_us, duration_us)
+        x, voltage_v = self._integrate(self._vector(world), target, self._parameters, duration_us * 1e-6)
         if not close_attitude(x):
             when = f"at t = {world.time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
@@ -133,6 +140,12 @@ class Physics:
     def _feel_wind(self, world: World) -> None:
         if self._air.steady is None:
             self._wind[:] = world.wind_enu_m_s
+
+    def _disturb(self, noise: Noise, target: FourRotors, time_us: int, duration_us: int) -> FourRotors:
+        """Set the body's noise; return the commands with that of the motors."""
+        self._parameters["noise_n"], self._parameters["noise_n_m"], factors = noise.over(time_us, duration_us)
+        a, b, c, d = (min(max(factor * speed, 0.0), self._top) for factor, speed in zip(factors, target, strict=True))
+        return (a, b, c, d)
 
     def _target(self, command: ActuatorCommand) -> FourRotors:
         target = _STANDING

@@ -33,7 +33,8 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
     text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
     text = f"{text}; {all_parameters_by(str(spec.vehicle), 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
-    end = ArduPilotEnd(Physics(vehicle, spec.integrator, weather), start, motors, vehicle.rotors, is_bound)
+    physics = Physics(vehicle, spec.integrator, weather, spec.disturbance)
+    end = ArduPilotEnd(physics, start, motors, vehicle.rotors, is_bound)
     logs = PlantLogs(spec.out, vehicle) if spec.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=spec.duration)

@@ -57,7 +57,7 @@ class Simulator:
         self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._start = starting_world(nudged(spec.started(Start(psi=spec.home.yaw_enu_deg))), vehicle, weather)
-        self._physics = Physics(vehicle, spec.integrator, weather)
+        self._physics = Physics(vehicle, spec.integrator, weather, spec.disturbance)
         self._origin: Geodetic = spec.home.origin
         self._interval_us = round(1e3 / spec.rate) * 1000
         self._seed, self._speed, self._duration_us = spec.seed, spec.pace, spec.duration * 1e6

@@ -141,7 +141,7 @@ class PlantBuilder:
         self.vehicle = vehicle
         self.starts = starts
         self._worlds = {it: starting_world(start, vehicle, weather) for it, start in starts.items()}
-        self._physics = Physics(vehicle, integrator, weather)
+        self._physics = Physics(vehicle, integrator, weather, spec.disturbance)
         self._spec = spec
         self._origin = origin
 

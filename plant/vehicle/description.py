@@ -119,6 +119,9 @@ class Drag(Table, frozen=True, kw_only=True):
     """Of the airframe, along the FLU axes: N for each m/s."""
     rotor_coefficient: NotNegative
     """Of one rotor, in its plane: N for each m/s and for each of its speed unit."""
+    quadratic_n_s2_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
+    """Of the airframe, along the FLU axes: N for each m/s of the axis and each m/s of airspeed. Of the plant alone:
+    control laws assume the linear part, and estimate the rest as a disturbance."""
 
 
 class Ground(Table, frozen=True, kw_only=True):

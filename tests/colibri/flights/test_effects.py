@@ -25,8 +25,11 @@ CASES: tuple[tuple[str, Any, dict[str, Any], str], ...] = (
     ("events", "0:payload=0.1", FLIGHT, ""),
     ("turbulence", "severe", THESIS, "vehicle hummingbird-thesis has no drag"),
     ("turbulence", "severe", FLIGHT, ""),
-    ("seed", 3, FLIGHT, "only sensors, and turbulence on drag, are random"),
+    ("seed", 3, FLIGHT, "only sensors, turbulence on drag, and noise are random"),
     ("seed", 3, FLIGHT | {"turbulence": "light"}, ""),
+    ("seed", 3, FLIGHT | {"noise": "force=0.01"}, ""),
+    ("noise", {"motors": 0.001}, FLIGHT, ""),
+    ("noise", "force=0,motors=0", FLIGHT, "each is 0"),
     ("without", "drag", THESIS, "vehicle hummingbird-thesis has no such part"),
     ("without", "drag", FLIGHT, ""),
     ("start", {"rotors": 2000}, THESIS, "rotors of vehicle hummingbird-thesis follow commands at once"),
@@ -70,7 +73,7 @@ def test_a_campaign_names_options_and_factors_without_effect() -> None:
         fly=fly, grid={idle: [4, 5], "wind": ["1@0", "2@0"], "without": ["drag", "battery"]}, seeds=[0, 1]
     )
     assert fly_campaign(campaign, Here(), None).notes == [
-        "no effect: seed (only sensors, and turbulence on drag, are random)",
+        "no effect: seed (only sensors, turbulence on drag, and noise are random)",
         "no effect on some flights: wind (vehicle hummingbird has no drag)",
         f"no effect: {idle} (flights that differ only in these are identical)",
     ]

@@ -1,6 +1,6 @@
 """Drag and wind against closed forms."""
 
-from math import exp
+from math import exp, tanh
 
 import numpy as np
 import pytest
@@ -69,3 +69,10 @@ def test_a_wind_is_a_moving_frame(air: Vector, velocity: Vector, tilt_deg: float
     )
     assert blown[6:9] == pytest.approx(calm[6:9] + 0.5 * np.array(air), abs=1e-8)
     assert blown[9:13] == pytest.approx(calm[9:13], abs=1e-8)
+
+
+def test_quadratic_drag_sets_the_terminal_velocity() -> None:
+    vehicle = VEHICLE.replace("drag.linear_n_s_m", [0.0, 0.0, 0.0]).replace("drag.quadratic_n_s2_m2", [0.0, 0.0, 0.02])
+    terminal = (MASS_KG * 9.81 / 0.02) ** 0.5
+    end = flight(vehicle, Start(z=1000.0), OFF, 10.0)[-1]
+    assert end.state[2] == pytest.approx(-terminal * tanh(9.81 * 10.0 / terminal), rel=1e-9)

@@ -1,0 +1,36 @@
+"""White noise on the body and on the rotors' commands; it depends on seed and time alone."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.types import FourRotors, Vector
+from colibri.plant.environment.random_streams import RandomStream
+
+NOISES = ("force", "moment", "motors")
+"""N, N m, and parts of each rotor's command, for each root of hertz."""
+
+
+class Disturbed(NamedTuple):
+    """Random force, N, and moment, N m, on the body, FLU, and factors of the rotors' commands."""
+
+    force_n: Vector
+    moment_n_m: Vector
+    factors: FourRotors
+
+
+class Noise:
+    """Process and motor noise, held over each frame: a density d has the standard deviation d / √(frame's duration)."""
+
+    def __init__(self, densities: Mapping[str, float], seed: int) -> None:
+        force, moment, motors = (densities.get(name, 0.0) for name in NOISES)
+        self._densities = np.array([force] * 3 + [moment] * 3 + [motors] * 4)
+        self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.NOISE,)).generate_state(2, np.uint64)
+
+    def over(self, time_us: int, duration_us: int) -> Disturbed:
+        """Return the disturbance of a frame, or of the part of one, that begins at `time_us`."""
+        chance = np.random.Generator(np.random.Philox(key=self._key, counter=time_us << 64))
+        normal = chance.standard_normal(len(self._densities)).astype(np.float32)  # as in `random_streams.Chance`
+        fx, fy, fz, mx, my, mz, a, b, c, d = (self._densities * normal / (duration_us * 1e-6) ** 0.5).tolist()
+        return Disturbed((fx, fy, fz), (mx, my, mz), (1.0 + a, 1.0 + b, 1.0 + c, 1.0 + d))
