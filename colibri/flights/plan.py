@@ -1,7 +1,7 @@
 """A flight with its inputs read and checked."""
 
 from dataclasses import dataclass
-from math import degrees, inf
+from math import atan2, degrees, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +39,10 @@ class FrameCount(NamedTuple):
 
 class PlanError(Error):
     """Options that cannot be combined."""
+
+
+_ALIKE_DEG, _SECTORS = 45.0, 8
+"""Bearings of rotors are compared to the nearest eighth of a turn."""
 
 
 class Contents(NamedTuple):
@@ -109,6 +113,7 @@ class FlightPlan:
         if spec.feedback is Feedback.SENSORS:
             for name, each in zip(names, (vehicle, plant_vehicle), strict=True):
                 _check_sensors(name, each)
+        _check_order(vehicle, plant_vehicle)
         floor_m = _floor_m(spec, plant_vehicle)
         check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS)
         track, note = load_track(spec.track, vehicle, profile, floor_m, track_file)
@@ -204,6 +209,18 @@ def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
     plant_vehicle = name_of(spec.plant_vehicle or vehicle)
     same = plant_vehicle != vehicle or spec.plant_vehicle in (None, spec.vehicle, vehicle)
     return vehicle, plant_vehicle if same else f"{plant_vehicle} (2)"
+
+
+def _check_order(vehicle: Vehicle, plant_vehicle: Vehicle) -> None:
+    """Refuse a plant whose rotors are the same in another order: each command would reach the wrong one."""
+    ours, plants = (
+        [round(degrees(atan2(-y, x)) / _ALIKE_DEG) % _SECTORS for x, y in each.rotors.position_m]
+        for each in (vehicle, plant_vehicle)
+    )
+    if ours != plants and sorted(ours) == sorted(plants):
+        raise PlanError(
+            "--plant-vehicle: its rotors are those of --vehicle in another order: list both alike (--order)"
+        )
 
 
 def _floor_m(spec: FlightSpec, plant_vehicle: Vehicle) -> float:

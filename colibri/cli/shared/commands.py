@@ -107,9 +107,12 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "vehicle": CommandEntry(
-            "write a vehicle as parameters of PX4 or ArduPilot",
+            "write a new vehicle's file, or parameters of PX4 or ArduPilot",
             "descriptions",
-            "colibri vehicle hummingbird --for px4 --out hummingbird.params",
+            """
+            colibri vehicle new x --mass 2 --arm .25 --propeller 1045 --hover-throttle .5
+            colibri vehicle hummingbird --for px4 --out hummingbird.params
+            """,
         ),
     },
     "control laws": {

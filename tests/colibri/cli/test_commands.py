@@ -197,3 +197,37 @@ def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
     assert len(report["trajectory_sha256"]) == 64
     assert {"flight.csv", "flight.ulg"} <= {path.name for path in tmp_path.iterdir()}
     assert len(list(tmp_path.glob("*.png"))) == 6
+
+
+def test_a_new_vehicle_is_written_and_not_overwritten(tmp_path: Path, ran: Ran, refused: Refused) -> None:
+    out = tmp_path / "mine.toml"
+    options = ("--mass", 2.06, "--wheelbase", 0.5, "--propeller", "10x4.5", "--hover-throttle", 0.5, "--out", out)
+    said = ran("vehicle", "new", "mine", *options).out
+    assert said.startswith(f"wrote {out}: thrust 40.4 N, 2.00 times the weight; ")
+    assert "\nnot measured: thrust, rotor lag, inertia, drag\n" in said
+    assert refused("vehicle", "new", "mine", *options).endswith("or --force to overwrite it")
+    ran("vehicle", "new", "mine", *options, "--force")
+    assert ran("vehicle", out, "--for", "px4").out.startswith("# mine, by")
+    assert refused("vehicle", "new", "mine") == ("required: --mass KG, --arm M or --wheelbase M, --propeller SIZE")
+    assert refused("vehicle", "new").endswith("a name is required")
+    assert refused("vehicle", out, "--for", "px4", "--mass", 3) == "--mass is an option of vehicle new NAME"
+    assert refused("vehicle", "hummingbird").startswith("--for px4 or ardupilot is required")
+
+
+def test_a_plant_with_another_rotor_order_is_refused(tmp_path: Path, ran: Ran, refused: Refused) -> None:
+    options = ("--mass", 2.06, "--arm", 0.25, "--propeller", "10x4.5", "--hover-throttle", 0.5)
+    for order in ("px4", "clockwise"):
+        ran("vehicle", "new", order, *options, "--order", order, "--out", tmp_path / f"{order}.toml")
+    plant = ("--plant-vehicle", tmp_path / "px4.toml")
+    fly = (
+        "fly",
+        "hover",
+        "--vehicle",
+        tmp_path / "clockwise.toml",
+        *plant,
+        "--link",
+        "memory",
+        "--out",
+        tmp_path / "out",
+    )
+    assert "in another order" in refused(*fly)
