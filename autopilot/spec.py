@@ -13,6 +13,7 @@ from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.process.spec import ProcessSpec
 from colibri.common.spec import Option
+from colibri.mavlink.client.events import StationEvent
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.services.identity import IdentityName
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -153,6 +154,9 @@ class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
     identity: Annotated[IdentityName, Option("towards ground stations")] = "px4"
     state: Annotated[Path | None, Option("folder of parameters, logs and files (default: not kept)", "DIR")] = None
     strict: Annotated[bool, Option("end at an exception in flight (default: replace the part and fly on)")] = False
+    events: Annotated[
+        tuple[StationEvent, ...], Option("modes and setpoints to send at their times", on_command_line=False)
+    ] = ()
     params: Annotated[Mapping[str, int | float], Option("initial values of parameters", on_command_line=False)] = field(
         default_factory=dict
     )

@@ -4,24 +4,24 @@ As text `5:payload=0.2`; as a table `{t = 5, event = "payload", kg = 0.2}` of Py
 """
 
 from argparse import ArgumentTypeError
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import msgspec
 
 from colibri.common.config import plain, read_toml
 from colibri.common.errors import shown, unknown
 from colibri.common.process.arguments import number
-from colibri.common.types import FourRotors, Vector
+from colibri.common.types import FourRotors
+from colibri.mavlink.client.events import EventError, Mode, Setpoint, StationEvent, TimedEvent
 from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.faults import Equipment, Fault
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.environment.weather import MAX_SPEED_M_S, RecordedWind, Wind
-from colibri.plant.errors import PlantError
 from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle
 
@@ -30,22 +30,7 @@ _SAMPLED_S = 0.02
 """Interval of samples of a wind that is a function."""
 
 
-class EventError(PlantError):
-    """An event is unknown or has an invalid value, or the flight cannot have it."""
-
-
-class _Event(
-    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="event"
-):
-    FORM: ClassVar[str]
-    t: Annotated[float, msgspec.Meta(ge=0.0)]
-
-    @property
-    def kind(self) -> str:
-        return str(self.__struct_config__.tag)
-
-
-class Payload(_Event, frozen=True, tag="payload"):
+class Payload(TimedEvent, frozen=True, tag="payload"):
     """Carry `kg` more than the vehicle's mass from `t` s on."""
 
     FORM = "KG"
@@ -56,7 +41,7 @@ class Payload(_Event, frozen=True, tag="payload"):
         return PayloadChange(self.kg)
 
 
-class Blow(_Event, frozen=True, tag="wind"):
+class Blow(TimedEvent, frozen=True, tag="wind"):
     """Replace the mean wind from `t` s on: constant, from a file, or a function of time to m/s, ENU."""
 
     FORM = "SPEED@FROM|FILE.csv"
@@ -67,7 +52,7 @@ class Blow(_Event, frozen=True, tag="wind"):
         return self.wind
 
 
-class Failure(_Event, frozen=True, tag="failure"):
+class Failure(TimedEvent, frozen=True, tag="failure"):
     """Fail as MAV_CMD_INJECT_FAILURE: FAILURE_UNIT, FAILURE_TYPE, instance from 1 (0: all), and its numbers."""
 
     FORM = "UNIT,TYPE[,INSTANCE[,VALUE...]]"
@@ -87,7 +72,7 @@ class Failure(_Event, frozen=True, tag="failure"):
         return Fault(unit, kind, self.instance, values)
 
 
-class Motor(_Event, frozen=True, tag="motor"):
+class Motor(TimedEvent, frozen=True, tag="motor"):
     """Leave a rotor, from 1 (0: all), this fraction of its thrust: 0 is lost, 1 is normal again."""
 
     FORM = "ROTOR,FRACTION"
@@ -100,27 +85,10 @@ class Motor(_Event, frozen=True, tag="motor"):
         return Fault(faults.MOTOR, kind, self.rotor, (self.fraction, 0.0, 0.0, 0.0))
 
 
-class Mode(_Event, frozen=True, tag="mode"):
-    """Select a flight mode, from a ground station."""
-
-    FORM = "MODE"
-    mode: str
-
-
-class Setpoint(_Event, frozen=True, tag="setpoint"):
-    """Send this offboard set-point, ENU, from `t` s on, at 20 Hz, until the next one or the next mode."""
-
-    FORM = "EAST,NORTH,UP"
-    position: Vector | None = None
-    velocity: Vector | None = None
-    yaw: float | None = None
-
-
 PlantEvent: TypeAlias = Payload | Blow | Failure | Motor
-Event: TypeAlias = PlantEvent | Mode | Setpoint
-PLANT_EVENTS = (Payload, Blow, Failure, Motor)
-KINDS: dict[str, Any] = {str(it.__struct_config__.tag): it for it in (*PLANT_EVENTS, Mode, Setpoint)}
-FORMS = ", ".join(f"{kind}={it.FORM}" for kind, it in KINDS.items() if it in PLANT_EVENTS)
+Event: TypeAlias = PlantEvent | StationEvent
+KINDS: dict[str, Any] = {str(it.__struct_config__.tag): it for it in (Payload, Blow, Failure, Motor, Mode, Setpoint)}
+FORMS = ", ".join(f"{kind}={it.FORM}" for kind, it in KINDS.items())
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
@@ -149,7 +117,7 @@ def event_of(given: Any, duration_s: float = 0.0) -> Event:
     """Return an event of a struct, a mapping or a text."""
     if isinstance(given, str):
         return _of_text(given)
-    if isinstance(given, _Event):
+    if isinstance(given, TimedEvent):
         given = msgspec.structs.asdict(given) | {"event": given.kind}
     if not isinstance(given, Mapping):
         raise EventError(f'an event must be a table or a text {EVENT}, not {type(given).__name__} "{shown(given)}"')
@@ -168,16 +136,16 @@ def event_of(given: Any, duration_s: float = 0.0) -> Event:
     return found
 
 
-def check_events(events: Iterable[Event], vehicle: Vehicle, *, on_sensors: bool) -> None:
-    """Refuse what this plant cannot do: EventError."""
+def check_events(events: Iterable[Event], vehicle: Vehicle, *, on_sensors: bool, served: bool = False) -> None:
+    """Refuse what this plant cannot do, and what ground stations send unless they are `served`: EventError."""
     parts = {Equipment.ROTORS}
     parts |= {Equipment.BATTERY} if vehicle.battery is not None else set()
     parts |= {Equipment.SENSORS} if on_sensors else set()
     for each in events:
-        if isinstance(each, Mode | Setpoint):
+        if isinstance(each, StationEvent) and not served:
             raise EventError(
-                f"event {each.kind} at t = {each.t:g} s needs a ground station: fly it in pytest, by the mark sitl, or "
-                "send it from one beside colibri sitl"
+                f"event {each.kind} at t = {each.t:g} s needs ground stations: fly it by colibri fly --gcs, by colibri "
+                "sitl or, in pytest, with the mark sitl"
             )
         judged = faults.judged(each.change, parts) if isinstance(each, Failure | Motor) else None
         if isinstance(judged, Refusal):
@@ -203,10 +171,13 @@ def _of_text(text: str) -> Event:
         elif kind == "setpoint":
             values["position"] = [number(word) for word in words]
         else:
-            values |= {"payload": {"kg": value}, "wind": {"wind": value}, "mode": {"mode": value}}[kind]
+            mode, _, arm = value.partition(",")
+            values |= {"payload": {"kg": value}, "wind": {"wind": value}, "mode": {"mode": mode}}[kind]
             if kind == "payload":
                 values["kg"] = number(value)
-    except (ValueError, IndexError):
+            elif kind == "mode" and arm:
+                values["arm"] = {"arm": True}[arm]
+    except (ValueError, LookupError):
         raise EventError(f'must be T:KIND=VALUE with {FORMS}; "5:payload=0.2" say, not "{shown(text)}"') from None
     return event_of(values | {"event": kind})
 
@@ -259,6 +230,10 @@ _OF_PLANT = {
 }
 
 
-def changes_of(events: Sequence[Event]) -> list[tuple[int, Any]]:
+def plant_events(events: Iterable[Event]) -> tuple[PlantEvent, ...]:
+    return tuple(it for it in events if isinstance(it, PlantEvent))
+
+
+def changes_of(events: Iterable[Event]) -> list[tuple[int, Any]]:
     """Return the changes of the plant by time, µs."""
-    return [(round(it.t * 1e6), it.change) for it in events if isinstance(it, PLANT_EVENTS)]
+    return [(round(it.t * 1e6), it.change) for it in plant_events(events)]

@@ -58,7 +58,12 @@ class WorldSpec:
     ] = field(default_factory=dict)
     events: Annotated[
         tuple[Any, ...],
-        Option(f"at T seconds: {FORMS}; or a file with tables [[events]]", EVENT, read=event, flag="event"),
+        Option(
+            f"at T seconds: {FORMS} (the last two need ground stations); or a file with tables [[events]]",
+            EVENT,
+            read=event,
+            flag="event",
+        ),
     ] = ()
     seed: Annotated[int, Option("seed of everything random", "N", least=0)] = 0
     start: Annotated[

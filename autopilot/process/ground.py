@@ -19,6 +19,7 @@ from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
+from colibri.autopilot.process.station_events import LINK, EventStation
 from colibri.autopilot.process.station_traffic import StationTraffic
 from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
 from colibri.autopilot.spec import AutopilotSpec
@@ -88,6 +89,9 @@ class GroundService:
         self._links: GroundLinks | SteppedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
             self._links = SteppedLinks(conductor, lambda: self.copter.pilot.state)
+        self._events = EventStation(spec.events, spec.system_id, self._state.signing) if spec.events else None
+        if self._events:
+            self._events.introduce(self.copter.stations)
         self.shut_down = self._full_reported = False
         self._revision = self.copter.parameters.revision
         self._reported_s = self._saved_s = perf_counter()
@@ -110,12 +114,16 @@ class GroundService:
         """Answer ground stations last: acknowledged changes are then on disk, even if the process is killed."""
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
+        if self._events:
+            received = [*self._events.due(self.copter.time_us), *received]
         passed: list[bytes] = []
         if self._traffic and received:
             received = _noting(received, passed)
         if self._log and received:
             received = self._recorded(self._log, received)
         outbox = self.autopilot.serve(received)
+        if self._events:
+            outbox = [outgoing for outgoing in outbox if outgoing.link != LINK]
         self._record_told()
         if stations.system.restart:
             self._restart(stations.system.restart)
@@ -212,6 +220,8 @@ class GroundService:
             self.autopilot = autopilot
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
+            if self._events:
+                self._events.introduce(self.copter.stations)
             if self._log:
                 self._log.begin_again(self._values, self._past_bytes)
             self._revision = self.copter.parameters.revision

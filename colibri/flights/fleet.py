@@ -7,6 +7,7 @@ from time import perf_counter, time
 from typing import Any
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.process.station_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.earth.home import HomePlace
@@ -22,7 +23,7 @@ from colibri.flights.launcher import Child, end_children, events_of, how_it_ende
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
-from colibri.plant.events import check_events
+from colibri.plant.events import check_events, plant_events
 from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import load_vehicle
@@ -83,7 +84,8 @@ def _check(spec: FleetSpec) -> str:
         name = name_of(spec.plant_vehicle or spec.vehicle or profile.simulation.vehicle)
         whole = load_vehicle(spec.plant_vehicle) if spec.plant_vehicle else assumed
         vehicle = whole.without(spec.without)
-        check_events(spec.events, vehicle, on_sensors=spec.feedback is Feedback.SENSORS)
+        check_events(spec.events, vehicle, on_sensors=spec.feedback is Feedback.SENSORS, served=True)
+        station_events(spec.events)
         check_reach(spec.links(spec.instance), signed=spec.signing_key is not None, insecure=spec.insecure)
     except Error as error:
         fail(str(error))
@@ -133,6 +135,7 @@ def _start_plant(member: Member, spec: FleetSpec) -> None:
         start=spec.started(Start(psi=home.yaw_enu_deg))._asdict(),
         seed=spec.seed + member.instance,
         tlog=True,
+        events=plant_events(spec.events),
         **_common(member, spec),
     )
     member.children.append(Child(plant))
@@ -146,6 +149,7 @@ def _start_autopilot(member: Member, spec: FleetSpec) -> None:
         gcs=tuple(member.links),
         tlog=True,
         state=spec.state / str(member.instance),
+        events=station_events(spec.events),
         **_common(member, spec),
     )
     member.children.append(Child(autopilot))

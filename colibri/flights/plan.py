@@ -16,9 +16,10 @@ from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
 from colibri.flights.effects import FlownOptions, without_effect
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.client.events import StationEvent
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
-from colibri.plant.events import check_events
+from colibri.plant.events import check_events, plant_events
 from colibri.plant.physics.contact import check_contact
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.spec import PlantSpec
@@ -115,7 +116,9 @@ class FlightPlan:
                 _check_sensors(name, each)
         _check_order(vehicle, plant_vehicle)
         floor_m = _floor_m(spec, plant_vehicle)
-        check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS)
+        served = bool(spec.gcs) or contents.whole is None  # stations of a recorded flight are not kept
+        check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS, served=served)
+        _sent(spec)
         track, note = load_track(spec.track, vehicle, profile, floor_m, track_file)
         start = spec.started(_usual_start(profile, plant_vehicle, track, spec.feedback))
         try:
@@ -195,13 +198,22 @@ class FlightPlan:
             start=self.start._asdict(),
             speed=spec.pace,
             tlog=spec.tlog or bool(spec.gcs),
+            events=plant_events(spec.events),
         )
 
     def autopilot_spec(self, plant: str) -> AutopilotSpec:
         """Return the specification of the autopilot, which calls the plant."""
         tlog = self.spec.tlog or bool(self.spec.gcs)
-        params = dict(self.spec.params)
-        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog, params=params)
+        given = {"params": dict(self.spec.params), "events": _sent(self.spec)}
+        return part_of(self.spec, AutopilotSpec, plant=plant, floor=self.floor_m, tlog=tlog, **given)
+
+
+def _sent(spec: FlightSpec) -> tuple[StationEvent, ...]:
+    if not spec.gcs:
+        return ()
+    from colibri.autopilot.process.station_events import station_events  # slow to load
+
+    return station_events(spec.events)
 
 
 def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
+from colibri.autopilot.process.station_events import StationEvents
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import unknown
 from colibri.mavlink.hil.conductor import Parcel
@@ -27,7 +28,6 @@ from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
 from colibri.sitl.mission_items import Item, on_wire
-from colibri.sitl.station_events import StationEvents
 from colibri.sitl.status_texts import StatusTexts
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
@@ -89,7 +89,7 @@ class Sitl(View, Stepped, Steered):
         self._wind, self._payload_kg = str(setting.wind or CALM), 0.0
         self._sticks: dict[str, float] | None = None
         self._sticks_at_us = 0
-        self._events = StationEvents(setting.events)
+        self._events = StationEvents(setting.events, setting.system)
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
         self._texts = StatusTexts()
@@ -126,7 +126,8 @@ class Sitl(View, Stepped, Steered):
         if self._sticks is not None and now_us >= self._sticks_at_us:
             self._send_sticks()
         if now_us >= self._events.next_us:
-            self._events.send(self, now_us)
+            for encoded in self._events.due(now_us):
+                self._send(encoded)
         stations, note = self._stations, self.record.note
         parcels = [Parcel(station.number, datagram) for station in stations for datagram in station.departing(now_us)]
         for _, datagram in parcels:

@@ -7,15 +7,16 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from colibri.autopilot.commander.rules.modes import Mode as FlightMode
+from colibri.autopilot.process.station_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, LawSpec
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
 from colibri.common.errors import unknown
 from colibri.common.spec import Option, part_of, read_values
+from colibri.mavlink.client.events import EventError
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.services.identity import IdentityName
-from colibri.plant.events import PLANT_EVENTS, EventError, Mode, check_events
+from colibri.plant.events import check_events, plant_events
 from colibri.plant.physics.start import Start
 from colibri.plant.spec import PlantSpec, WorldSpec
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -83,13 +84,13 @@ class Setting(WorldSpec, LawSpec):
             hover_rpm = vehicle.hover_speed / vehicle.speed_from_rpm(1.0)
             start = start._replace(z=self.airborne, rotors=hover_rpm)
         begins = self.started(start)._asdict()
-        events = tuple(it for it in self.events if isinstance(it, PLANT_EVENTS))
+        events = plant_events(self.events)
         return part_of(self, PlantSpec, system_id=self.system, start=begins, truth=True, speed=inf, events=events)
 
     def autopilot_spec(self, state: Path) -> AutopilotSpec:
         """Return the specification of an autopilot with its files in `state`."""
         vehicle = self.believed or self.vehicle
-        return part_of(self, AutopilotSpec, vehicle=vehicle, system_id=self.system, state=state)
+        return part_of(self, AutopilotSpec, vehicle=vehicle, system_id=self.system, state=state, events=())
 
 
 DOES = frozenset(Trouble.__slots__) - {"down"}
@@ -103,14 +104,12 @@ def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
         values |= read | {"params": {**values.get("params", {}), **read.get("params", {})}}
     try:
         setting = Setting(**values)
-        mine = [it for it in setting.events if isinstance(it, PLANT_EVENTS)]
-        if mine:
-            check_events(mine, load_vehicle(setting.vehicle), on_sensors=setting.feedback is Feedback.SENSORS)
+        if setting.events:
+            station_events(setting.events)
+            on_sensors = setting.feedback is Feedback.SENSORS
+            check_events(setting.events, load_vehicle(setting.vehicle), on_sensors=on_sensors, served=True)
     except EventError as error:
         raise SettingError(f"events: {error}") from None
-    for event in setting.events:
-        if isinstance(event, Mode) and event.mode not in set(FlightMode):
-            raise SettingError(f"events: {unknown('mode', event.mode, FlightMode)}")
     unknown_faults = sorted(set(setting.ground) - DOES)
     if unknown_faults:
         raise SettingError(f"ground: {unknown('fault', unknown_faults[0], sorted(DOES))}")

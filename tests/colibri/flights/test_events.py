@@ -15,8 +15,9 @@ from colibri.flights.fleet_spec import FleetSpec
 from colibri.flights.provenance import plan_of
 from colibri.flights.replay import replay_flight
 from colibri.flights.spec import FlightSpec
+from colibri.mavlink.client.events import Mode, Setpoint
 from colibri.plant.environment.weather import Wind
-from colibri.plant.events import Blow, Failure, Mode, Motor, Payload, Setpoint
+from colibri.plant.events import Blow, Failure, Motor, Payload
 from colibri.plant.spec import PlantSpec, WorldSpec
 from colibri.sitl.backends.setting import Setting, setting_of
 from tests.support.commands import Refused
@@ -29,6 +30,7 @@ EVENTS = {
     "3:failure=gps,off": Failure(t=3.0, unit="gps", type="off"),
     "3:failure=motor,wrong,1,0.8": Failure(t=3.0, unit="motor", type="wrong", instance=1, values=(0.8,)),
     "4:mode=land": Mode(t=4.0, mode="land"),
+    "4:mode=takeoff,arm": Mode(t=4.0, mode="takeoff", arm=True),
     "4:setpoint=1,2,3": Setpoint(t=4.0, position=(1.0, 2.0, 3.0)),
 }
 
@@ -74,10 +76,11 @@ def test_texts_tables_and_structs_are_the_same_events(text: str, struct: Any, sp
         ({"t": 1}, 'unknown event "None" (choose payload, wind'),
         ({"t": float("nan"), "event": "payload", "kg": 1}, "payload: Expected float >= 0.0 - at $.t"),
         ({"t": float("inf"), "event": "payload", "kg": 1}, "payload: t and values must be finite"),
+        ("4:mode=takeoff,am", 'not "4:mode=takeoff,am"'),
         ({"t": 1, "event": "wind", "wind": lambda t: (t,)}, "wind: a function must return three numbers"),
         ({"t": 1, "event": "wind", "wind": lambda _: 1 / 0}, "wind: the function raised ZeroDivisionError at t = 0 s"),
-        ("4:mode=land", "event mode at t = 4 s needs a ground station: fly it in pytest"),
-        ("4:setpoint=0,0,1", "event setpoint at t = 4 s needs a ground station: fly it in pytest"),
+        ("4:mode=land", "event mode at t = 4 s needs ground stations: fly it by colibri fly --gcs"),
+        ("4:setpoint=0,0,1", "event setpoint at t = 4 s needs ground stations: fly it by colibri fly --gcs"),
         ("4:failure=gps,off", "event failure at t = 4 s: flown by the state, not by sensors"),
         ("4:failure=motor,wrong,1,3", "event failure at t = 4 s: remaining fraction must be 0.001 to 1"),
         ("4:failure=motor,off,9", "event failure at t = 4 s: instance must be 0 to 4"),
@@ -148,6 +151,19 @@ def test_the_fixture_flies_events_of_plant_and_station(sitl: colibri.Sitl) -> No
     sitl.wait_until(lambda: sitl.mode == "land", within=20.0)
 
 
+def test_modes_and_setpoints_fly_beside_ground_stations(tmp_path: Path) -> None:
+    words = ["fly", "hover", "--duration", "5", "--link", "udp", "--gcs", "udpin:127.0.0.1:0", "--speed", "max"]
+    events = ["--event", "0.5:setpoint=1,0,3", "--event", "0.7:mode=offboard", "--event", "0.8:payload=0.05"]
+    hashes = set()
+    for out in (tmp_path / "one", tmp_path / "two"):
+        assert main([*words, *events, "--no-figures", "--quiet", "--out", str(out)]) == 0
+        assert replay_flight(out).difference is None
+        flight = colibri.load_flight(out)
+        hashes.add(flight.sha256)
+        np.testing.assert_allclose([flight.samples[axis][-1] for axis in "xyz"], (1.0, 0.0, 3.0), atol=0.2)
+    assert len(hashes) == 1
+
+
 @pytest.mark.parametrize(
     ("event", "said"),
     [
@@ -166,5 +182,6 @@ def test_foreign_autopilots_have_no_events(serve: str, refused: Refused) -> None
     assert "--event needs --serve colibri" in refused("plant", "--serve", serve, "--event", "1:payload=0.1")
 
 
-def test_a_vehicle_for_stations_refuses_modes(refused: Refused) -> None:
-    assert "event mode at t = 4 s needs a ground station" in refused("sitl", "--event", "4:mode=land")
+@pytest.mark.parametrize("command", [("sitl",), ("fly", "hover", "--link", "udp", "--gcs", "udpin:127.0.0.1:0")])
+def test_unknown_modes_are_refused(command: tuple[str, ...], refused: Refused) -> None:
+    assert 'unknown mode "lnd" (did you mean "land"?)' in refused(*command, "--event", "4:mode=lnd")
