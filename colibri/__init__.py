@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 from colibri.common.lazy import public
 
+__version__: str
+
 if TYPE_CHECKING:
     from colibri.analysis import Recording as Recording
     from colibri.analysis import read_recording as read_recording
@@ -55,4 +57,11 @@ if TYPE_CHECKING:
     from colibri.tuning import TuningResults as TuningResults
     from colibri.tuning import tune as tune
 else:
-    __getattr__, __dir__ = public(__name__)
+    _public, __dir__ = public(__name__)
+
+    def __getattr__(name):
+        if name != "__version__":
+            return _public(name)
+        from importlib.metadata import version
+
+        return version("colibri-sitl")

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -100,3 +101,7 @@ def test_what_the_page_of_control_laws_imports_is_public() -> None:
     named = set(re.findall(r"`(\w+)`", sentence)) - {"colibri"}
     assert len(named) > 10
     assert named <= set(import_module("colibri").__all__)
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert import_module("colibri").__version__ == version("colibri-sitl")
