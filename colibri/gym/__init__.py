@@ -1,0 +1,24 @@
+"""Flights as learning environments: `import colibri.gym` registers `colibri/Hover-v0` and `colibri/Track-v0`."""
+
+from colibri.gym.errors import GymError
+
+try:
+    import gymnasium
+except ModuleNotFoundError as error:
+    if error.name != "gymnasium":
+        raise
+    raise GymError("colibri.gym needs gymnasium: pip install 'colibri-sitl[gym]'") from None
+
+from colibri.gym.environment import QuadrotorEnv, QuadrotorVectorEnv
+from colibri.gym.episodes import EpisodesSnapshot, GymTransition
+
+__all__ = ["EpisodesSnapshot", "GymError", "QuadrotorEnv", "QuadrotorVectorEnv", "GymTransition"]
+
+for _name, _track in {"colibri/Hover-v0": "hover", "colibri/Track-v0": "lemniscate"}.items():
+    if _name not in gymnasium.registry:
+        gymnasium.register(
+            _name,
+            entry_point="colibri.gym.environment:QuadrotorEnv",
+            vector_entry_point="colibri.gym.environment:QuadrotorVectorEnv",
+            kwargs={"track": _track},
+        )

@@ -1,0 +1,156 @@
+"""The environments of gymnasium: one vehicle, and a vector of vehicles in one compiled loop."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Space
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from colibri.common.errors import shown
+from colibri.gym import kernels
+from colibri.gym.episodes import Episodes, EpisodesSnapshot, read_options
+from colibri.gym.errors import GymError
+
+Values = NDArray[np.float32]
+_MAX_COUNT = 100_000
+
+
+class QuadrotorEnv(gymnasium.Env[Values, Values]):
+    """One vehicle; keywords, observations and rewards are in docs/gym.md."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - declared by gymnasium
+
+    def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
+        self._episodes = _episodes(1, render_mode, options)
+        self.observation_space, self.action_space = _spaces(self._episodes)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Values, dict[str, Any]]:
+        """Begin an episode; the same seed gives the same bits. `options` must be empty."""
+        super().reset(seed=_seed(seed))
+        if options:
+            raise GymError(f'options: none are known, not "{shown(options)}": distributions are the keyword draw')
+        self._episodes.begin(0, self.np_random)
+        return self._episodes.observations[0].copy(), {}
+
+    def step(self, action: Values) -> tuple[Values, float, bool, bool, dict[str, Any]]:
+        """Advance one control interval; `info["why"]` names the reason of a termination."""
+        episodes = self._episodes
+        if not episodes.flying[0]:
+            raise GymError("reset() is required: no episode is running")
+        given = np.asarray(action)
+        if given.shape != (4,):
+            raise GymError(f"action must have the shape (4,), not {given.shape}")
+        rewards, terminated, truncated = episodes.step(given[None])
+        ended = bool(terminated[0])
+        info = {"why": episodes.why(0)} if ended else {}
+        return episodes.observations[0].copy(), float(rewards[0]), ended, bool(truncated[0]), info
+
+    def snapshot(self) -> EpisodesSnapshot:
+        """Keep the episode, with its random numbers."""
+        return self._episodes.snapshot()
+
+    def restore(self, snapshot: EpisodesSnapshot) -> Values:
+        """Continue from a snapshot with the same bits; return its observation."""
+        self._episodes.restore(snapshot, [self.np_random])
+        seen: Values = self._episodes.observations[0].copy()
+        return seen
+
+
+class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
+    """A vector of vehicles; row i seeded with `seed + i` has the bits of one vehicle with that seed.
+
+    A row that has ended is reset in the next step, whose action it ignores (`AutoresetMode.NEXT_STEP`).
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(self, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> None:
+        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or not 1 <= num_envs <= _MAX_COUNT:
+            raise GymError(f'num_envs must be a whole number from 1 to {_MAX_COUNT}, not "{shown(num_envs)}"')
+        self._episodes = _episodes(num_envs, render_mode, options)
+        self.num_envs = num_envs
+        self.single_observation_space, self.single_action_space = _spaces(self._episodes)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._chances = [seeding.np_random(None)[0] for _ in range(num_envs)]
+        self._begun = False
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Values, dict[str, Any]]:
+        """Begin the episodes of all rows, or of those in `options["reset_mask"]`, (n,)."""
+        count = self.num_envs
+        if isinstance(seed, Sequence) and not isinstance(seed, str):
+            seeds = [_seed(each) for each in seed]
+        else:
+            first = _seed(seed)
+            seeds = [None if first is None else first + n for n in range(count)]
+        if len(seeds) != count:
+            raise GymError(f"seed must be one number or {count}, not {len(seeds)}")
+        mask = np.asarray((options or {}).get("reset_mask", np.ones(count, dtype=np.bool_)))
+        if set(options or {}) - {"reset_mask"} or mask.shape != (count,) or mask.dtype != np.bool_:
+            raise GymError(f'options: only reset_mask is known, ({count},) of bool, not "{shown(options)}"')
+        for n in np.flatnonzero(mask).tolist():
+            if seeds[n] is not None:
+                self._chances[n] = seeding.np_random(seeds[n])[0]
+            self._episodes.begin(n, self._chances[n])
+        self._begun = self._begun or bool(mask.all())
+        return self._episodes.observations.copy(), {}
+
+    def step(
+        self, actions: Values
+    ) -> tuple[Values, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Advance all rows one control interval; `infos["why"]` names the reasons of terminations."""
+        if not self._begun:
+            raise GymError("reset() is required: no episode is running")
+        episodes = self._episodes
+        waiting = np.flatnonzero(~episodes.flying).tolist()
+        rewards, terminated, truncated = episodes.step(actions)
+        for n in waiting:
+            episodes.begin(n, self._chances[n])
+        infos: dict[str, Any] = {}
+        if terminated.any():
+            infos = {"why": np.array([episodes.why(n) for n in range(self.num_envs)], dtype=object), "_why": terminated}
+        return episodes.observations.copy(), rewards, terminated, truncated, infos
+
+    def snapshot(self) -> EpisodesSnapshot:
+        """Keep the episodes of all rows, with their random numbers."""
+        return self._episodes.snapshot()
+
+    def restore(self, snapshot: EpisodesSnapshot) -> Values:
+        """Continue from a snapshot with the same bits; return its observations."""
+        self._episodes.restore(snapshot, self._chances)
+        self._begun = True
+        return self._episodes.observations.copy()
+
+
+def _episodes(count: int, render_mode: Any, options: dict[str, Any]) -> Episodes:
+    if render_mode is not None:
+        raise GymError(f'render_mode must be None, not "{shown(render_mode)}": nothing is drawn')
+    return Episodes(count, **read_options(options))
+
+
+def _seed(given: Any) -> int | None:
+    if given is None or (isinstance(given, int | np.integer) and not isinstance(given, bool) and given >= 0):
+        return None if given is None else int(given)
+    raise GymError(f'seed must be a whole number, 0 at least, not {type(given).__name__} "{shown(given)}"')
+
+
+def _spaces(episodes: Episodes) -> tuple[Space[Values], Space[Values]]:
+    most = np.concatenate(
+        [
+            np.full(3, kernels.MAX_POSITION_M),
+            np.full(3, kernels.MAX_SPEED_M_S),
+            np.ones(9),
+            np.full(3, kernels.MAX_RATE_RAD_S),
+            np.ones(4),
+            np.full(3 * episodes.preview, kernels.MAX_POSITION_M),
+        ]
+    ).astype(np.float32)
+    spaces: Any = (Box(-most, most, dtype=np.float32), Box(-1.0, 1.0, (4,), dtype=np.float32))
+    return spaces[0], spaces[1]

@@ -1,0 +1,305 @@
+"""Episodes of many vehicles, without gymnasium: draws, resets, steps, snapshots."""
+
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
+from math import ceil
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.sampling import sampled_track
+from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.autopilot.spec import Trajectory
+from colibri.campaigns.values import CampaignError, Draw, is_number, read_draw
+from colibri.common.errors import shown, unknown
+from colibri.common.jit import packed
+from colibri.common.matrices import inverse
+from colibri.common.types import Array, Vector
+from colibri.gym import kernels
+from colibri.gym.errors import GymError
+from colibri.plant.environment.air import CALM
+from colibri.plant.environment.weather import Wind
+from colibri.plant.physics.integrators import RK4_STEP_S
+from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import starting_world
+from colibri.plant.texts import wind as read_wind
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+ActionKind = Literal["rotors", "rates"]
+ACTIONS: tuple[ActionKind, ...] = get_args(ActionKind)
+ENDS = ("", "too far from the reference", "ground", "state not finite", "action not finite")
+_START: dict[str, Any] = {
+    **{f"start.{key}": {"uniform": [-0.5, 0.5]} for key in ("x", "y", "z", "vx", "vy", "vz", "p", "q", "r")},
+    **{f"start.{key}": {"uniform": [-15.0, 15.0]} for key in ("phi", "theta")},
+}
+
+
+class GymTransition(NamedTuple):
+    """One step of n vehicles, for a reward of one's own."""
+
+    observations: NDArray[np.float32]  # (n, values), after the step
+    actions: Array  # (n, 4), as given
+    states: Array  # (n, 18), `plant.physics.equations`
+    references: Array  # (n, 6), position m and velocity m/s, ENU
+    rewards: Array  # (n,), the shipped reward
+    terminated: NDArray[np.bool_]  # (n,)
+
+
+Reward = Callable[[GymTransition], Any]
+"""Returns the rewards, (n,)."""
+
+
+class EpisodesSnapshot(NamedTuple):
+    """Memory of episodes in mid-air."""
+
+    arrays: tuple[Any, ...]
+    chances: tuple[Mapping[str, Any] | None, ...]
+
+
+class Episodes:
+    """Episodes of `count` vehicles, each row with its own random numbers; arguments as in docs/gym.md."""
+
+    def __init__(
+        self,
+        count: int,
+        *,
+        track: Any = "hover",
+        vehicle: str | Vehicle = "hummingbird",
+        action: str = "rotors",
+        rate: float = 250.0,
+        duration: float = 10.0,
+        preview: int = 0,
+        preview_s: float = 0.1,
+        max_rates: Sequence[float] = (8.0, 8.0, 4.0),
+        limit_m: float = 5.0,
+        draw: Mapping[str, Any] | None = None,
+        reward: Reward | None = None,
+    ) -> None:
+        if action not in ACTIONS:
+            raise GymError(unknown("action", action, ACTIONS))
+        _within("rate", rate, 10.0, 1000.0, "Hz")
+        _within("duration", duration, 1.0 / rate, 3600.0, "s")
+        _within("limit_m", limit_m, 0.1, 1000.0, "m")
+        _within("preview_s", preview_s, 1.0 / rate, 10.0, "s")
+        if isinstance(preview, bool) or not isinstance(preview, int) or not 0 <= preview <= 100:
+            raise GymError(f'preview must be a whole number from 0 to 100, not "{shown(preview)}"')
+        if not isinstance(max_rates, Sequence) or len(max_rates) != 3 or not all(map(is_number, max_rates)):
+            raise GymError(f'max_rates must be three numbers, rad/s, not "{shown(max_rates)}"')
+        for value in max_rates:
+            _within("max_rates", value, 0.1, 50.0, "rad/s")
+        if reward is not None and not callable(reward):
+            raise GymError(
+                f'reward must be a function of a GymTransition, not {type(reward).__name__} "{shown(reward)}"'
+            )
+        self.count, self.interval_s, self.preview = count, 1.0 / rate, preview
+        self.length = max(1, round(duration * rate))
+        self._with_rates, self._reward, self._limit_m = action == "rates", reward, float(limit_m)
+        self._stride = max(1, round(preview_s * rate))
+        self._substeps = max(1, ceil(self.interval_s / RK4_STEP_S - 1e-6))
+        self._max_rates = tuple(map(float, max_rates))
+        self.vehicle = load_vehicle(vehicle)
+        self._floor_m = -np.inf if self.vehicle.ground is None else 0.0
+        self.reference = self._sampled(track, duration)
+        self._fixed, self._draws = _read_draws({**_START, **_mapping(draw)})
+        for end in (0, -1):  # both ends of every range must fly
+            first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
+        self._x = np.zeros((count, first.x.size))
+        self._last, self._steps = np.zeros((count, 4)), np.zeros(count, dtype=np.int64)
+        self._parameters = np.empty(count, dtype=first.parameters.dtype)
+        self._mixers, self._scales = np.empty((count, 4, 4)), np.empty((count, 6))
+        self._chances: list[Generator | None] = [None] * count
+        self._ends, self._rewards = np.zeros(count, dtype=np.int64), np.zeros(count)
+        self.observations = np.zeros((count, kernels.FIXED + 3 * preview), dtype=np.float32)
+        self.flying = np.zeros(count, dtype=np.bool_)
+
+    def begin(self, n: int, chance: Generator) -> None:
+        """Begin an episode of row `n`, drawn from `chance`."""
+        values = {key: each.value(chance) for key, each in self._draws.items()}
+        begun = self._drawn({**self._fixed, **values})
+        self._chances[n] = chance
+        self._x[n], self._last[n], self._steps[n] = begun.x, begun.action, 0
+        self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
+        self.flying[n] = True
+        kernels.observe(self._x[n], self._last[n], self.reference, 0, self._stride, self.observations[n])
+
+    def step(self, given: Any) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Advance all flying rows; return rewards, terminated, truncated, each (n,)."""
+        try:
+            actions = np.ascontiguousarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise GymError(f'action must be numbers, ({self.count}, 4), not "{shown(given)}"') from None
+        if actions.shape != self._last.shape:
+            raise GymError(f"action must have the shape {self._last.shape}, not {actions.shape}")
+        kernels.advance(
+            self._x,
+            actions,
+            self._last,
+            self._steps,
+            self.flying,
+            self._parameters,
+            self._mixers,
+            self._scales,
+            self.reference,
+            self._stride,
+            self._with_rates,
+            self.interval_s,
+            self._substeps,
+            self._limit_m,
+            self._floor_m,
+            self.observations,
+            self._rewards,
+            self._ends,
+        )
+        terminated = self._ends != 0
+        truncated = self.flying & (self._steps >= self.length) & ~terminated
+        rewards = self._rewards.copy()
+        if self._reward is not None:
+            now = self.reference[self._steps]
+            seen = GymTransition(
+                self.observations.copy(), actions, self._x.copy(), now, rewards.copy(), terminated.copy()
+            )
+            own = np.asarray(self._reward(seen), dtype=np.float64)
+            if own.shape != rewards.shape:
+                raise GymError(f"reward must return the shape {rewards.shape}, not {own.shape}")
+            rewards = np.where(self.flying, own, 0.0)
+        self.flying &= ~(terminated | truncated)
+        return rewards, terminated, truncated
+
+    def why(self, n: int) -> str:
+        """Return the reason of a row's termination, or an empty text."""
+        return ENDS[self._ends[n]]
+
+    def snapshot(self) -> EpisodesSnapshot:
+        """Keep states, vehicles and random numbers of all rows."""
+        chances = tuple(None if it is None else it.bit_generator.state for it in self._chances)
+        return EpisodesSnapshot(tuple(array.copy() for array in self._memory()), chances)
+
+    def restore(self, snapshot: EpisodesSnapshot, chances: Sequence[Generator]) -> None:
+        """Continue from a snapshot of an environment of the same shape, with `chances` set to its random numbers."""
+        memory = self._memory()
+        kept = snapshot.arrays if isinstance(snapshot, EpisodesSnapshot) else ()
+        if [(it.shape, it.dtype) for it in kept] != [(it.shape, it.dtype) for it in memory]:
+            raise GymError("snapshot must come from snapshot() of an environment of the same size and keywords")
+        for n, state in enumerate(snapshot.chances):
+            if state is not None:
+                chances[n].bit_generator.state = state
+            self._chances[n] = None if state is None else chances[n]
+        for array, value in zip(memory, kept, strict=True):
+            array[:] = value
+
+    def _memory(self) -> tuple[Any, ...]:
+        return (
+            self._x,
+            self._last,
+            self._steps,
+            self._parameters,
+            self._mixers,
+            self._scales,
+            self._ends,
+            self._rewards,
+            self.observations,
+            self.flying,
+        )
+
+    def _sampled(self, given: Any, duration_s: float) -> Array:
+        """Return position and velocity at each interval of an episode and its preview, (m, 6), ENU."""
+        is_named = isinstance(given, str | Trajectory)
+        track = load_track(
+            given if is_named else sampled_track(given, duration_s), self.vehicle, load_profile("flight")
+        )
+        times_s = np.arange(self.length + 2 + self.preview * self._stride, dtype=np.float64) * self.interval_s
+        return np.ascontiguousarray(np.hstack([position(track.track, times_s, order) for order in (0, 1)]))
+
+    def _drawn(self, values: Mapping[str, Any]) -> "_Begun":
+        vehicle, wind = self.vehicle, CALM
+        start: dict[str, float] = {}
+        for key, value in values.items():
+            if key == "wind":
+                wind = _wind(value)
+            elif key.startswith("vehicle."):
+                vehicle = vehicle.replace(key.removeprefix("vehicle."), value)
+            else:
+                start[key.removeprefix("start.")] = value
+        for place, key in enumerate(("x", "y", "z", "vx", "vy", "vz")):
+            start[key] = start.get(key, 0.0) + float(self.reference[0, place])
+        start.setdefault("rotors", vehicle.hover_rpm)
+        world = starting_world(Start(**start), vehicle)
+        top = vehicle.rotors.max_speed
+        thrust_n = float(vehicle.max_wrench()[0])
+        share = world.rotor_speeds[0] / top
+        level = 2.0 * share - 1.0
+        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self._with_rates else (level, level, level, level)
+        return _Begun(
+            np.array((*world.state, *world.rotor_speeds, 0.0)),
+            np.array(action),
+            packed(parameters_of(vehicle, wind)),
+            inverse(vehicle.allocation()),
+            np.array((vehicle.rotors.idle_speed, top, thrust_n, *self._max_rates)),
+        )
+
+
+class _Begun(NamedTuple):
+    x: Array
+    action: Array
+    parameters: Any
+    mixer: Array
+    scale: Array
+
+
+def read_options(given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return keywords of `Episodes`; GymError for an unknown one."""
+    known = list(signature(Episodes).parameters)[1:]
+    for name in given:
+        if name not in known:
+            raise GymError(unknown("keyword", name, known))
+    return given
+
+
+def _mapping(draw: Any) -> Mapping[str, Any]:
+    if draw is not None and not isinstance(draw, Mapping):
+        raise GymError(f'draw must be a table of keys, not {type(draw).__name__} "{shown(draw)}"')
+    return draw or {}
+
+
+def _read_draws(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Draw]]:
+    """Return fixed values and distributions by key, in alphabetical order."""
+    known = ("wind", "vehicle.body.mass_kg", *(f"start.{key}" for key in Start._fields))
+    fixed: dict[str, Any] = {}
+    draws: dict[str, Draw] = {}
+    for key in sorted(map(str, given)):
+        if key not in known and not key.startswith("vehicle."):
+            raise GymError(unknown("key of draw", key, known))
+        value = given[key]
+        try:
+            if isinstance(value, Mapping):
+                draws[key] = read_draw(f"draw: {key}", value)
+            else:
+                fixed[key] = value
+        except CampaignError as error:
+            raise GymError(str(error)) from None
+    starts = [(key, each) for key in draws if key.startswith("start.") for each in draws[key].typical]
+    for key, value in (*starts, *((key, value) for key, value in fixed.items() if key.startswith("start."))):
+        if not is_number(value):
+            raise GymError(f'draw: {key} must be a number, not "{shown(value)}"')
+    return fixed, draws
+
+
+def _wind(given: Any) -> Vector:
+    try:
+        wind = given if isinstance(given, Wind) else read_wind(str(given))
+    except ArgumentTypeError as error:
+        raise GymError(f"draw: wind: {error}") from None
+    if not isinstance(wind, Wind):
+        raise GymError(f'draw: wind must be constant, "5@270" say, not a file "{shown(given)}"')
+    return wind.velocity_enu_m_s
+
+
+def _within(name: str, given: Any, least: float, most: float, unit: str) -> None:
+    if not is_number(given) or not least <= given <= most:
+        raise GymError(f'{name} must be a number from {least:g} to {most:g} {unit}, not "{shown(given)}"')

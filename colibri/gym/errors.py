@@ -1,0 +1,7 @@
+"""The error of a learning environment."""
+
+from colibri.common.errors import Error
+
+
+class GymError(Error):
+    """An environment cannot be made or stepped as requested; the message names the keyword."""

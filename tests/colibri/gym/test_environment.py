@@ -1,0 +1,166 @@
+"""Learning environments: gymnasium's checker, equal bits in vectors of any size, snapshots, ends, refusals."""
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from colibri.common.errors import Error
+from colibri.gym import QuadrotorEnv, QuadrotorVectorEnv, GymTransition
+from colibri.plant.vehicle.description import load_vehicle
+
+_DRAW: dict[str, Any] = {"wind": {"choice": ["5@270", "2@0"]}, "vehicle.body.mass_kg": {"uniform": [0.6, 0.7]}}
+_STEPS = 60
+
+
+def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
+    """Return the bits of each row's observations, rewards and ends."""
+    env = QuadrotorVectorEnv(count, duration=0.16, **options)
+    actions = np.random.default_rng(5).uniform(-1.0, 1.0, (_STEPS, 4)).astype(np.float32)
+    actions[30:33, 2] = np.nan  # ends an episode before its time
+    parts = [[row.tobytes()] for row in env.reset(seed=seed)[0]]
+    for action in actions:
+        results = env.step(np.tile(action, (count, 1)))[:4]
+        for n, part in enumerate(parts):
+            part += [np.asarray(each[n]).tobytes() for each in results]
+    return [b"".join(part) for part in parts]
+
+
+@pytest.mark.parametrize(
+    "options", [{"id": "colibri/Hover-v0"}, {"id": "colibri/Track-v0", "action": "rates", "preview": 3}]
+)
+def test_checker_of_gymnasium_passes(options: dict[str, Any]) -> None:
+    env = gymnasium.make(**options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    assert isinstance(gymnasium.make_vec(options["id"], num_envs=2), QuadrotorVectorEnv)
+
+
+@pytest.mark.parametrize("options", [{}, {"action": "rates", "draw": _DRAW, "track": "circle:speed=3", "preview": 2}])
+def test_vectors_of_any_size_give_equal_bits(options: dict[str, Any]) -> None:
+    seven = _flown(7, 11, **options)
+    assert len(set(seven)) == 7
+    assert [_flown(1, 11 + n, **options)[0] for n in range(7)] == seven
+    assert _flown(64, 11, **options)[:7] == seven
+
+
+def test_one_vehicle_has_the_bits_of_a_vector() -> None:
+    one, several = QuadrotorEnv(draw=_DRAW), QuadrotorVectorEnv(3, draw=_DRAW)
+    seen, rows = one.reset(seed=6)[0], several.reset(seed=4)[0]
+    for k in range(40):
+        assert seen.tobytes() == rows[2].tobytes()
+        action = np.full((3, 4), 0.01 * k, dtype=np.float32)
+        seen, rows = one.step(action[2])[0], several.step(action)[0]
+
+
+def test_restored_episodes_continue_with_the_same_bits() -> None:
+    env = QuadrotorVectorEnv(3, duration=0.1, draw=_DRAW)
+    actions = np.zeros((3, 4), dtype=np.float32)
+    env.reset(seed=2)
+    env.step(actions)
+    kept = env.snapshot()
+    first = [env.step(actions)[0].tobytes() for _ in range(_STEPS)]  # beyond ends: draws are restored as well
+    other = QuadrotorVectorEnv(3, duration=0.1, draw=_DRAW)
+    for again in (env, other):
+        again.restore(kept)
+        assert [again.step(actions)[0].tobytes() for _ in range(_STEPS)] == first
+    with pytest.raises(Error, match="snapshot must come from"):
+        QuadrotorEnv().restore(kept)
+
+
+def test_a_simple_law_hovers_with_rates() -> None:
+    env = QuadrotorEnv(action="rates")
+    vehicle = load_vehicle("hummingbird")
+    seen, _ = env.reset(seed=3)
+    for _ in range(1500):
+        R = seen[6:15].reshape(3, 3).astype(float)
+        force = -4.0 * seen[:3] - 4.0 * seen[3:6] + np.array([0.0, 0.0, vehicle.gravity_m_s2])
+        tilt = R.T @ np.cross(R[:, 2], force / np.linalg.norm(force))
+        thrust = 2.0 * vehicle.body.mass_kg * (force @ R[:, 2]) / vehicle.max_wrench()[0] - 1.0
+        seen, reward, terminated, truncated, _ = env.step(np.array([thrust, tilt[0], tilt[1], 0.0], dtype=np.float32))
+        assert not terminated
+        assert not truncated
+    assert np.linalg.norm(seen[:3]) < 0.02
+    assert reward > 0.95
+
+
+@pytest.mark.parametrize(
+    ("action", "options", "why"),
+    [
+        (np.nan, {}, "action not finite"),
+        (np.inf, {"action": "rates"}, "action not finite"),
+        (-1.0, {}, "ground"),
+        (1.0, {"limit_m": 2.0}, "too far from the reference"),
+    ],
+)
+def test_episode_ends_and_says_why(action: float, options: dict[str, Any], why: str) -> None:
+    env = QuadrotorEnv(**options)
+    env.reset(seed=1)
+    for _ in range(1000):
+        seen, reward, terminated, _, info = env.step(np.full(4, action, dtype=np.float32))
+        assert env.observation_space.contains(seen)
+        if terminated:
+            break
+    assert (info["why"], reward) == (why, -10.0)
+    with pytest.raises(Error, match=r"reset\(\) is required"):
+        env.step(np.zeros(4, dtype=np.float32))
+
+
+def test_reward_can_be_replaced() -> None:
+    def height(now: GymTransition) -> Any:
+        return now.states[:, 8]
+
+    env = QuadrotorEnv(reward=height)
+    seen, _ = env.reset(seed=1)
+    seen, reward, *_ = env.step(np.zeros(4, dtype=np.float32))
+    assert reward == pytest.approx(2.0 + seen[2], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"action": "rate"}, 'unknown action "rate" (did you mean "rates"?)'),
+        ({"rat": 3}, 'unknown keyword "rat" (did you mean "rate"?)'),
+        ({"rate": float("nan")}, "rate must be a number from 10 to 1000 Hz"),
+        ({"duration": -1}, "duration must be a number"),
+        ({"preview": 1.5}, "preview must be a whole number"),
+        ({"max_rates": (1, 2)}, "max_rates must be three numbers"),
+        ({"reward": 3}, "reward must be a function"),
+        ({"vehicle": "humingbird"}, "humingbird"),
+        ({"track": "sprial"}, "sprial"),
+        ({"render_mode": "human"}, "render_mode must be None"),
+        ({"draw": [1]}, "draw must be a table"),
+        ({"draw": {"start.w": 1}}, 'unknown key of draw "start.w"'),
+        ({"draw": {"start.x": {"uniform": [2, 1]}}}, "empty range"),
+        ({"draw": {"start.x": "a"}}, "start.x must be a number"),
+        ({"draw": {"start.z": -3.0}}, "below the ground"),
+        ({"draw": {"wind": "fast"}}, "draw: wind"),
+        ({"draw": {"vehicle.body.mass": 1.0}}, "body.mass"),
+    ],
+)
+def test_wrong_keywords_get_one_line(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(Error) as refused:
+        QuadrotorEnv(**options)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_wrong_actions_and_seeds_get_one_line() -> None:
+    one, several = QuadrotorEnv(), QuadrotorVectorEnv(2)
+    one.reset(seed=0)
+    several.reset(seed=0)
+    with pytest.raises(Error, match="must have the shape"):
+        one.step(np.zeros(3, dtype=np.float32))
+    with pytest.raises(Error, match="must have the shape"):
+        several.step(np.zeros((1, 4), dtype=np.float32))
+    with pytest.raises(Error, match="seed must be"):
+        several.reset(seed=[1])
+    wrong: list[Any] = [-1, 1.5, True, "a"]
+    for seed in wrong:
+        for reset in (one.reset, several.reset):
+            with pytest.raises(Error, match="seed must be"):
+                reset(seed=seed)
