@@ -5,3 +5,7 @@ from colibri.common.errors import Error
 
 class GymError(Error):
     """An environment cannot be made or stepped as requested; the message names the keyword."""
+
+
+class GymImportError(GymError, ImportError):
+    """A package of the extra `gym` is missing."""

@@ -25,6 +25,7 @@ PACKAGES = (
     "colibri.certification",
     "colibri.cli",
     "colibri.doctor",
+    "colibri.gym",
     "colibri.lpv",
     "colibri.studies",
     "colibri.verification",

@@ -1,6 +1,8 @@
 """Learning environments: gymnasium's checker, equal bits in vectors of any size, snapshots, ends, refusals."""
 
+import sys
 import warnings
+from importlib import import_module
 from typing import Any
 
 import gymnasium
@@ -9,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from colibri.common.errors import Error
-from colibri.gym import QuadrotorEnv, QuadrotorVectorEnv, GymTransition
+from colibri.gym import GymTransition, QuadrotorEnv, QuadrotorVectorEnv
 from colibri.plant.vehicle.description import load_vehicle
 
 _DRAW: dict[str, Any] = {"wind": {"choice": ["5@270", "2@0"]}, "vehicle.body.mass_kg": {"uniform": [0.6, 0.7]}}
@@ -147,6 +149,13 @@ def test_wrong_keywords_get_one_line(options: dict[str, Any], message: str) -> N
         QuadrotorEnv(**options)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_missing_gymnasium_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "colibri.gym")
+    with pytest.raises(ImportError, match=r"pip install 'colibri-sitl\[gym\]'"):
+        import_module("colibri.gym")
 
 
 def test_wrong_actions_and_seeds_get_one_line() -> None:
