@@ -7,10 +7,11 @@ vehicle that is quicker than its file, but not one that is twice as slow.
 import csv
 import io
 import tomllib
-from math import cos, isfinite, pi, radians, sin, sqrt
+from math import isfinite, pi, radians, sqrt
 from typing import Literal, NamedTuple, TypeAlias
 
 from colibri.common.config import SettingsError, read_settings
+from colibri.common.elementary import cos, sin
 from colibri.plant.vehicle.description import Vehicle, VehicleError, vehicle_names, vehicle_text
 
 Layout: TypeAlias = Literal["x", "+", "h"]
