@@ -155,6 +155,20 @@ def test_an_impossible_track_is_followed_upright(lap_s: float, count: int, lasts
     assert max(it.z_m.max() for it in flown) < 4.5
 
 
+def test_agile_flies_a_vertical_loop() -> None:
+    """Radius 1 m at 4 rad/s, 1.6 g: thrust points down at the top."""
+
+    def loop(t: float) -> tuple[float, float, float]:
+        angle = 0.5 * t**2 if t < 4.0 else 4.0 * (t - 2.0)
+        return float(np.sin(angle)), 0.0, 8.0 - float(np.cos(angle))
+
+    flown = colibri.fly(loop, profile="agile", link="direct", duration=8.28)  # ends upright
+    upright = np.cos(flown.samples["phi"]) * np.cos(flown.samples["theta"])
+    assert upright.min() < np.cos(np.radians(150.0))
+    assert flown.lost is None
+    assert flown.report["max_error_m"] < 0.5
+
+
 def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
     fly(tmp_path, "hover:height=1.5", "--link", "memory", "--duration", "8", "--start", "x=0,y=0,z=0,rotors=0")
     flown = rows(tmp_path / "flight.csv")
