@@ -7,9 +7,9 @@ from colibri.autopilot.commander.rules.modes import Mode as FlightMode
 from colibri.autopilot.commander.rules.modes import custom_mode
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import Stations
-from colibri.common.errors import unknown
+from colibri.autopilot.process.planned_events import station_events
 from colibri.mavlink.client.conversation import Encoded
-from colibri.mavlink.client.events import EventError, Mode, Setpoint, StationEvent
+from colibri.mavlink.client.events import Setpoint
 from colibri.mavlink.client.setpoints import position_target
 from colibri.mavlink.streaming.rates import SILENT
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, mav
@@ -21,15 +21,6 @@ _SETPOINTS_EVERY_US = 50_000
 _NEVER_US = 1 << 62
 _BEGINS_WITHIN_US = 5_000_000
 """A flight's first estimate; sensors are aligned for a second."""
-
-
-def station_events(events: Iterable[object]) -> tuple[StationEvent, ...]:
-    """Return the events that a ground station sends; unknown modes raise EventError."""
-    found = tuple(event for event in events if isinstance(event, StationEvent))
-    for event in found:
-        if isinstance(event, Mode) and event.mode not in set(FlightMode):
-            raise EventError(unknown("mode", event.mode, FlightMode))
-    return found
 
 
 class StationEvents:

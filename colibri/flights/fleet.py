@@ -7,7 +7,7 @@ from time import perf_counter, time
 from typing import Any
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.process.station_events import station_events
+from colibri.autopilot.process.planned_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.earth.home import HomePlace

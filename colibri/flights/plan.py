@@ -11,6 +11,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import Track, position
+from colibri.autopilot.process.planned_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, name_of
 from colibri.common.errors import Error, checked
 from colibri.common.spec import part_of
@@ -211,7 +212,6 @@ class FlightPlan:
 def _sent(spec: FlightSpec) -> tuple[StationEvent, ...]:
     if not spec.gcs:
         return ()
-    from colibri.autopilot.process.station_events import station_events  # slow to load
 
     return station_events(spec.events)
 

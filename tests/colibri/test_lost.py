@@ -155,7 +155,7 @@ def test_numbers_of_the_report_have_limits(tmp_path: Path, refused: Refused) -> 
 
 
 def test_every_number_that_may_have_a_limit_is_in_the_report(tmp_path: Path) -> None:
-    options = ("--link", "memory", "--duration", "21", "--feedback", "sensors")
+    options = ("--link", "memory", "--duration", "21", "--feedback", "sensors", "--window", "5:20")
     report = fly(tmp_path, "hover", *options)
     assert exceeded([ReportLimit(key, 1e9) for key in KEYS], report) == []
     assert len(exceeded([ReportLimit(key, -1.0) for key in KEYS], report)) == len(KEYS)

@@ -90,7 +90,7 @@ def cost(
     f[:] = 0.0
     for step in problem.counted:
         used = inputs * _blocks(problem.starts, step)
-        _add_motion(motion, responses, step, target, problem.weights, used, row, H, f)
+        _add_motion(motion, responses, step, target, problem, used, row, H, f)
         if problem.weights.tilt > 0.0 or problem.weights.thrust > 0.0:
             _add_demand(motion[step], speeds[step], responses[step], step, target, problem, used, row, H, f)
     _add_terminal(motion[-1], speeds[-1], responses[-1], target, problem, H, f)
@@ -114,7 +114,7 @@ def _add_motion(
     responses: Array,
     n: int,
     target: PlanReferences,
-    weights: CostWeights,
+    problem: Problem,
     used: int,
     row: Array,
     H: Array,
@@ -124,6 +124,7 @@ def _add_motion(
 
     One loop over all rows: loading an element of H takes as long as adding one row.
     """
+    weights = problem.weights
     on_place, on_velocity, on_rate, on_heading = weights.position, weights.velocity, weights.rate, weights.heading
     x, X = motion[n], responses[n]
     p0, p1, p2 = x[0] - target.position[n, 0], x[1] - target.position[n, 1], x[2] - target.position[n, 2]
@@ -133,7 +134,8 @@ def _add_motion(
     cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
     s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
     heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
-    on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
+    if problem.min_cos_tilt < -1.0:
+        on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
     for k in range(used):
         row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
     for k in range(used):
@@ -157,7 +159,7 @@ def _add_demand(
     H: Array, f: Array,
 ) -> None:  # fmt: skip
     weights = problem.weights
-    away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])))
+    away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])), problem)
     for i in range(2):
         _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
     thrust = -target.thrusts_n[step]
@@ -183,9 +185,11 @@ def _nearest(angle: float) -> float:
 
 
 @compiled
-def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
+def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...], problem: Problem) -> Array:
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
+    if problem.min_cos_tilt >= -1.0:
+        return error
     c = -0.5
     for i in range(3):
         c += 0.5 * (wanted[0, i] * R[0][i] + wanted[1, i] * R[1][i] + wanted[2, i] * R[2][i])
@@ -206,7 +210,7 @@ def _add_terminal(
     steps, moved = target.rates.shape[0], X.shape[1]
     inputs = moved // problem.levels.shape[0]
     R = rotation_matrix((x[6], x[7], x[8], x[9]))
-    away = _rotation_error(target.attitudes[steps], R)
+    away = _rotation_error(target.attitudes[steps], R, problem)
     error, E = np.zeros(STATES), np.zeros((STATES, moved))
     for i in range(3):
         for j in range(3):

@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from colibri.autopilot.process.station_events import station_events
+from colibri.autopilot.process.planned_events import station_events
 from colibri.autopilot.spec import AutopilotSpec, LawSpec
 from colibri.common.earth.home import DEFAULT_HOME, HomePlace
 from colibri.common.earth.home import home as read_home
