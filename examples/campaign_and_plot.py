@@ -1,7 +1,7 @@
 """Compare two control laws over vehicles of unknown mass, on all cores, and save table and figure in out/campaign.
 
 Prints:
-    lpv-mpc: 0.172 m, 2 flights
+    lpv-mpc: 0.174 m, 2 flights
     geometric-se3: 0.345 m, 2 flights
 """
 

@@ -2,8 +2,8 @@
 
 Prints:
     lost: None
-    position error, RMS after 20 s: 0.371 m
-    hash of the trajectory: 911430dd427cfa82
+    position error, RMS after 20 s: 0.370 m
+    hash of the trajectory: 2fbcf5c2fd37b99c
 """
 
 import colibri
