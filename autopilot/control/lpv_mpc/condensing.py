@@ -54,7 +54,7 @@ class Problem(NamedTuple):
     terminal: Array  # S on the error at the end, (16, 16), symmetric
     allocation: Array  # thrust of each rotor at its largest speed, N, (4,)
     levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
-    min_cos_tilt: float
+    min_cos_tilt: float  # of the soft limit; below -1: none, and attitude errors beyond 90° count whole
     max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance
-from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force, overcome_drag
+from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limit_force, overcome_drag
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
@@ -22,7 +22,6 @@ from colibri.common.types import Array
 
 HEADING_ABOVE = 0.3  # least vertical part of body z at which the yaw has a meaning
 _TWIST_RAD_S = 4.0  # of the return to it
-_LEAST_N = 1e-9
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
 
@@ -176,7 +175,7 @@ def stand_along(rigid: Array, yaw_rad: Array, limits: ForceLimits, interval_s: f
         if total < limits.min_up_n:
             for i in range(3):
                 ahead[i] = force[i] + (limits.min_up_n - total) * ahead[i]
-            length = max(norm(ahead), _LEAST_N)
+            length = max(norm(ahead), LEAST_N)
             total = max(dot(force, ahead) / length, limits.min_n)
             for i in range(3):
                 force[i] = total * ahead[i] / length

@@ -134,7 +134,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self._now = packed(Now(np.empty(RIGID), np.empty(ROTORS), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
-        self.agile = max_tilt_deg > 90.0
+        self._agile = max_tilt_deg > 90.0
         self._model_kg = self._mpc.model["airframe"]["mass_kg"]
 
     def warm_up(self) -> None:
@@ -226,7 +226,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
-        if not (self.agile and inputs.airborne):
+        if not (self._agile and inputs.airborne):
             most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
             planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None

@@ -10,7 +10,7 @@ from colibri.common.jit import compiled
 from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
-_LEAST_N = 1e-9
+LEAST_N = 1e-9  # below, a force has no direction
 _DRAG_PASSES = 2  # drag depends on the direction of the force against it
 
 
@@ -50,7 +50,7 @@ def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, fo
         put(force, free)
         limit_force(force, limits)
         for _ in range(_DRAG_PASSES):
-            thrust = max(norm(force), _LEAST_N)
+            thrust = max(norm(force), LEAST_N)
             up = (force[0] / thrust, force[1] / thrust, force[2] / thrust)
             drag = drag_force(airframe, velocities[n], up, thrust)
             for i in range(3):
