@@ -10,7 +10,7 @@ Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
 """w, x, y, z."""
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
-FourRotors: TypeAlias = tuple[float, float, float, float]
-"""One number per rotor."""
+PerRotor: TypeAlias = tuple[float, ...]
+"""One number per rotor, 3 to 8."""
 Address: TypeAlias = tuple[str, int]
 """Host and port."""

@@ -14,7 +14,7 @@ import msgspec
 from colibri.common.config import plain, read_toml
 from colibri.common.errors import shown, unknown
 from colibri.common.process.arguments import number
-from colibri.common.types import FourRotors
+from colibri.common.types import Vector
 from colibri.mavlink.client.events import EventError, Mode, Setpoint, StationEvent, TimedEvent
 from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.faults import Equipment, Fault
@@ -67,7 +67,7 @@ class Failure(TimedEvent, frozen=True, tag="failure"):
     @property
     def change(self) -> Fault:
         a, b, c, d = (*self.values, 0.0, 0.0, 0.0, 0.0)[:4]
-        values: FourRotors = (a, b, c, d)
+        values = (a, b, c, d)
         unit, kind = _number("FAILURE_UNIT", self.unit), _number("FAILURE_TYPE", self.type)
         return Fault(unit, kind, self.instance, values)
 

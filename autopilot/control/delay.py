@@ -12,12 +12,11 @@ from colibri.autopilot.control.vehicle_model import motion
 from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
 from colibri.common.jit import packed
 from colibri.common.kernels import exp
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_DELAY_US = 200_000  # longer delays are compensated as this one
-NO_ROTORS = (0.0, 0.0, 0.0, 0.0)
 _MEDIAN_OF = 25
 _WORTH_US = 1_000  # a smaller change of the measured delay is ignored: references must not jitter
 _CONTINUES_US = 100_000  # after a longer gap the rotors restart at their commands and the disturbance at zero
@@ -35,9 +34,9 @@ class DelayCompensation:
         self._declared_s: float | None = None
         self.declare(declared_s)
         self.adopt(vehicle)
-        self.begin(NO_ROTORS)
-        x = np.zeros(motion.STATES)
-        motion.carry(x, np.zeros(1), np.zeros((1, 4)), self._disturbance, 1.0, self._model)
+        self.begin(vehicle.rotors.stopped)
+        x = np.zeros(motion.RIGID + vehicle.rotors.count)
+        motion.carry(x, np.zeros(1), np.zeros((1, vehicle.rotors.count)), self._disturbance, 1.0, self._model)
         motion.thrust_n(x[motion.ROTORS], self._model)
 
     def adopt(self, vehicle: Vehicle) -> None:
@@ -54,7 +53,7 @@ class DelayCompensation:
             self._median_us = median_us
             self._choose()
 
-    def begin(self, controls: FourRotors, *, rests: bool = False) -> None:
+    def begin(self, controls: PerRotor, *, rests: bool = False) -> None:
         """Start with the rotors at `controls`; a vehicle at rest stays until they lift it."""
         self._sent = deque([ActuatorCommand(0, controls, armed=any(controls))])
         self._known: tuple[int, Array] | None = None  # time, µs, and x of the previous frame
@@ -127,12 +126,11 @@ class DelayCompensation:
                 acting.append(it)
         return acting
 
-    def _speeds(self, command: ActuatorCommand) -> FourRotors:
-        if not command.armed:
-            return NO_ROTORS
+    def _speeds(self, command: ActuatorCommand) -> PerRotor:
         rotors = self._vehicle.rotors
-        a, b, c, d = (max(control * rotors.max_speed, rotors.idle_speed) for control in command.controls)
-        return (a, b, c, d)
+        if not command.armed:
+            return rotors.stopped
+        return tuple(max(control * rotors.max_speed, rotors.idle_speed) for control in command.controls)
 
 
 def _frame(time_us: int, x: Array) -> StateFrame:

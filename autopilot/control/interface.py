@@ -14,7 +14,7 @@ import numpy as np
 
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.rotations import earth_from_body
-from colibri.common.types import Array, FourRotors, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Quaternion, Vector
 
 Clock: TypeAlias = Callable[[], float]  # seconds, to measure durations; a decision must not depend on it
 Memory = TypeVar("Memory")
@@ -88,7 +88,7 @@ class VehicleState(NamedTuple):
     euler: Vector
     rate_flu_rad_s: Vector
     acceleration_enu_m_s2: Vector = _ZERO
-    rotor_speeds: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    rotor_speeds: PerRotor = (0.0, 0.0, 0.0, 0.0)
     airborne: bool = True
 
     @property

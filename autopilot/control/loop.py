@@ -40,7 +40,7 @@ from colibri.common.config import SettingsError
 from colibri.common.errors import Error
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
-from colibri.common.types import Array, FourRotors, Vector
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
@@ -60,10 +60,10 @@ class LoopRecord(NamedTuple):
     """State of a control loop to resume after a restart, as plain data."""
 
     yaw_rad: float  # unwrapped
-    controls: tuple[float, float, float, float]  # rotor speeds, in parts of the largest
+    controls: PerRotor  # rotor speeds, in parts of the largest
     memory: bytes  # the control law's, serialised; empty if it is not plain data
     seen: Seen
-    rotor_speeds: FourRotors  # of the model, vehicle's unit
+    rotor_speeds: PerRotor  # of the model, vehicle's unit
 
 
 class ControlLoop:
@@ -88,8 +88,8 @@ class ControlLoop:
         self._is_plain = True
         self._yaw_rad = 0.0
         self._seen = _UNSEEN
-        self._speeds: FourRotors = (0.0, 0.0, 0.0, 0.0)  # of the rotors' model at the next control sample
-        self.controls = (0.0, 0.0, 0.0, 0.0)  # rotor speeds now, in parts of the largest
+        self._speeds = vehicle.rotors.stopped  # of the rotors' model at the next control sample
+        self.controls = vehicle.rotors.stopped  # rotor speeds now, in parts of the largest
 
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
         """Begin at a rotor speed (vehicle's unit) and yaw; `afresh` resets the charge to the battery's report."""
@@ -98,8 +98,8 @@ class ControlLoop:
             charge_ah = self._reported_ah if afresh or before is None else self._charged.charge_ah(before)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
         self._yaw_rad, self._seen = yaw_rad, _UNSEEN
-        self._speeds = (rotor_speed, rotor_speed, rotor_speed, rotor_speed)
-        self._command(np.full(4, rotor_speed))
+        self._speeds = (rotor_speed,) * self.vehicle.rotors.count
+        self._command(np.full(self.vehicle.rotors.count, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
         """Restart at hover speed; keep charge, mass and lag."""
@@ -236,17 +236,13 @@ class ControlLoop:
         return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
 
     def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
-        maximum = self.vehicle.rotors.max_speed
-        a, b, c, d = check_rotor_speeds(self._name, rotor_speeds, maximum, time_us)
-        self.controls = (a / maximum, b / maximum, c / maximum, d / maximum)
+        rotors = self.vehicle.rotors
+        speeds, maximum = check_rotor_speeds(self._name, rotor_speeds, rotors, time_us), rotors.max_speed
+        self.controls = tuple([speed / maximum for speed in speeds])
         if self._reads_motion:
-            (up, down), (i, j, k, m) = self._lag, self._speeds
-            self._speeds = (
-                i + (a - i) * (up if a > i else down),
-                j + (b - j) * (up if b > j else down),
-                k + (c - k) * (up if c > k else down),
-                m + (d - m) * (up if d > m else down),
-            )
+            up, down = self._lag
+            moving = zip(self._speeds, speeds, strict=True)
+            self._speeds = tuple([now + (to - now) * (up if to > now else down) for now, to in moving])
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

@@ -17,8 +17,8 @@ from colibri.autopilot.control.law_files import full_name, is_place, law_at
 from colibri.autopilot.control.settings import current_name
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError, checked, unknown
-from colibri.common.types import Array, FourRotors
-from colibri.plant.vehicle.description import Vehicle
+from colibri.common.types import Array, PerRotor
+from colibri.plant.vehicle.description import Rotors, Vehicle
 
 GROUP = "colibri.controllers"
 DEFAULT = "cascade"
@@ -169,13 +169,15 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
     )
 
 
-def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
-    speeds = np.asarray(rotor_speeds).tolist()
-    if isinstance(speeds, list) and len(speeds) == 4:
-        a, b, c, d = speeds
-        if 0.0 <= a <= max_speed and 0.0 <= b <= max_speed and 0.0 <= c <= max_speed and 0.0 <= d <= max_speed:
-            return (a, b, c, d)
+def check_rotor_speeds(name: str, rotor_speeds: Array, rotors: Rotors, time_us: int | None = None) -> PerRotor:
+    speeds, max_speed = np.asarray(rotor_speeds).tolist(), rotors.max_speed
+    if isinstance(speeds, list) and len(speeds) == len(rotors.position_m):
+        for speed in speeds:
+            if not 0.0 <= speed <= max_speed:
+                break
+        else:
+            return tuple(speeds)
     when = "" if time_us is None else f" at t = {time_us / 1e6:.3f} s"
     raise DecisionError(
-        f"controller {name} gave rotor speeds {rotor_speeds}{when}: expected four from 0 to {max_speed:g}"
+        f"controller {name} gave rotor speeds {rotor_speeds}{when}: expected {rotors.count} from 0 to {max_speed:g}"
     )

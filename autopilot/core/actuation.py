@@ -6,10 +6,9 @@ from colibri.autopilot.control.registry import check_rotor_speeds
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.defence.descent import Descent
 from colibri.autopilot.core.defence.plain_law import PlainLaw
-from colibri.autopilot.core.step import STILL
 from colibri.autopilot.guidance.guidance import RESTS, Guidance
-from colibri.common.types import FourRotors
-from colibri.plant.vehicle.description import Vehicle
+from colibri.common.types import PerRotor
+from colibri.plant.vehicle.description import Rotors, Vehicle
 
 
 class SolveTime:
@@ -21,10 +20,10 @@ class SolveTime:
         missed: Number of decisions that took longer than a control interval.
     """
 
-    def __init__(self, interval_us: int) -> None:
+    def __init__(self, interval_us: int, stopped: PerRotor) -> None:
         self._interval_us = interval_us
         self._ready_us: int | None = None
-        self._next = self._now = STILL
+        self._next = self._now = stopped
         self.missed = 0
 
     def busy(self, now_us: int) -> bool:
@@ -32,17 +31,17 @@ class SolveTime:
         self.controls(now_us)
         return self._ready_us is not None
 
-    def decided(self, controls: FourRotors, now_us: int, solve_us: int) -> None:
+    def decided(self, controls: PerRotor, now_us: int, solve_us: int) -> None:
         """Set the command of the sample at `now_us`, in effect after `solve_us`."""
         if solve_us > self._interval_us:
             self.missed += 1
         self._next, self._ready_us = controls, now_us + solve_us
 
-    def at_once(self, controls: FourRotors) -> None:
+    def at_once(self, controls: PerRotor) -> None:
         """Set a command that needs no solving; a decision that is being made is dropped."""
         self._now, self._ready_us = controls, None
 
-    def controls(self, now_us: int) -> FourRotors:
+    def controls(self, now_us: int) -> PerRotor:
         """Return the command that holds now."""
         if self._ready_us is not None and now_us >= self._ready_us:
             self._now, self._ready_us = self._next, None
@@ -63,11 +62,12 @@ class Actuation:
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss) -> None:
         """Command by the control law of `loop`, and by `rotor_loss` once a rotor is lost."""
         self._loop, self._rotor_loss = loop, rotor_loss
+        self._stopped = loop.vehicle.rotors.stopped
         self.adopt(loop.vehicle)
         self.by_plain_law = False
         self.descent: Descent | None = None
-        self._solving = SolveTime(loop.control_interval_us)
-        self.sent = STILL
+        self._solving = SolveTime(loop.control_interval_us, self._stopped)
+        self.sent = self._stopped
         self.decision: Decision | None = None
         self.solve_time_s = 0.0
 
@@ -80,23 +80,22 @@ class Actuation:
         """Have a plain law for other numbers of the vehicle."""
         self.plain = PlainLaw(vehicle, self._loop.control_interval_us * 1e-6)
 
-    def begin(self, controls: FourRotors) -> None:
+    def begin(self, controls: PerRotor) -> None:
         """Begin with the rotors turning at `controls`."""
         self.sent = controls
         self._solving.at_once(controls)
         self._rotor_loss.begin(controls)
 
-    def send(self, now_us: int) -> FourRotors:
+    def send(self, now_us: int) -> PerRotor:
         """Return the command to send at `now_us`."""
         self.sent = self._solving.controls(now_us)
         return self.sent
 
-    def turning(self, now_us: int, *, armed: bool) -> FourRotors:
+    def turning(self, now_us: int, *, armed: bool) -> PerRotor:
         """Return how the rotors turn at `now_us`, idling at the least while armed, parts of the largest speed."""
         rotors = self._loop.vehicle.rotors
         minimum = rotors.idle_speed / rotors.max_speed if armed else 0.0
-        c1, c2, c3, c4 = self._solving.controls(now_us)
-        return max(c1, minimum), max(c2, minimum), max(c3, minimum), max(c4, minimum)
+        return tuple([max(control, minimum) for control in self._solving.controls(now_us)])
 
     def decide(
         self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float
@@ -123,8 +122,8 @@ class Actuation:
             self.decision = self.plain.step_attitude(state, guidance.attitude)
         else:
             self.decision = None
-        vehicle = self._loop.vehicle
-        self._solving.at_once(STILL if self.decision is None else controls_of(self.decision, vehicle.rotors.max_speed))
+        decision, rotors = self.decision, self._loop.vehicle.rotors
+        self._solving.at_once(self._stopped if decision is None else controls_of(decision, rotors))
         return self.decision
 
     def _decide(
@@ -144,19 +143,18 @@ class Actuation:
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._solving.at_once(STILL)
+            self._solving.at_once(self._stopped)
             return None
         self._solving.decided(loop.controls, now_us, round(solve_time_s * 1e6))
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
 
-def controls_of(decision: Decision, max_speed: float) -> FourRotors:
+def controls_of(decision: Decision, rotors: Rotors) -> PerRotor:
     """Return the command of a decision of the plain law, parts of the largest speed.
 
     Raises:
         DecisionError: No rotor can follow it.
     """
-    check_rotor_speeds("plain law", decision.rotor_speeds, max_speed)
-    c1, c2, c3, c4 = (decision.rotor_speeds / max_speed).tolist()
-    return c1, c2, c3, c4
+    check_rotor_speeds("plain law", decision.rotor_speeds, rotors)
+    return tuple((decision.rotor_speeds / rotors.max_speed).tolist())

@@ -3,7 +3,6 @@
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.core.checkpoint import Checkpointer, History, goes_on
 from colibri.autopilot.core.parts import Parts
-from colibri.autopilot.core.step import STILL
 from colibri.autopilot.core.supervision import Supervision
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.services.statustext import INFO, WARNING
@@ -59,7 +58,8 @@ class FlightStart:
             parts.tasks.forget_first()
         self._supervision.listen(frame.time_us)
         self._checkpointer.resume(history, frame, parts.tasks.again)
-        parts.actuation.begin(parts.loop.controls if pilot.state.armed and not pilot.ground.idles else STILL)
+        turns, stopped = pilot.state.armed and not pilot.ground.idles, parts.loop.vehicle.rotors.stopped
+        parts.actuation.begin(parts.loop.controls if turns else stopped)
         parts.stations.say(INFO, parts.stations.system.banner)
         if not pilot.state.armed:
             return
@@ -77,7 +77,7 @@ class FlightStart:
         delay_us = parts.delay.delay_us
         parts.pilot.begin(frame.time_us, loop.observe(frame), mode=mode, rests=rests, delay_us=delay_us)
         parts.rotor_loss.forget()
-        parts.actuation.begin(STILL if parts.pilot.ground.standing else loop.controls)
+        parts.actuation.begin(loop.vehicle.rotors.stopped if parts.pilot.ground.standing else loop.controls)
         parts.pilot.readiness.trust_rotors()
         self._catch(frame.time_us)
         parts.stations.say(INFO, parts.stations.system.banner)

@@ -9,11 +9,7 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ActuatorCommand
-
-STILL = (0.0, 0.0, 0.0, 0.0)
-"""Rotors that stand."""
-
+from colibri.mavlink.hil.state import ROTORS, ActuatorCommand
 
 MISSED_US = 100_000
 """How long frames may be missing while the model of the rotors still holds, more or less."""
@@ -44,7 +40,7 @@ class Step(NamedTuple):
 
 def nothing_known(time_us: int, duration_s: float) -> Step:
     """Return the answer to a frame before the first estimate."""
-    return Step(ActuatorCommand(time_us, STILL, armed=False), None, duration_s, known=False)
+    return Step(ActuatorCommand(time_us, (0.0,) * ROTORS, armed=False), None, duration_s, known=False)
 
 
 class Steps(Protocol):

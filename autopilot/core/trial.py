@@ -42,7 +42,7 @@ class VehicleTrial:
         """
         loop, interval_s = self._loop, self._loop.control_interval_us * 1e-6
         self._rotor_loss.try_out(vehicle)
-        controls_of(PlainLaw(vehicle, interval_s).by_velocity(AT_REST, np.zeros(3)), vehicle.rotors.max_speed)
+        controls_of(PlainLaw(vehicle, interval_s).by_velocity(AT_REST, np.zeros(3)), vehicle.rotors)
         Forecaster(vehicle, interval_s, loop.plan_columns)
         if loop.takes_attitude:
             attitude = AttitudeReference(vehicle, loop.preview)

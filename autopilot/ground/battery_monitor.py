@@ -5,7 +5,7 @@ from math import nan
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, estimated
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 from colibri.mavlink.hil.plant_status import PlantBattery
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState
 from colibri.plant.vehicle.description import Vehicle
@@ -29,7 +29,7 @@ class BatteryMonitor:
         self.battery = vehicle.battery
         self._cells = 0 if vehicle.battery is None else max(1, round(vehicle.battery.full_voltage_v / _CELL_V))
         self.energy_wh = 0.0
-        self._now = self._model.terminal(0.0, np.zeros(4))
+        self._now = self._model.terminal(0.0, np.zeros(vehicle.rotors.count))
         self._vehicle = vehicle
         self._is_reported = False
         self._sag_v = 0.0
@@ -50,9 +50,9 @@ class BatteryMonitor:
         if self._is_reported:
             return
         self.charge_ah = charge_ah
-        self._now = self._model.terminal(charge_ah, np.zeros(4))
+        self._now = self._model.terminal(charge_ah, np.zeros(self._vehicle.rotors.count))
 
-    def run(self, controls: FourRotors, duration_s: float) -> None:
+    def run(self, controls: PerRotor, duration_s: float) -> None:
         """Integrate with `controls` relative to top speed."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah = charged(self.charge_ah, current_a, duration_s)

@@ -19,7 +19,7 @@ from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.guidance.guidance import Guidance
 from colibri.common.compiled_rotations import quaternion_from_euler
-from colibri.common.types import Array, FourRotors, Vector
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.telemetry.snapshot import (
     NO_SETPOINT,
     NOT_SOLVED,
@@ -65,7 +65,7 @@ class SnapshotBuilder:
         guidance: Guidance,
         decision: Decision | None,
         duration_s: float,
-        controls: FourRotors,
+        controls: PerRotor,
         battery: BatteryState | None,
         fence: Fence,
         state_source: StateSource,
@@ -78,7 +78,6 @@ class SnapshotBuilder:
         vx, vy, vz = velocity = state.velocity_enu_m_s
         (ux, uy, uz), self._velocity, dt = self._velocity or velocity, velocity, self._interval_s
         speed = self._max_speed_rad_s
-        c1, c2, c3, c4 = controls
         return TelemetrySnapshot(
             time_us=now_us,
             armed=armed,
@@ -101,7 +100,7 @@ class SnapshotBuilder:
             fence_enabled=fence.exists,
             fence_breached=breached,
             home=HomePosition(home.position_enu_m, home.yaw_rad),
-            rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
+            rotor_speeds_rad_s=tuple([control * speed for control in controls]),
             controls=controls,
             battery=battery,
             setpoint=setpoint(guidance, decision, controls),
@@ -160,11 +159,10 @@ def _comes_down(pilot: Pilot, state: VehicleState) -> bool:
     return height_m < _NEAR_GROUND_M and reference is not None and float(reference.motion[1, 2]) < _SINKING_M_S
 
 
-def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors) -> Setpoint:
+def setpoint(guidance: Guidance, decision: Decision | None, controls: PerRotor) -> Setpoint:
     if decision is None:
         return NO_SETPOINT
-    c1, c2, c3, c4 = controls
-    thrust = (c1 * c1 + c2 * c2 + c3 * c3 + c4 * c4) / len(controls)
+    thrust = sum([control * control for control in controls]) / len(controls)
     attitude = quaternion_from_euler(*decision.attitude_reference)
     if guidance.horizon is None:
         # for small tilt the rates of the angles are those of the body

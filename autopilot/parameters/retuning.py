@@ -156,16 +156,16 @@ def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
     memory = controller.initial(vehicle.hover_speed)
     for sample, state in enumerate(_TRIED):
         memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
-        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)
     if isinstance(controller, AttitudeController):
         thrust_n = np.full(controller.preview.samples, vehicle.body.mass_kg * vehicle.gravity_m_s2)
         time_us = len(_TRIED) * controller.control_interval_us
         level = AttitudeDemand(references.position_enu_m, references.velocity_enu_m_s, thrust_n)
         _, decision = controller.step_attitude(memory, time_us, AT_REST, level)
-        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)
     if isinstance(controller, PathController) and controller.min_path_speed < 1.0:
         for sample in range(2):  # the second with a plan
             memory, decision = controller.step_on_path(
                 memory, sample * controller.control_interval_us, AT_REST, references
             )
-            check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+            check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors)

@@ -103,11 +103,15 @@ def limit_checks(subject: Subject) -> Iterator[Row]:
 
 def out_of_limits(subject: Subject, decision: Decision) -> str:
     """Describe an invalid part of a decision."""
-    speeds = decision.rotor_speeds
-    if not isinstance(speeds, np.ndarray) or speeds.shape != (4,) or not np.issubdtype(speeds.dtype, np.floating):
-        return f"rotor_speeds is not an array of four floats: {speeds!r}"
+    speeds, rotors = decision.rotor_speeds, subject.vehicle.rotors
+    if (
+        not isinstance(speeds, np.ndarray)
+        or speeds.shape != (rotors.count,)
+        or not np.issubdtype(speeds.dtype, np.floating)
+    ):
+        return f"rotor_speeds is not an array of {rotors.count} floats: {speeds!r}"
     try:
-        check_rotor_speeds(subject.name, speeds, subject.max_speed)
+        check_rotor_speeds(subject.name, speeds, rotors)
         angles, plan = np.array(decision.attitude_reference, dtype=float), decision.diagnostics.predicted
         if plan is not None and not np.isfinite(plan).all():
             return "diagnostics.predicted is not finite"

@@ -48,10 +48,6 @@ class Subject:
     def name(self) -> str:
         return self.profile.controller
 
-    @property
-    def max_speed(self) -> float:
-        return self.vehicle.rotors.max_speed
-
     def start(self, **changed: float) -> dict[str, float]:
         """Return a start at rest in hover 2 m above the origin, with changes."""
         rpm = self.vehicle.hover_speed / self.vehicle.speed_from_rpm(1.0)

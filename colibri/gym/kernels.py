@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
 
@@ -130,7 +130,7 @@ def advance(
 
 
 @compiled
-def _rate_targets(x: Array, action: Array, parameters: Packed, mixer: Array, scale: Array) -> FourRotors:
+def _rate_targets(x: Array, action: Array, parameters: Packed, mixer: Array, scale: Array) -> PerRotor:
     """Return rotor speeds for thrust and body rates: proportional, with the gyroscopic moment compensated."""
     p, q, r = x[3], x[4], x[5]
     inertia = parameters[0].inertia_kg_m2

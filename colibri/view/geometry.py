@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.common.types import Array, FourRotors, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Quaternion, Vector
 from colibri.view.snapshot import Mark, Surroundings, VehicleShape, Zone
 
 Colour: TypeAlias = tuple[int, int, int]
@@ -36,13 +36,12 @@ def rotor_colour(part: float) -> Colour:
     return red, green, blue
 
 
-def blade_angles(rotors: FourRotors, spins: FourRotors, before_rad: FourRotors, elapsed_s: float) -> FourRotors:
+def blade_angles(rotors: PerRotor, spins: PerRotor, before_rad: PerRotor, elapsed_s: float) -> PerRotor:
     full = 2.0 * pi * _TURNS_A_SECOND * elapsed_s
-    a, b, c, d = (
+    return tuple(
         (angle + full * spin * (0.0 if isnan(part) else part)) % (2.0 * pi)
         for angle, spin, part in zip(before_rad, spins, rotors, strict=True)
     )
-    return a, b, c, d
 
 
 def about_up(angle_rad: float) -> Quaternion:
@@ -50,8 +49,8 @@ def about_up(angle_rad: float) -> Quaternion:
     return cos(angle_rad / 2.0), 0.0, 0.0, sin(angle_rad / 2.0)
 
 
-def thrust_arrows(airframe: VehicleShape, rotors: FourRotors, scale: float) -> Array:
-    """Return the ends of thrust arrows, proportional to squared speeds; FLU, m times scale, (4, 2, 3)."""
+def thrust_arrows(airframe: VehicleShape, rotors: PerRotor, scale: float) -> Array:
+    """Return the ends of thrust arrows, proportional to squared speeds; FLU, m times scale, (N, 2, 3)."""
     arrows = np.zeros((len(airframe.rotors_m), 2, 3))
     arrows[:, :, :2] = scale * np.array(airframe.rotors_m)[:, None, :]
     lengths = np.nan_to_num(np.square(rotors)) * _MAX_ARROW * airframe.radius_m * scale

@@ -7,11 +7,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from colibri.common.errors import Error
-from colibri.common.types import Array, FourRotors, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Quaternion, Vector
 
 NOWHERE: Vector = (nan, nan, nan)
 NO_POINTS: Array = np.empty((0, 3))
-UNKNOWN_ROTORS: FourRotors = (nan, nan, nan, nan)
+UNKNOWN_ROTORS: PerRotor = (nan, nan, nan, nan)
 
 
 class ViewError(Error):
@@ -28,7 +28,7 @@ class VehicleShape(NamedTuple):
     """
 
     rotors_m: tuple[tuple[float, float], ...] = ((0.17, -0.17), (-0.17, 0.17), (0.17, 0.17), (-0.17, -0.17))
-    spins: FourRotors = (1.0, 1.0, -1.0, -1.0)
+    spins: PerRotor = (1.0, 1.0, -1.0, -1.0)
     foot_m: float = 0.1
 
     @property
@@ -56,7 +56,7 @@ class Snapshot:
     position_enu_m: Vector
     attitude: Quaternion
     velocity_enu_m_s: Vector = NOWHERE
-    rotors: FourRotors = UNKNOWN_ROTORS
+    rotors: PerRotor = UNKNOWN_ROTORS
     reference_enu_m: Vector = NOWHERE
     trail: Array = field(default_factory=lambda: NO_POINTS)
     horizon: Array = field(default_factory=lambda: NO_POINTS)

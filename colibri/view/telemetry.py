@@ -10,7 +10,7 @@ import numpy as np
 
 from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
 from colibri.common.rotations import quaternion_from_euler, tilt_deg
-from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.client.modes import mode_name
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
@@ -211,7 +211,7 @@ class Telemetry:
     def _outputs(self, fields: Any, now_s: float) -> None:
         self._pulses(tuple(fields.actuator[:4]), now_s)
 
-    def _pulses(self, pulses: FourRotors, now_s: float) -> None:
+    def _pulses(self, pulses: PerRotor, now_s: float) -> None:
         low, high = _PULSE_US
         if any(pulses):
             parts = tuple(min(max((pulse - low) / (high - low), 0.0), 1.0) for pulse in pulses)

@@ -8,9 +8,8 @@ are not given. A part has one fault at a time: a new one replaces it, OK ends it
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from math import isfinite, isnan
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
-from colibri.common.types import FourRotors
 from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED, Codec, mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -35,9 +34,11 @@ SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS, RANGEFINDER)
 ALL = 0
 """The instance for all of a part."""
 MOTORS = 4
+"""Of a vehicle that is not known."""
+FaultValues: TypeAlias = tuple[float, float, float, float]
 _ROUNDING = 1e-6
 """Tolerance of limits, for the precision of the wire."""
-_NOT_GIVEN: FourRotors = (0.0, 0.0, 0.0, 0.0)
+_NOT_GIVEN: FaultValues = (0.0, 0.0, 0.0, 0.0)
 
 
 class Equipment(StrEnum):
@@ -55,7 +56,7 @@ class Fault(NamedTuple):
     unit: int  # FAILURE_UNIT
     kind: int  # FAILURE_TYPE
     instance: int = ALL  # from 1
-    values: FourRotors = _NOT_GIVEN  # param4 to param7
+    values: FaultValues = _NOT_GIVEN  # param4 to param7
 
 
 class Value(NamedTuple):
@@ -171,23 +172,24 @@ def kind_name(kind: int) -> str:
     return str(mav.enums["FAILURE_TYPE"][kind].name).removeprefix("FAILURE_TYPE_")
 
 
-def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | None:
+def fault_from(p1: float, p2: float, p3: float, values: FaultValues) -> Fault | None:
     p3 = 0.0 if isnan(p3) else p3
     if not all(isfinite(number) and number == int(number) for number in (p1, p2, p3)):
         return None
     return Fault(int(p1), int(p2), int(p3), values)
 
 
-def judged(fault: Fault, parts: Collection[Equipment]) -> Fault | Refusal:
-    """Return a fault with all its numbers, or the refusal for a plant with these `parts`."""
+def judged(fault: Fault, parts: Collection[Equipment], motors: int = MOTORS) -> Fault | Refusal:
+    """Return a fault with all its numbers, or the refusal for a plant with these `parts` and so many motors."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
         return Refusal("no plant does this fault", RESULT_UNSUPPORTED)
     if row.part not in parts:
         without = "flown by the state, not by sensors" if row.part is Equipment.SENSORS else f"no {row.part} to fail"
         return Refusal(without, RESULT_UNSUPPORTED)
-    if not 0 <= fault.instance <= row.instances:
-        return Refusal(f"instance must be 0 to {row.instances}")
+    instances = motors if row.unit == MOTOR else row.instances
+    if not 0 <= fault.instance <= instances:
+        return Refusal(f"instance must be 0 to {instances}")
     return _with_values(row, fault)
 
 

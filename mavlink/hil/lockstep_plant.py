@@ -30,6 +30,7 @@ from colibri.mavlink.hil.plant_status import (
 )
 from colibri.mavlink.hil.sensors import Frame, encode_sensors
 from colibri.mavlink.hil.state import (
+    ROTORS,
     STATE_MESSAGES,
     ActuatorCommand,
     StateFrame,
@@ -65,10 +66,12 @@ class PlantEnd:
         frame_interval_us: int,
         serves: Collection[Feedback] = (Feedback.STATE,),
         waits: bool = True,
+        rotors: int = ROTORS,
         is_there: Callable[[Address], bool] = lambda _: False,
     ) -> None:
         """Begin without autopilot; `is_there` tells whether a program has the address of a silent one."""
         self.waits = waits  # or runs freely
+        self._rotors = rotors
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
@@ -125,7 +128,7 @@ class PlantEnd:
         self._send_frame(now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        command = read_actuators(datagram, self._autopilot_bytes) if sender == self.peer else None
+        command = read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else None
         if command is None:
             return self._receive_any(datagram, sender, now_s)
         self._note(datagram, now_s)
@@ -145,7 +148,7 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender, now_s)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
-                command = self._accept(decode_actuators(message)) or command
+                command = self._accept(decode_actuators(message, self._rotors)) or command
             else:
                 self.dropped["unexpected"] += 1
                 continue

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep import encode_heartbeat
 from colibri.mavlink.hil.plant_status import ReceivedFrame
@@ -31,7 +31,7 @@ _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER |
 class FlierEnd:
     """The autopilot's end: returns each new frame once, remembers the last answer."""
 
-    def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
+    def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[PerRotor], PerRotor]) -> None:
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
         self.refused: int | None = None  # always None

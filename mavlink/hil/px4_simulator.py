@@ -14,10 +14,10 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
-from colibri.common.types import Address, FourRotors, Vector
+from colibri.common.types import Address, PerRotor, Vector
 from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US, encode_heartbeat
 from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors
-from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame
+from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame, actuator_frame
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
@@ -30,10 +30,8 @@ GIVEN_UP_AFTER_S = 30.0
 """Wall-clock time without an answer after which another caller takes over: PX4 needs some seconds to start."""
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
-_STOPPED: FourRotors = (0.0, 0.0, 0.0, 0.0)
 _G_M_S2 = 9.80665
 _INT16_MAX, _UINT16_MAX = 32767, 65535
-_CONTROLS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
 _TRUTH = FixedFrame(
     "HIL_STATE_QUATERNION",
     "time_usec attitude_quaternion rollspeed pitchspeed yawspeed lat lon alt vx vy vz "
@@ -42,9 +40,9 @@ _TRUTH = FixedFrame(
 
 
 class Motors(NamedTuple):
-    """Controls, 0..1, of PX4's first four motors in its order."""
+    """Controls, 0..1, of PX4's first motors in its order."""
 
-    controls: FourRotors
+    controls: PerRotor
     armed: bool
 
 
@@ -60,13 +58,14 @@ class Truth(NamedTuple):
 class SimulatorEnd:
     """The simulator's end: offers frames, receives motor commands."""
 
-    def __init__(self, *, system_id: int) -> None:
+    def __init__(self, *, system_id: int, rotors: int = ROTORS) -> None:
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
+        self._controls, self._stopped = actuator_frame(rotors), Motors((0.0,) * rotors, armed=False)
         self.peer: Address | None = None
         self.calls = 0  # starts of PX4
         self.lockstep = False  # PX4 answers each frame
         self.answered = True
-        self.motors = Motors(_STOPPED, armed=False)
+        self.motors = self._stopped
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
         self.received: list[bytes] = []  # valid frames; the owner may log and clear it
@@ -93,8 +92,8 @@ class SimulatorEnd:
         self._send(now_s)
 
     def receive(self, datagram: bytes, sender: Address) -> None:
-        if len(datagram) == _CONTROLS.size and sender == self.peer:
-            numbers = _CONTROLS.read(datagram, 0, self._source)
+        if len(datagram) == self._controls.size and sender == self.peer:
+            numbers = self._controls.read(datagram, 0, self._source)
             if numbers is not None:
                 self._obey(numbers)
                 self.received.append(datagram)
@@ -106,7 +105,7 @@ class SimulatorEnd:
                 self.dropped["second autopilot" if self.peer else "not begun"] += 1
                 continue
             if message.name == "HIL_ACTUATOR_CONTROLS":
-                self._obey(_CONTROLS.numbers(message.fields))
+                self._obey(self._controls.numbers(message.fields))
             elif message.name == "COMMAND_LONG":
                 self._receive_request(message)
             elif message.name != "HEARTBEAT":
@@ -148,23 +147,23 @@ class SimulatorEnd:
         self.peer, self._source = sender, bytes(message.source)
         self.calls += 1
         self.lockstep, self.answered = False, True
-        self.motors = Motors(_STOPPED, armed=False)
+        self.motors = self._stopped
         self._answer_us = self._truth_every_us = self._answered_s = None
 
     def _obey(self, numbers: Sequence[Any]) -> None:
-        time_us, flags, a, b, c, d, mode = numbers
+        time_us, flags, *controls, mode = numbers
         if time_us == self._answer_us:
             self.dropped["repeated"] += 1
             return
         self._answer_us, self._answered_s = time_us, self._now_s
         self.lockstep = bool(flags & LOCKSTEP_FLAG)
         self.answered = True
-        if not (0.0 <= a <= 1.0 and 0.0 <= b <= 1.0 and 0.0 <= c <= 1.0 and 0.0 <= d <= 1.0):
-            if not isfinite(a + b + c + d):
-                self.dropped["invalid"] += 1
-                return
-            a, b, c, d = (min(max(control, 0.0), 1.0) for control in (a, b, c, d))
-        self.motors = Motors((a, b, c, d), bool(mode & dialect.MODE_ARMED))
+        if not isfinite(sum(controls)):
+            self.dropped["invalid"] += 1
+            return
+        self.motors = Motors(
+            tuple([min(max(control, 0.0), 1.0) for control in controls]), bool(mode & dialect.MODE_ARMED)
+        )
 
     def _receive_request(self, message: Message) -> None:
         fields = message.fields

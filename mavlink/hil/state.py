@@ -4,15 +4,17 @@ Invalid input (not finite, out of range, halves of different frames) decodes to 
 """
 
 from collections.abc import Sequence
+from functools import cache
 from math import isfinite, sqrt
 from typing import Any, NamedTuple
 
-from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import ned_frd_state
 
 ROTORS = 4
+"""Of a plant that is not told otherwise."""
 LOCKSTEP_FLAG = 1
 """HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message."""
 
@@ -25,7 +27,12 @@ STATE_BYTES = _ATTITUDE.size + _POSITION.size
 """Size of a datagram that is nothing but a frame of state feedback."""
 _DISARMED = MODE_CUSTOM | MODE_HIL
 _ARMED = _DISARMED | MODE_ARMED
-_ACTUATORS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
+
+
+@cache
+def actuator_frame(rotors: int) -> FixedFrame:
+    """Return the layout of HIL_ACTUATOR_CONTROLS with its first controls, at most 16."""
+    return FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{rotors}] mode")
 
 
 class StateFrame(NamedTuple):
@@ -42,7 +49,7 @@ class ActuatorCommand(NamedTuple):
     """Rotor speeds in answer to the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
 
     time_us: int
-    controls: FourRotors
+    controls: PerRotor
     armed: bool
 
 
@@ -93,30 +100,34 @@ def _state(attitude: Sequence[Any], position: Sequence[Any]) -> StateFrame | Non
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
     time_us, controls, armed = command
-    return _ACTUATORS.encode(codec, (time_us, LOCKSTEP_FLAG, *controls, _ARMED if armed else _DISARMED))
+    return actuator_frame(len(controls)).encode(
+        codec, (time_us, LOCKSTEP_FLAG, *controls, _ARMED if armed else _DISARMED)
+    )
 
 
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     """Return the command as rounded by `encode_actuators` and `read_actuators`."""
     time_us, controls, armed = command
     mode = _ARMED if armed else _DISARMED
-    return _command(_ACTUATORS.rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
+    return _command(actuator_frame(len(controls)).rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
 
 
-def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:
+def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:
     """Read a datagram of exactly one valid command of `source`; otherwise `None`."""
-    if len(datagram) != _ACTUATORS.size:
+    layout = actuator_frame(rotors)
+    if len(datagram) != layout.size:
         return None
-    numbers = _ACTUATORS.read(datagram, 0, source)
+    numbers = layout.read(datagram, 0, source)
     return _command(numbers) if numbers else None
 
 
-def decode_actuators(message: Message) -> ActuatorCommand | None:
-    return _command(_ACTUATORS.numbers(message.fields))
+def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand | None:
+    return _command(actuator_frame(rotors).numbers(message.fields))
 
 
 def _command(numbers: Sequence[Any]) -> ActuatorCommand | None:
-    time_us, _, c1, c2, c3, c4, mode = numbers
-    if not (0.0 <= c1 <= 1.0 and 0.0 <= c2 <= 1.0 and 0.0 <= c3 <= 1.0 and 0.0 <= c4 <= 1.0):
-        return None
-    return ActuatorCommand(time_us, (c1, c2, c3, c4), bool(mode & MODE_ARMED))
+    time_us, _, *controls, mode = numbers
+    for control in controls:
+        if not 0.0 <= control <= 1.0:
+            return None
+    return ActuatorCommand(time_us, tuple(controls), bool(mode & MODE_ARMED))

@@ -2,7 +2,7 @@
 
 from math import isfinite, pi
 
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16
 from colibri.mavlink.telemetry.snapshot import BatteryState, TelemetrySnapshot
@@ -84,7 +84,7 @@ def _stick_us(stick: float) -> float:
     return LOW_US + 0.5 * SPAN_US * (1.0 + stick)
 
 
-def _pulses_us(controls: FourRotors) -> tuple[float, ...]:
+def _pulses_us(controls: PerRotor) -> tuple[float, ...]:
     return tuple(LOW_US + SPAN_US * control for control in controls)
 
 

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
-from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 
 NOWHERE: Vector = (nan, nan, nan)
@@ -70,7 +70,7 @@ class SolverState(NamedTuple):
     cost: float = 0.0
     slack: float = 0.0  # largest excess of a soft limit, in parts of it
     active: tuple[int, int, int, int] = (0, 0, 0, 0)  # constraints: rotors, increments, angles, rates
-    planned_squared: tuple[FourRotors, ...] = ()  # parts of the largest, by step
+    planned_squared: tuple[PerRotor, ...] = ()  # parts of the largest, by step
     horizon: tuple[Forecast, ...] = ()
     mass_kg: float = nan  # nan for a law without an estimate
     path_lag_s: float = nan  # nan for a law that follows the clock
@@ -111,14 +111,14 @@ class TelemetrySnapshot(NamedTuple):
     rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
     origin: Geodetic = DEFAULT_ORIGIN
     home: HomePosition | None = None
-    rotor_speeds_rad_s: FourRotors = (0.0, 0.0, 0.0, 0.0)  # estimated
-    controls: FourRotors = (0.0, 0.0, 0.0, 0.0)  # commanded, parts of the largest
+    rotor_speeds_rad_s: PerRotor = (0.0, 0.0, 0.0, 0.0)  # estimated
+    controls: PerRotor = (0.0, 0.0, 0.0, 0.0)  # commanded, parts of the largest
     battery: BatteryState | None = None
     setpoint: Setpoint = NO_SETPOINT
     solver: SolverState = NOT_SOLVED
     wind_enu_m_s: Vector = NOWHERE
     delay_us: int = 0  # compensated delay of commands
-    sticks: FourRotors | None = None  # of MANUAL_CONTROL: pitch, roll, thrust, yaw
+    sticks: tuple[float, float, float, float] | None = None  # of MANUAL_CONTROL: pitch, roll, thrust, yaw
     flight_started_us: int = 0  # last arming; 0 before, as the next two
     takeoff_us: int = 0
     landing_us: int = 0

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.common.types import FourRotors, Vector
+from colibri.common.types import PerRotor, Vector
 from colibri.plant.environment.random_streams import RandomStream
 
 NOISES = ("force", "moment", "motors")
@@ -17,7 +17,8 @@ class Disturbed(NamedTuple):
 
     force_n: Vector
     moment_n_m: Vector
-    factors: FourRotors
+    factors: PerRotor
+    """For `MAX_ROTORS` rotors."""
 
 
 class Noise:
@@ -25,12 +26,12 @@ class Noise:
 
     def __init__(self, densities: Mapping[str, float], seed: int) -> None:
         force, moment, motors = (densities.get(name, 0.0) for name in NOISES)
-        self._densities = np.array([force] * 3 + [moment] * 3 + [motors] * 4)
+        self._densities = np.array([force] * 3 + [moment] * 3 + [motors] * MAX_ROTORS)
         self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.NOISE,)).generate_state(2, np.uint64)
 
     def over(self, time_us: int, duration_us: int) -> Disturbed:
         """Return the disturbance of a frame, or of the part of one, that begins at `time_us`."""
         chance = np.random.Generator(np.random.Philox(key=self._key, counter=time_us << 64))
         normal = chance.standard_normal(len(self._densities)).astype(np.float32)  # as in `random_streams.Chance`
-        fx, fy, fz, mx, my, mz, a, b, c, d = (self._densities * normal / (duration_us * 1e-6) ** 0.5).tolist()
-        return Disturbed((fx, fy, fz), (mx, my, mz), (1.0 + a, 1.0 + b, 1.0 + c, 1.0 + d))
+        fx, fy, fz, mx, my, mz, *motors = (self._densities * normal / (duration_us * 1e-6) ** 0.5).tolist()
+        return Disturbed((fx, fy, fz), (mx, my, mz), tuple([1.0 + part for part in motors]))

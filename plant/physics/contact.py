@@ -37,7 +37,7 @@ def check_contact(vehicle: Vehicle) -> None:
         fits, too_large = (part, too_large) if _max_rate(vehicle, scaled) <= _MAX_RATE_RAD_S else (fits, part)
     values = [(f"ground.{key}", getattr(hardness, key)) for key in keys]
     said = ", ".join(f"{key} {value:g} is too large, at most {_ROUNDED * fits * value:.3g}" for key, value in values)
-    farthest_m = float(np.abs(ground.contacts_m(vehicle.rotors)).max())
+    farthest_m = float(np.abs(vehicle.contacts_m()).max())
     raise VehicleError(
         f"{said}, for the plant's step of 1 ms with feet and rotors {farthest_m:g} m from the centre and this inertia; "
         "or leave the ground out: --without ground"
@@ -47,11 +47,12 @@ def check_contact(vehicle: Vehicle) -> None:
 def _max_rate(vehicle: Vehicle, hardness: _Hardness) -> float:
     """Return a bound on the poles, rad/s, of the vehicle on its feet and on its rotors."""
     assert vehicle.ground is not None
-    inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
-    points_m = vehicle.ground.contacts_m(vehicle.rotors)
+    inertia = np.diag([vehicle.body.mass_kg] * 6)
+    inertia[3:, 3:] = vehicle.body.inertia()
+    points_m, feet = vehicle.contacts_m(), len(vehicle.ground.foot_position_m)
     stiffness, normal, slip = hardness
     rates = []
-    for contacts_m in (points_m[:4], points_m[4:]):
+    for contacts_m in (points_m[:feet], points_m[feet:]):
         damping = np.linalg.solve(inertia, _contact_matrix(contacts_m, (slip, slip, normal)))
         spring = np.linalg.solve(inertia, _contact_matrix(contacts_m, (0.0, 0.0, stiffness)))
         rates += [np.abs(np.linalg.eigvals(damping)).max(), np.sqrt(np.abs(np.linalg.eigvals(spring)).max())]

@@ -1,7 +1,10 @@
 """The vehicle's equations of motion, x' = f(x), as one compiled kernel.
 
-x has 18 values: the rigid body's `STATE`, four rotor speeds in the vehicle's unit, and the charge used, Ah. Velocity
+x has 14 + N values: the rigid body's `STATE`, N rotor speeds in the vehicle's unit, and the charge used, Ah. Velocity
 m/s and rates rad/s are FLU, position m is ENU; the unit quaternion turns FLU into ENU.
+
+Rotors that all thrust along z in the plane of the centre of mass, on a body with a diagonal inertia matrix, have
+shorter equations. Which ones, and the number of rotors, are known at compile time, from the shapes of the parameters.
 """
 
 from collections.abc import Sequence
@@ -13,11 +16,11 @@ import numpy as np
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.matrices import put
-from colibri.common.types import Array, FourRotors, Matrix, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Matrix, Quaternion, Vector
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz")
-ROTORS = slice(13, 17)
-CHARGE = 17
+ROTORS = slice(13, -1)
+CHARGE = -1
 
 _AH_PER_C = 1.0 / 3600.0
 _HALVINGS = 60
@@ -29,11 +32,12 @@ class PlantParameters(NamedTuple):
     mass_kg: float
     gravity_m_s2: float
     inertia_kg_m2: Vector
-    thrust: FourRotors  # N per speed unit squared
-    yaw_moment: FourRotors  # N m per speed unit squared, with its sign
-    momentum: FourRotors  # angular momentum along body z, N m s per speed unit, with its sign
-    rotor_x_m: FourRotors  # forward
-    rotor_y_m: FourRotors  # left
+    thrust: PerRotor  # N per speed unit squared
+    yaw_moment: PerRotor  # about the rotor's axis, N m per speed unit squared, with its sign
+    momentum: PerRotor  # angular momentum along the rotor's axis, N m s per speed unit, with its sign
+    rotor_x_m: PerRotor  # forward
+    rotor_y_m: PerRotor  # left
+    power: PerRotor  # electrical, W per speed unit cubed; 0 without a battery
     top_speed: float  # at the battery's full voltage
     wind_enu_m_s: Vector
     lag_up_s: float = inf  # time constant; inf: the rotors follow at once
@@ -41,12 +45,11 @@ class PlantParameters(NamedTuple):
     linear_drag_n_s_m: Vector = (0.0, 0.0, 0.0)  # of the airframe, along the FLU axes
     quadratic_drag_n_s2_m2: Vector = (0.0, 0.0, 0.0)  # of the airframe, along the FLU axes
     rotor_drag: float = 0.0  # in its plane, N per m/s and per speed unit
-    power: FourRotors = (0.0, 0.0, 0.0, 0.0)  # electrical, W per speed unit cubed
     full_voltage_v: float = 1.0  # open-circuit
     empty_voltage_v: float = 1.0  # open-circuit
     resistance_ohm: float = 0.0
     capacity_ah: float = inf
-    contacts_m: Array = np.zeros((8, 3))  # points in FLU that can touch the ground
+    contacts_m: Array = np.zeros((0, 3))  # points in FLU that can touch the ground
     ground_m: float = -inf  # z of ENU; -inf: no ground
     stiffness_n_m: float = 0.0  # of the ground at one point
     damping_n_s_m: float = 0.0  # against sinking in and coming out
@@ -54,6 +57,8 @@ class PlantParameters(NamedTuple):
     slip_damping_n_s_m: float = 0.0  # friction of a creeping point, below Coulomb's limit
     noise_n: Vector = (0.0, 0.0, 0.0)  # random force on the body, FLU
     noise_n_m: Vector = (0.0, 0.0, 0.0)  # random moment on the body, FLU
+    axes: Array = np.zeros((0, 4))  # of the thrusts, FLU, and z of the rotors, m, (N, 4); (0, 4) for short equations
+    inertia: Array = np.zeros((0, 3, 3))  # the matrix and its inverse, kg m², (2, 3, 3)
 
 
 class Wrench(NamedTuple):
@@ -64,10 +69,12 @@ class Wrench(NamedTuple):
 
 
 @compiled
-def rotor_wrench(speeds: FourRotors, parameters: PlantParameters) -> Wrench:
+def rotor_wrench(speeds: Array | PerRotor, parameters: PlantParameters) -> Wrench:
     """Return force (0, 0, U1) and moment (U2, U3, U4) of the rotors, THESIS [2.2]."""
+    if parameters.axes.shape[0] > 0:
+        return _wrench_in_space(speeds, parameters)
     u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0
-    for i in range(4):
+    for i in range(len(parameters.thrust)):
         squared = speeds[i] * speeds[i]
         thrust_n = parameters.thrust[i] * squared
         u1 += thrust_n
@@ -78,10 +85,56 @@ def rotor_wrench(speeds: FourRotors, parameters: PlantParameters) -> Wrench:
 
 
 @compiled
-def rotor_momentum(speeds: FourRotors, parameters: PlantParameters) -> float:
+def _wrench_in_space(speeds: Array | PerRotor, parameters: PlantParameters) -> Wrench:
+    fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(parameters.thrust)):
+        x, y, z = parameters.rotor_x_m[i], parameters.rotor_y_m[i], parameters.axes[i, 3]
+        thrust_n, drag_n_m = (
+            parameters.thrust[i] * speeds[i] * speeds[i],
+            parameters.yaw_moment[i] * speeds[i] * speeds[i],
+        )
+        ax, ay, az = parameters.axes[i, 0], parameters.axes[i, 1], parameters.axes[i, 2]
+        fx, fy, fz = fx + thrust_n * ax, fy + thrust_n * ay, fz + thrust_n * az
+        mx += thrust_n * (y * az - z * ay) + drag_n_m * ax
+        my += thrust_n * (z * ax - x * az) + drag_n_m * ay
+        mz += thrust_n * (x * ay - y * ax) + drag_n_m * az
+    return Wrench((fx, fy, fz), (mx, my, mz))
+
+
+@compiled
+def rotor_momentum(speeds: Array | PerRotor, parameters: PlantParameters) -> float:
     """Return the angular momentum h along body z, N m s; h = -J Ω in the thesis's symbols (erratum 2)."""
-    h = parameters.momentum
-    return h[0] * speeds[0] + h[1] * speeds[1] + h[2] * speeds[2] + h[3] * speeds[3]
+    total: float = parameters.momentum[0] * speeds[0]
+    for i in range(1, len(parameters.momentum)):
+        total += parameters.momentum[i] * speeds[i]
+    return total
+
+
+@compiled
+def _momentum_in_space(speeds: Array | PerRotor, parameters: PlantParameters) -> Vector:
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(len(parameters.momentum)):
+        momentum = parameters.momentum[i] * speeds[i]
+        x, y = x + momentum * parameters.axes[i, 0], y + momentum * parameters.axes[i, 1]
+        z += momentum * parameters.axes[i, 2]
+    return x, y, z
+
+
+@compiled
+def _turn_in_space(rate: Vector, moment: Vector, h: Vector, h_rate: Vector, inertia: Array) -> Vector:
+    """Return I⁻¹ (τ - h' - ω × (I ω + h)); `inertia` has I and its inverse, (2, 3, 3)."""
+    p, q, r = rate
+    lx = inertia[0, 0, 0] * p + inertia[0, 0, 1] * q + inertia[0, 0, 2] * r + h[0]
+    ly = inertia[0, 1, 0] * p + inertia[0, 1, 1] * q + inertia[0, 1, 2] * r + h[1]
+    lz = inertia[0, 2, 0] * p + inertia[0, 2, 1] * q + inertia[0, 2, 2] * r + h[2]
+    mx = moment[0] - h_rate[0] - (q * lz - r * ly)
+    my = moment[1] - h_rate[1] - (r * lx - p * lz)
+    mz = moment[2] - h_rate[2] - (p * ly - q * lx)
+    return (
+        inertia[1, 0, 0] * mx + inertia[1, 0, 1] * my + inertia[1, 0, 2] * mz,
+        inertia[1, 1, 0] * mx + inertia[1, 1, 1] * my + inertia[1, 1, 2] * mz,
+        inertia[1, 2, 0] * mx + inertia[1, 2, 1] * my + inertia[1, 2, 2] * mz,
+    )
 
 
 @compiled
@@ -100,17 +153,19 @@ def angular_acceleration(rate: Vector, moment: Vector, h: float, h_rate: float, 
 
 
 @compiled
-def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: PlantParameters) -> Wrench:
+def drag_wrench(air: Vector, rate: Vector, speeds: Array | PerRotor, parameters: PlantParameters) -> Wrench:
     """Return the drag of airframe and rotors; `air` is the velocity through the air, FLU.
 
     The airframe's is -(l + q |v|) v along each axis, a rotor's -c Ω (v + ω × r) in its plane: Faessler, Franchi,
     Scaramuzza (RA-L 2018), RotorS.
     """
+    if parameters.axes.shape[0] > 0:
+        return _drag_in_space(air, rate, speeds, parameters)
     linear, quadratic = parameters.linear_drag_n_s_m, parameters.quadratic_drag_n_s2_m2
     speed = sqrt(air[0] * air[0] + air[1] * air[1] + air[2] * air[2])
     fx, fy = -(linear[0] + quadratic[0] * speed) * air[0], -(linear[1] + quadratic[1] * speed) * air[1]
     fz, yaw = -(linear[2] + quadratic[2] * speed) * air[2], 0.0
-    for i in range(4):
+    for i in range(len(parameters.thrust)):
         x, y = parameters.rotor_x_m[i], parameters.rotor_y_m[i]
         drag = -parameters.rotor_drag * speeds[i]
         rotor_fx, rotor_fy = drag * (air[0] - rate[2] * y), drag * (air[1] + rate[2] * x)
@@ -118,6 +173,25 @@ def drag_wrench(air: Vector, rate: Vector, speeds: FourRotors, parameters: Plant
         fy += rotor_fy
         yaw += x * rotor_fy - y * rotor_fx
     return Wrench((fx, fy, fz), (0.0, 0.0, yaw))
+
+
+@compiled
+def _drag_in_space(air: Vector, rate: Vector, speeds: Array | PerRotor, parameters: PlantParameters) -> Wrench:
+    linear, quadratic = parameters.linear_drag_n_s_m, parameters.quadratic_drag_n_s2_m2
+    speed = sqrt(air[0] * air[0] + air[1] * air[1] + air[2] * air[2])
+    fx, fy = -(linear[0] + quadratic[0] * speed) * air[0], -(linear[1] + quadratic[1] * speed) * air[1]
+    fz, mx, my, mz = -(linear[2] + quadratic[2] * speed) * air[2], 0.0, 0.0, 0.0
+    for i in range(len(parameters.thrust)):
+        x, y, z = parameters.rotor_x_m[i], parameters.rotor_y_m[i], parameters.axes[i, 3]
+        ax, ay, az = parameters.axes[i, 0], parameters.axes[i, 1], parameters.axes[i, 2]
+        u = air[0] + rate[1] * z - rate[2] * y
+        v = air[1] + rate[2] * x - rate[0] * z
+        w = air[2] + rate[0] * y - rate[1] * x
+        along, drag = u * ax + v * ay + w * az, -parameters.rotor_drag * speeds[i]
+        gx, gy, gz = drag * (u - along * ax), drag * (v - along * ay), drag * (w - along * az)
+        fx, fy, fz = fx + gx, fy + gy, fz + gz
+        mx, my, mz = mx + y * gz - z * gy, my + z * gx - x * gz, mz + x * gy - y * gx
+    return Wrench((fx, fy, fz), (mx, my, mz))
 
 
 @compiled
@@ -148,13 +222,13 @@ def contact_wrench(height_m: float, velocity: Vector, rate: Vector, R: Matrix, p
 
 
 @compiled
-def battery(speeds: FourRotors, charge_ah: float, parameters: PlantParameters) -> tuple[float, float]:
+def battery(speeds: Array | PerRotor, charge_ah: float, parameters: PlantParameters) -> tuple[float, float]:
     """Return the battery's terminal voltage, V, and its current, A.
 
     V² - V0 V + R P = 0, with V0 falling linearly with the charge used. At most V0² / 4R can be drawn.
     """
     power_w = 0.0
-    for i in range(4):
+    for i in range(len(parameters.power)):
         power_w += parameters.power[i] * speeds[i] * speeds[i] * speeds[i]
     used = min(1.0, charge_ah / parameters.capacity_ah)
     open_v = parameters.full_voltage_v + (parameters.empty_voltage_v - parameters.full_voltage_v) * used
@@ -164,8 +238,8 @@ def battery(speeds: FourRotors, charge_ah: float, parameters: PlantParameters) -
 
 
 @compiled
-def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
-    """Return x' = f(x), (18,), with the rotors commanded to `target`."""
+def derivative(x: Array, target: PerRotor, parameters: Packed) -> Array:
+    """Return x' = f(x) with the rotors commanded to `target`."""
     change = np.empty_like(x)
     write_derivative(change, x, target, parameters[0])
     return change
@@ -175,27 +249,27 @@ def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
 def specific_force(x: Array, parameters: Packed) -> Vector:
     numbers = parameters[0]
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
-    fx, fy, fz = _wrench(x, R, (x[13], x[14], x[15], x[16]), numbers).force_n
+    fx, fy, fz = _wrench(x, R, x[ROTORS], numbers).force_n
     return (fx / numbers.mass_kg, fy / numbers.mass_kg, fz / numbers.mass_kg)
 
 
 @compiled
-def hold(start: Array, target: FourRotors, parameters: Packed, x: Array) -> None:
+def hold(start: Array, target: PerRotor, parameters: Packed, x: Array) -> None:
     """Write x at the start of a command: rotors without lag turn at once as fast as the battery allows."""
     put(start, x)
     numbers = parameters[0]
     if numbers.lag_up_s == np.inf:
-        share = _share_held(target, x[17], numbers)
-        for i in range(4):
+        share = _share_held(target, x[CHARGE], numbers)
+        for i in range(len(target)):
             x[13 + i] = min(target[i], share * numbers.top_speed)
 
 
 @compiled
 def close(x: Array, parameters: Packed) -> float:
     """Clip rotor speeds in place after rounding; return the battery's voltage."""
-    for i in range(13, 17):
+    for i in range(13, 13 + len(parameters[0].thrust)):
         x[i] = min(max(x[i], 0.0), parameters[0].top_speed)
-    return battery((x[13], x[14], x[15], x[16]), x[17], parameters[0])[0]
+    return battery(x[ROTORS], x[CHARGE], parameters[0])[0]
 
 
 @compiled
@@ -217,22 +291,27 @@ def attitude_of(state: Sequence[float]) -> Quaternion:
 
 
 @compiled
-def write_derivative(change: Array, x: Array, target: FourRotors, parameters: PlantParameters) -> None:
-    speeds = (x[13], x[14], x[15], x[16])
-    voltage_v, current_a = battery(speeds, x[17], parameters)
-    speed_rates = _speed_rates(speeds, target, voltage_v, parameters)
-    change[13], change[14], change[15], change[16] = speed_rates
-    change[17] = current_a * _AH_PER_C
+def write_derivative(change: Array, x: Array, target: PerRotor, parameters: PlantParameters) -> None:
+    speeds, speed_rates = x[ROTORS], change[ROTORS]
+    voltage_v, current_a = battery(speeds, x[CHARGE], parameters)
+    maximum = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
+    for i in range(len(target)):
+        speed_rates[i] = _lag(speeds[i], min(target[i], maximum), parameters)
+    change[CHARGE] = current_a * _AH_PER_C
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
     wrench = _wrench(x, R, speeds, parameters)
     _write_motion(change, x, R, wrench, parameters)
-    h, h_rate = rotor_momentum(speeds, parameters), rotor_momentum(speed_rates, parameters)
     rate = (x[3], x[4], x[5])
+    if parameters.axes.shape[0] > 0:
+        momentum, turning = _momentum_in_space(speeds, parameters), _momentum_in_space(speed_rates, parameters)
+        change[3], change[4], change[5] = _turn_in_space(rate, wrench.moment_n_m, momentum, turning, parameters.inertia)
+        return
+    h, h_rate = rotor_momentum(speeds, parameters), rotor_momentum(speed_rates, parameters)
     change[3], change[4], change[5] = angular_acceleration(rate, wrench.moment_n_m, h, h_rate, parameters.inertia_kg_m2)
 
 
 @compiled
-def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: PlantParameters) -> Wrench:
+def _wrench(x: Array, R: Matrix, speeds: Array | PerRotor, parameters: PlantParameters) -> Wrench:
     velocity, rate = (x[0], x[1], x[2]), (x[3], x[4], x[5])
     wind = _rotated_back(R, parameters.wind_enu_m_s)
     rotors = rotor_wrench(speeds, parameters)
@@ -260,23 +339,12 @@ def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters
 
 
 @compiled
-def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, parameters: PlantParameters) -> FourRotors:
-    maximum = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
-    return (
-        _lag(speeds[0], min(target[0], maximum), parameters),
-        _lag(speeds[1], min(target[1], maximum), parameters),
-        _lag(speeds[2], min(target[2], maximum), parameters),
-        _lag(speeds[3], min(target[3], maximum), parameters),
-    )
-
-
-@compiled
 def _lag(speed: float, target: float, parameters: PlantParameters) -> float:
     return (target - speed) / (parameters.lag_up_s if target > speed else parameters.lag_down_s)
 
 
 @compiled
-def _share_held(target: FourRotors, charge_ah: float, parameters: PlantParameters) -> float:
+def _share_held(target: PerRotor, charge_ah: float, parameters: PlantParameters) -> float:
     """Return the share of the top speed at which rotors that follow `target` leave just the voltage for it."""
     low, high = 0.0, 1.0
     if _voltage_share(target, high, charge_ah, parameters) >= high:
@@ -291,9 +359,10 @@ def _share_held(target: FourRotors, charge_ah: float, parameters: PlantParameter
 
 
 @compiled
-def _voltage_share(target: FourRotors, share: float, charge_ah: float, parameters: PlantParameters) -> float:
-    maximum = share * parameters.top_speed
-    speeds = (min(target[0], maximum), min(target[1], maximum), min(target[2], maximum), min(target[3], maximum))
+def _voltage_share(target: PerRotor, share: float, charge_ah: float, parameters: PlantParameters) -> float:
+    maximum, speeds = share * parameters.top_speed, np.empty(len(target))
+    for i in range(len(target)):
+        speeds[i] = min(target[i], maximum)
     return battery(speeds, charge_ah, parameters)[0] / parameters.full_voltage_v
 
 

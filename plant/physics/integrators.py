@@ -9,10 +9,10 @@ import numpy as np
 
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close, hold, write_derivative
 
-Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]
+Solver: TypeAlias = Callable[[Array, PerRotor, Packed, float], tuple[Array, float]]
 """(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `equations`."""
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
@@ -41,7 +41,7 @@ _TOO_SMALL = 1e-14
 """Smallest step, in parts of the frame."""
 
 
-def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
+def fixed_step(x: Array, target: PerRotor, parameters: Packed, duration_s: float) -> tuple[Array, float]:
     end = np.empty_like(x)
     return end, runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s), end)
 
@@ -51,7 +51,7 @@ def _steps(duration_s: float) -> int:
     return max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
 
 
-def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
+def adaptive_step(x: Array, target: PerRotor, parameters: Packed, duration_s: float) -> tuple[Array, float]:
     """Integrate by Dormand-Prince; nan if the step size underflows."""
     end = np.empty_like(x)
     voltage_v, done = dormand_prince(x, target, parameters, duration_s, end)
@@ -65,9 +65,7 @@ def solver(name: Integrator) -> Solver:
 
 
 @compiled
-def runge_kutta_4(
-    start: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int, x: Array
-) -> float:
+def runge_kutta_4(start: Array, target: PerRotor, parameters: Packed, duration_s: float, steps: int, x: Array) -> float:
     """Write x after `duration_s`; return the voltage then."""
     h = duration_s / steps
     hold(start, target, parameters, x)
@@ -89,7 +87,7 @@ def runge_kutta_4(
 
 @compiled
 def dormand_prince(
-    start: Array, target: FourRotors, parameters: Packed, duration_s: float, x: Array
+    start: Array, target: PerRotor, parameters: Packed, duration_s: float, x: Array
 ) -> tuple[float, bool]:
     """Write x after `duration_s`; return the voltage then, and whether the end was reached.
 

@@ -2,24 +2,26 @@
 
 import numpy as np
 
-from colibri.common.types import Array, FourRotors, Vector
+from colibri.common.types import Vector
 from colibri.plant.physics.equations import PlantParameters
 from colibri.plant.vehicle.description import Vehicle
 
 
 def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
-    thrust, _, _, yaw_moment = vehicle.allocation()
+    rotors, arms_m = vehicle.rotors, vehicle.arms_m()
+    strength = np.array(rotors.strength)
+    thrust, yaw_moment = rotors.thrust_coefficient * strength, -rotors.spin() * rotors.torque_coefficient * strength
     east, north, up = wind_enu_m_s
-    x_m, y_m = np.array(vehicle.rotors.position_m).T
     numbers = PlantParameters(
         mass_kg=vehicle.body.mass_kg,
         gravity_m_s2=vehicle.gravity_m_s2,
         inertia_kg_m2=vehicle.body.inertia_kg_m2,
-        thrust=_four(thrust),
-        yaw_moment=_four(yaw_moment),
-        momentum=_four(vehicle.rotor_momentum()),
-        rotor_x_m=_four(x_m),
-        rotor_y_m=_four(y_m),
+        thrust=tuple(thrust.tolist()),
+        yaw_moment=tuple(yaw_moment.tolist()),
+        momentum=tuple(vehicle.rotor_momentum().tolist()),
+        rotor_x_m=tuple(arms_m[:, 0].tolist()),
+        rotor_y_m=tuple(arms_m[:, 1].tolist()),
+        power=(0.0,) * rotors.count,
         top_speed=vehicle.rotors.max_speed,
         wind_enu_m_s=(float(east), float(north), float(up)),
     )
@@ -33,7 +35,7 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
         )
     if (ground := vehicle.ground) is not None:
         numbers = numbers._replace(
-            contacts_m=ground.contacts_m(vehicle.rotors),
+            contacts_m=vehicle.contacts_m(),
             ground_m=vehicle.ground_height_m,
             stiffness_n_m=ground.stiffness_n_m,
             damping_n_s_m=ground.damping_n_s_m,
@@ -41,17 +43,16 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
             slip_damping_n_s_m=ground.slip_damping_n_s_m,
         )
     if (battery := vehicle.battery) is not None:
-        torque = np.abs(vehicle.allocation()[3])
+        power = np.abs(yaw_moment) * vehicle.rad_s_per_speed_unit / battery.efficiency
         numbers = numbers._replace(
-            power=_four(torque * vehicle.rad_s_per_speed_unit / battery.efficiency),
+            power=tuple(power.tolist()),
             full_voltage_v=battery.full_voltage_v,
             empty_voltage_v=battery.empty_voltage_v,
             resistance_ohm=battery.resistance_ohm,
             capacity_ah=battery.capacity_ah,
         )
+    if not vehicle.is_flat:
+        inertia = vehicle.body.inertia()
+        axes = np.concatenate([rotors.axes(), arms_m[:, 2:]], axis=1)
+        numbers = numbers._replace(axes=axes, inertia=np.array([inertia, np.linalg.inv(inertia)]))
     return numbers
-
-
-def _four(values: Array) -> FourRotors:
-    a, b, c, d = values.tolist()
-    return (a, b, c, d)

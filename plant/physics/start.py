@@ -59,7 +59,7 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
     if vehicle.ground is None:
         return
     _, _, up = rotation_matrix(start.attitude)
-    min_height_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) * np.array(up)).sum(axis=1).min())
+    min_height_m = start.z + float((vehicle.contacts_m() * np.array(up)).sum(axis=1).min())
     depth_m = vehicle.ground_height_m - min_height_m
     if depth_m > _MAX_START_DEPTH_M:
         raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")

@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body
-from colibri.common.types import Array, FourRotors, Vector
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.plant_status import NO_BATTERY, PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
@@ -22,7 +22,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 State = tuple[float, ...]
 
-_STANDING: FourRotors = (0.0, 0.0, 0.0, 0.0)
 _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _MOMENT_S = 1e-3
 _RIGID = len(STATE)
@@ -33,7 +32,7 @@ class World(NamedTuple):
 
     time_us: int
     state: State  # `equations.STATE`
-    rotor_speeds: FourRotors  # the vehicle's unit; without lag, of the last step
+    rotor_speeds: PerRotor  # the vehicle's unit; without lag, of the last step
     charge_used_ah: float = 0.0
     voltage_v: float = nan  # at the terminals; nan before the first step and without a battery
     wind_enu_m_s: Vector = CALM  # at the vehicle, held until the next step ends
@@ -46,7 +45,7 @@ def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER
     speed = vehicle.speed_from_rpm(start.rotors)
     state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
     wind, eddies = Air(weather).begin(start.z)
-    return World(0, state, (speed, speed, speed, speed), wind_enu_m_s=wind, eddies=eddies)
+    return World(0, state, (speed,) * vehicle.rotors.count, wind_enu_m_s=wind, eddies=eddies)
 
 
 class Physics:
@@ -66,8 +65,9 @@ class Physics:
         self._as_built = self._parameters.copy()
         self._power: list[float] = self._parameters["power"][0].tolist()
         self._held: list[float | None] | None = None
-        self._end: tuple[World | None, Array] = (None, np.array((*_LEVEL, *_STANDING, 0.0)))
-        self._integrate(self._end[1], _STANDING, self._parameters, _MOMENT_S)
+        self._standing: PerRotor = (0.0,) * vehicle.rotors.count
+        self._end: tuple[World | None, Array] = (None, np.array((*_LEVEL, *self._standing, 0.0)))
+        self._integrate(self._end[1], self._standing, self._parameters, _MOMENT_S)
         close_attitude(self._end[1])
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
@@ -101,15 +101,16 @@ class Physics:
     def battery(self, world: World) -> PlantBattery:
         if self._battery is None:
             return NO_BATTERY
-        (a, b, c, d), (i, j, k, m) = self._power, world.rotor_speeds
-        power_w = a * i * i * i + b * j * j * j + c * k * k * k + d * m * m * m
+        power_w = 0.0
+        for power, speed in zip(self._power, world.rotor_speeds, strict=True):
+            power_w += power * speed * speed * speed
         voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
         left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
         return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
 
     def hold_rotor(self, rotor: int, speed: float | None) -> None:
         """Hold a rotor at a speed regardless of commands; `None` releases it."""
-        held = self._held or [None] * len(_STANDING)
+        held = self._held or [None] * len(self._standing)
         held[rotor] = speed
         self._held = held if any(it is not None for it in held) else None
 
@@ -141,22 +142,19 @@ class Physics:
         if self._air.steady is None:
             self._wind[:] = world.wind_enu_m_s
 
-    def _disturb(self, noise: Noise, target: FourRotors, time_us: int, duration_us: int) -> FourRotors:
+    def _disturb(self, noise: Noise, target: PerRotor, time_us: int, duration_us: int) -> PerRotor:
         """Set the body's noise; return the commands with that of the motors."""
         self._parameters["noise_n"], self._parameters["noise_n_m"], factors = noise.over(time_us, duration_us)
-        a, b, c, d = (min(max(factor * speed, 0.0), self._top) for factor, speed in zip(factors, target, strict=True))
-        return (a, b, c, d)
+        return tuple([min(max(factor * speed, 0.0), self._top) for factor, speed in zip(factors, target, strict=False)])
 
-    def _target(self, command: ActuatorCommand) -> FourRotors:
-        target = _STANDING
+    def _target(self, command: ActuatorCommand) -> PerRotor:
+        target = self._standing
         if command.armed:
-            c1, c2, c3, c4 = command.controls
             idle, top = self._idle, self._top
-            target = (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+            target = tuple([max(control * top, idle) for control in command.controls])
         if self._held is None:
             return target
-        a, b, c, d = (free if held is None else held for free, held in zip(target, self._held, strict=True))
-        return (a, b, c, d)
+        return tuple(free if held is None else held for free, held in zip(target, self._held, strict=True))
 
 
 def state_frame(world: World) -> StateFrame:

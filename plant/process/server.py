@@ -19,7 +19,6 @@ from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, r
 from colibri.plant.simulation.plant import Plant
 
 _CATCH_UP_S = 0.1
-_STANDING = (0.0, 0.0, 0.0, 0.0)
 
 
 class FramePacer:
@@ -215,7 +214,7 @@ class FreeServer(Server):
             self._silence.end(now_us * 1e-6)
         waiting = ": the rotors are stopped, waiting for the autopilot"
         if self._silence.lasts(begin_us * 1e-6, self._missing, begin_us, waiting):
-            plant.arrive(begin_us, ActuatorCommand(begin_us, _STANDING, armed=False))
+            plant.arrive(begin_us, ActuatorCommand(begin_us, plant.vehicle.rotors.stopped, armed=False))
         plant.inject(faults)
         plant.go_on()
         return True

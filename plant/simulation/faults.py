@@ -25,7 +25,7 @@ class Faults:
         self._taken_ah = 0.0
 
     def inject(self, asked: Fault, world: World) -> tuple[World, FaultResult]:
-        fault = judged(asked, self.parts)
+        fault = judged(asked, self.parts, len(world.rotor_speeds))
         if isinstance(fault, Refusal):
             return world, FaultResult(asked.unit, asked.kind, fault.result)
         if fault.unit in SENSORS and fault.unit not in self.sensors.units:

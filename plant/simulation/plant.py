@@ -160,5 +160,5 @@ class PlantBuilder:
 
 
 def _held(world: World, vehicle: Vehicle) -> ActuatorCommand:
-    a, b, c, d = (speed / vehicle.rotors.max_speed for speed in world.rotor_speeds)
-    return ActuatorCommand(world.time_us, (a, b, c, d), armed=any(world.rotor_speeds))
+    controls = tuple(speed / vehicle.rotors.max_speed for speed in world.rotor_speeds)
+    return ActuatorCommand(world.time_us, controls, armed=any(world.rotor_speeds))

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterable
 from math import inf, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
 
 from colibri.common.config import NotNegative, Positive, Table, named_text, read_named, replaced, toml_names
 from colibri.common.elementary import square
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.plant.errors import PlantError
 from colibri.plant.vehicle.rotor_numbering import Numbering, numbering
 from colibri.plant.vehicle.sensors import Sensors as Sensors
@@ -20,8 +20,15 @@ Efficiency: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001)]
 """At least the plant's integration step."""
 PointInPlane: TypeAlias = tuple[float, float]
+Point: TypeAlias = Annotated[tuple[float, ...], msgspec.Meta(min_length=2, max_length=3)]
+Direction: TypeAlias = Literal["ccw", "cw"]
+
+MIN_ROTORS, MAX_ROTORS = 3, 8
+_Rotor = TypeVar("_Rotor")
+_EachRotor: TypeAlias = Annotated[tuple[_Rotor, ...], msgspec.Meta(min_length=MIN_ROTORS, max_length=MAX_ROTORS)]
 
 _FOLDER = Path(__file__).parent / "models"
+AXES = ("thrust", "roll", "pitch", "yaw")
 _RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
 
 
@@ -34,7 +41,11 @@ class Body(Table, frozen=True, kw_only=True):
 
     mass_kg: Positive
     inertia_kg_m2: tuple[Positive, Positive, Positive]
-    """Ix, Iy, Iz about the FLU axes."""
+    """Ix, Iy, Iz about the FLU axes through the centre of mass."""
+    inertia_products_kg_m2: Vector = (0.0, 0.0, 0.0)
+    """Ixy, Ixz, Iyz: the elements of the inertia matrix off its diagonal, Ixy = -∫ x y dm."""
+    center_of_mass_m: Vector = (0.0, 0.0, 0.0)
+    """x forward, y left, z up, in the frame of the positions of rotors and feet."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -48,6 +59,20 @@ class Body(Table, frozen=True, kw_only=True):
             raise ValueError(
                 f"inertia_kg_m2: {largest:.4g} exceeds {rest:.4g}, the sum of the other two (nearest valid: [{valid}])"
             )
+        if any(self.inertia_products_kg_m2):
+            x, y, z = np.linalg.eigvalsh(self.inertia()).tolist()
+            if x <= 0.0 or x + y < z:
+                moments = f"{x:.4g}, {y:.4g}, {z:.4g}"
+                raise ValueError(
+                    f"inertia_products_kg_m2: too large, with principal moments {moments}: "
+                    "each must be above 0, and at most the sum of the other two"
+                )
+
+    def inertia(self) -> Array:
+        """Return the inertia matrix about the centre of mass, kg m², FLU, (3, 3)."""
+        xy, xz, yz = self.inertia_products_kg_m2
+        x, y, z = self.inertia_kg_m2
+        return np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
 
 
 class RotorLag(Table, frozen=True, kw_only=True):
@@ -58,7 +83,7 @@ class RotorLag(Table, frozen=True, kw_only=True):
 
 
 class Rotors(Table, frozen=True, kw_only=True):
-    """The four rotors, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
+    """The rotors, 3 to 8, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
 
     speed_unit: Literal["rad/s", "rpm"]
     thrust_coefficient: Positive
@@ -68,16 +93,18 @@ class Rotors(Table, frozen=True, kw_only=True):
     inertia_kg_m2: Positive
     """J: moment of inertia of one rotor with its motor about its axis."""
     max_speed: Positive
-    position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
-    """x forward, y left of each rotor."""
-    direction: tuple[Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"]]
-    """Seen from above."""
+    position_m: _EachRotor[Point]
+    """x forward, y left of each rotor, and z up, which may be left out."""
+    direction: _EachRotor[Direction]
+    """Seen from above, against the thrust."""
     gyroscopic_term: Literal["conserving", "as-printed"]
     """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
     idle_speed: NotNegative = 0.0
     """Least speed of an armed rotor."""
-    strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
-    """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
+    axis: tuple[Vector, ...] = ()
+    """Direction of each rotor's thrust, FLU, of any length; without it, all thrust upwards."""
+    strength: tuple[Part, ...] = ()
+    """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak. Without it, all are 1."""
     control: Literal["speed", "thrust"] = "speed"
     """Quantity that a control of 0 to 1 scales, in interfaces of other simulators and autopilots."""
     lag: RotorLag | None = None
@@ -87,24 +114,50 @@ class Rotors(Table, frozen=True, kw_only=True):
         super().__post_init__()
         if self.idle_speed >= self.max_speed:
             raise ValueError("idle_speed: must lie below max_speed")
-        if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
-            raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
+        if not self.strength:
+            msgspec.structs.force_setattr(self, "strength", (1.0,) * self.count)
+        for key, given in (
+            ("direction", self.direction),
+            ("axis", self.axis or self.stopped),
+            ("strength", self.strength),
+        ):
+            if len(given) != self.count:
+                raise ValueError(f"{key}: {len(given)} given for the {self.count} rotors of position_m")
+        if not all(map(any, self.axis)):
+            raise ValueError("axis: a direction needs a length above 0")
 
-    def speeds_of(self, controls: FourRotors) -> FourRotors:
+    @property
+    def count(self) -> int:
+        return len(self.position_m)
+
+    def axes(self) -> Array:
+        """Return the unit vectors of the thrusts, FLU, (N, 3)."""
+        axes = np.array(self.axis or ((0.0, 0.0, 1.0),) * self.count)
+        unit: Array = axes / np.sqrt((axes * axes).sum(axis=1))[:, None]
+        return unit
+
+    @property
+    def stopped(self) -> PerRotor:
+        """The command of rotors that stand."""
+        return (0.0,) * self.count
+
+    def points_m(self) -> Array:
+        """Return the positions with their heights, (N, 3)."""
+        return np.array([(*point, 0.0)[:3] for point in self.position_m])
+
+    def spin(self) -> Array:
+        """Return 1 for each rotor that turns counter-clockwise, else -1, (N,)."""
+        return np.array([1.0 if direction == "ccw" else -1.0 for direction in self.direction])
+
+    def speeds_of(self, controls: PerRotor) -> PerRotor:
         """Return rotor speeds, in parts of the top speed, for another autopilot's controls."""
-        if self.control == "speed":
-            return controls
-        a, b, c, d = map(sqrt, controls)
-        return (a, b, c, d)
+        return controls if self.control == "speed" else tuple(map(sqrt, controls))
 
-    def controls_of(self, speeds: FourRotors) -> FourRotors:
-        if self.control == "speed":
-            return speeds
-        a, b, c, d = (speed * speed for speed in speeds)
-        return (a, b, c, d)
+    def controls_of(self, speeds: PerRotor) -> PerRotor:
+        return speeds if self.control == "speed" else tuple(speed * speed for speed in speeds)
 
     def numbering(self) -> Numbering:
-        found = numbering(self.position_m, self.direction)
+        found = numbering(self.position_m, self.direction) if self.count == 4 else None
         if found is None:
             raise VehicleError(
                 "rotors: PX4 and ArduPilot know a '+' or an 'x' whose opposite rotors turn alike, not this frame"
@@ -125,13 +178,13 @@ class Drag(Table, frozen=True, kw_only=True):
 
 
 class Ground(Table, frozen=True, kw_only=True):
-    """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
+    """How the vehicle stands on the ground: on its feet, or on its rotors when it has fallen on its back.
 
     Values apply per foot. Height 0 is the centre of mass of the vehicle at rest on its feet.
     """
 
-    foot_position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
-    """x forward, y left of each foot."""
+    foot_position_m: _EachRotor[PointInPlane]
+    """x forward, y left of each foot, 3 to 8."""
     foot_depth_m: Positive
     """How far the feet are below the centre of mass."""
     stiffness_n_m: Positive
@@ -139,11 +192,6 @@ class Ground(Table, frozen=True, kw_only=True):
     friction_coefficient: NotNegative
     slip_damping_n_s_m: NotNegative
     """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
-
-    def contacts_m(self, rotors: Rotors) -> Array:
-        """Return the points in FLU that can touch the ground, (8, 3): feet, then rotors."""
-        feet = [(x, y, -self.foot_depth_m) for x, y in self.foot_position_m]
-        return np.array([*feet, *((x, y, 0.0) for x, y in rotors.position_m)])
 
 
 class Battery(Table, frozen=True, kw_only=True):
@@ -166,7 +214,7 @@ class Battery(Table, frozen=True, kw_only=True):
 
 
 class Vehicle(Table, frozen=True, kw_only=True):
-    """A quadrotor in SI units, except for rotor speeds (`rotors.speed_unit`).
+    """A multirotor in SI units, except for rotor speeds (`rotors.speed_unit`).
 
     Parts that are `None` are not modelled.
     """
@@ -182,7 +230,12 @@ class Vehicle(Table, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.hover_speed >= self.rotors.max_speed:
+        axes, rotors = controlled_axes(self.allocation()), self.rotors
+        free_yaw = rotors.count == MIN_ROTORS or not all(rotors.strength)
+        if len(axes) < len(AXES) - free_yaw:
+            only = f"only {', '.join(axes) or 'none'}"
+            raise ValueError(f"rotors.position_m, direction, axis: the rotors cannot control every axis, {only}")
+        if not self.hover_speed < self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
 
     def replace(self, key: str, value: Any) -> "Vehicle":
@@ -200,8 +253,8 @@ class Vehicle(Table, frozen=True, kw_only=True):
     @property
     def hover_speed(self) -> float:
         """Rotor speed in hover."""
-        weight_n = self.body.mass_kg * self.gravity_m_s2
-        return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
+        weight_n, lift = self.body.mass_kg * self.gravity_m_s2, float(self.rotors.axes()[:, 2].sum())
+        return sqrt(weight_n / (lift * self.rotors.thrust_coefficient)) if lift > 0.0 else inf
 
     @property
     def hover_rpm(self) -> float:
@@ -225,9 +278,42 @@ class Vehicle(Table, frozen=True, kw_only=True):
         """The vehicle's unit of rotor speed, in rad/s."""
         return _RAD_S_PER_UNIT[self.rotors.speed_unit]
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether all rotors thrust along z in the plane of the centre of mass, and the inertia matrix is diagonal."""
+        flat = not self.arms_m()[:, 2].any() and (self.rotors.axes()[:, 2] == 1.0).all()
+        return bool(flat) and not any(self.body.inertia_products_kg_m2)
+
+    def arms_m(self) -> Array:
+        """Return the positions of the rotors from the centre of mass, FLU, (N, 3)."""
+        arms: Array = self.rotors.points_m() - np.array(self.body.center_of_mass_m)
+        return arms
+
+    def contacts_m(self) -> Array:
+        """Return the points from the centre of mass, FLU, that can touch the ground, (n, 3): feet, then rotors."""
+        assert self.ground is not None, "only what has a ground can touch it"
+        x, y, _ = self.body.center_of_mass_m
+        feet = [(foot_x - x, foot_y - y, -self.ground.foot_depth_m) for foot_x, foot_y in self.ground.foot_position_m]
+        return np.array([*feet, *self.arms_m()])
+
+    def wrenches(self) -> Array:
+        """Return the matrix from squared rotor speeds to force, N, and moment, N m, FLU, (6, N)."""
+        rotors, axes = self.rotors, self.rotors.axes().T
+        strength = np.array(rotors.strength)
+        force = rotors.thrust_coefficient * strength * axes
+        drag = -rotors.spin() * rotors.torque_coefficient * strength * axes
+        x, y, z = self.arms_m().T
+        moment = np.array([y * force[2] - z * force[1], z * force[0] - x * force[2], x * force[1] - y * force[0]])
+        return np.concatenate([force, moment + drag])
+
     def allocation(self) -> Array:
-        """Return the 4 x 4 matrix from squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
-        return _allocation(self.rotors)
+        """Return the matrix from squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2], (4, N)."""
+        if not self.is_flat:
+            return self.wrenches()[2:]
+        rotors, (x, y, _) = self.rotors, self.arms_m().T
+        strength = np.array(rotors.strength)
+        thrust = rotors.thrust_coefficient * strength
+        return np.array([thrust, thrust * y, -thrust * x, -rotors.spin() * rotors.torque_coefficient * strength])
 
     def max_wrench(self) -> Array:
         """Return the largest U1 (N), U2, U3, U4 (N m) of the rotors, each on its own, (4,)."""
@@ -235,11 +321,11 @@ class Vehicle(Table, frozen=True, kw_only=True):
         return max_wrench
 
     def rotor_momentum(self) -> Array:
-        """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
+        """Return the row (N,) that maps rotor speeds to their angular momentum along their axes, N m s.
 
         `as-printed` is the thesis's +J Ω [2.8]: opposite in sign to J (Ω1 - Ω2 + Ω3 - Ω4), and Ω in the file's unit.
         """
-        spin = _spin(self.rotors) * self.rotors.inertia_kg_m2
+        spin = self.rotors.spin() * self.rotors.inertia_kg_m2
         if self.rotors.gyroscopic_term == "as-printed":
             return -spin
         return spin * self.rad_s_per_speed_unit
@@ -263,15 +349,14 @@ def load_vehicle(given: str | Vehicle) -> Vehicle:
     return given if isinstance(given, Vehicle) else read_named("vehicle", _FOLDER, given, Vehicle, VehicleError)
 
 
-def _allocation(rotors: Rotors) -> Array:
-    x, y = np.array(rotors.position_m).T
-    strength = np.array(rotors.strength)
-    thrust = rotors.thrust_coefficient * strength
-    return np.array([thrust, thrust * y, -thrust * x, -_spin(rotors) * rotors.torque_coefficient * strength])
-
-
-def _spin(rotors: Rotors) -> Array:
-    return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
+def controlled_axes(allocation: Array) -> tuple[str, ...]:
+    """Return the axes that rotors with an allocation, (4, N), control together: yaw is the first to be given up."""
+    length = np.sqrt((allocation * allocation).sum(axis=1))
+    unit = allocation / np.where(length > 0.0, length, 1.0)[:, None]
+    for count in range(len(AXES), 0, -1):
+        if np.linalg.matrix_rank(unit[:count]) == count:
+            return AXES[:count]
+    return ()
 
 
 _WITHOUT: dict[str, Callable[[Vehicle], dict[str, Any]]] = {

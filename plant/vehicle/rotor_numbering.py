@@ -10,7 +10,7 @@ from math import degrees
 from typing import Literal, NamedTuple, TypeAlias
 
 from colibri.common.elementary import atan2
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 
 Shape: TypeAlias = Literal["+", "x"]
 
@@ -29,13 +29,13 @@ class Numbering(NamedTuple):
     reverse: bool
     rotors: tuple[int, int, int, int]
 
-    def to_vehicle(self, motors: FourRotors) -> FourRotors:
+    def to_vehicle(self, motors: PerRotor) -> PerRotor:
         a, b, c, d = self.rotors
         given = [0.0, 0.0, 0.0, 0.0]
         given[a], given[b], given[c], given[d] = motors
         return (given[0], given[1], given[2], given[3])
 
-    def to_motors(self, rotors: FourRotors) -> FourRotors:
+    def to_motors(self, rotors: PerRotor) -> PerRotor:
         a, b, c, d = self.rotors
         return (rotors[a], rotors[b], rotors[c], rotors[d])
 
@@ -45,9 +45,9 @@ class Numbering(NamedTuple):
         return _FRAME_TYPES[self.shape, self.reverse]
 
 
-def numbering(position_m: Sequence[tuple[float, float]], direction: Sequence[str]) -> Numbering | None:
+def numbering(position_m: Sequence[tuple[float, ...]], direction: Sequence[str]) -> Numbering | None:
     """Return the numbering; `None` if the rotors are neither a '+' nor an 'x', or do not turn as in one."""
-    bearings_deg = [degrees(atan2(-y, x)) for x, y in position_m]
+    bearings_deg = [degrees(atan2(-y, x)) for x, y, *_ in position_m]
     for shape, wanted_deg in _BEARINGS_DEG.items():
         nearest = [[i for i in range(4) if _apart_deg(bearings_deg[i], want) < _NEAR_DEG] for want in wanted_deg]
         if not all(len(found) == 1 for found in nearest):

@@ -20,7 +20,7 @@ from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, opened, packed
 from colibri.common.matrices import matvec, put
-from colibri.common.types import Array, FourRotors, Quaternion, Vector
+from colibri.common.types import Array, PerRotor, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
 ALARM = 20.0  # log odds: e²⁰ samples are a century
@@ -120,13 +120,13 @@ class RotorWatch:
         self._accelerations = signature.effect * signature.full_thrust_n / inertia[:, None]
         self._numbers = packed(DetectorModel(signature, lag, self._interval_s))
 
-    def begin(self, controls: FourRotors) -> None:
+    def begin(self, controls: PerRotor) -> None:
         kept = self._kept
         self.speeds = np.array(controls)
         kept.evidence[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
         self._began = False
 
-    def step(self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool) -> int | None:
+    def step(self, state: VehicleState, controls: PerRotor, charge_ah: float, *, airborne: bool) -> int | None:
         likeliest, most = self._take_in(state, controls, charge_ah, counts=airborne and self._began)
         self._began = True
         self.max_evidence = max(self.max_evidence, most)
@@ -134,9 +134,7 @@ class RotorWatch:
             self.lost = likeliest
         return self.lost
 
-    def _take_in(
-        self, state: VehicleState, controls: FourRotors, charge_ah: float, *, counts: bool
-    ) -> tuple[int, float]:
+    def _take_in(self, state: VehicleState, controls: PerRotor, charge_ah: float, *, counts: bool) -> tuple[int, float]:
         _, velocity, attitude, _, rate, *_ = state
         battery = self._battery
         found: tuple[int, float] = _take_in(
@@ -158,7 +156,7 @@ def _take_in(
     velocity_enu_m_s: Vector,
     attitude: Quaternion,
     rate_flu_rad_s: Vector,
-    controls: FourRotors,
+    controls: PerRotor,
     open_v: float,  # of the battery without load
     counts: bool,  # else evidence is reset
     numbers: Packed,
@@ -178,7 +176,7 @@ def _take_in(
 
 
 @compiled
-def _followed(speeds: Array, controls: FourRotors, open_v: float, lag: SampledLag, battery: Packed) -> Array:
+def _followed(speeds: Array, controls: PerRotor, open_v: float, lag: SampledLag, battery: Packed) -> Array:
     max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):

@@ -8,7 +8,7 @@ from colibri.autopilot.control.interface import AT_REST, Decision, VehicleState
 from colibri.autopilot.control.rotor_loss.detector import RotorWatch
 from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, ThreeRotorsError
 from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors, law_without
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_INTERVAL_S = 0.02  # longest control interval for the landing: half a radian at four turns a second
@@ -100,7 +100,7 @@ class RotorLoss:
         if not self.enabled:
             self.forget()
 
-    def begin(self, controls: FourRotors) -> None:
+    def begin(self, controls: PerRotor) -> None:
         self.watch.begin(controls)
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
@@ -113,7 +113,7 @@ class RotorLoss:
         self._three = None
 
     def look(
-        self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float
+        self, state: VehicleState, controls: PerRotor, charge_ah: float, *, airborne: bool, ground_m: float
     ) -> bool:
         """Process a control sample; return whether a loss was detected in it."""
         if self.watch.lost is not None:
@@ -128,7 +128,7 @@ class RotorLoss:
         self._take_over(lost, state, ground_m)
         return True
 
-    def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
+    def decide(self, state: VehicleState, charge_ah: float) -> tuple[PerRotor, Decision]:
         assert self._three is not None, "decided only while three rotors fly"
         decision = self._three.step(state, charge_ah)
         return self._three.controls, decision

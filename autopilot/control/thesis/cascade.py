@@ -27,7 +27,7 @@ class CascadeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class CascadeMemory(NamedTuple):
     """State of the cascade between two control samples."""
 
-    rotor_speeds: Array  # last commanded, in the vehicle's unit, (4,)
+    rotor_speeds: Array  # last commanded, in the vehicle's unit, (N,)
     demand: AttitudeAndThrust | None  # of the present outer sample
 
 
@@ -52,7 +52,7 @@ class Cascade:
         self._mixer = Mixer(vehicle)
 
     def initial(self, rotor_speed: float) -> CascadeMemory:
-        return CascadeMemory(np.full(4, rotor_speed), None)
+        return CascadeMemory(np.full(self._mixer.rotors, rotor_speed), None)
 
     def step(
         self, memory: CascadeMemory, time_us: int, state: VehicleState, references: Horizon

@@ -49,7 +49,7 @@ class GlobalMemory(NamedTuple):
     """State of the MPC between two control samples."""
 
     wrench: Array  # last U1 (N), U2..U4 (N m) decided, (4,); unbounded as in the thesis, so U1 may be negative
-    rotor_speeds: Array  # last commanded, in the vehicle's unit, (4,)
+    rotor_speeds: Array  # last commanded, in the vehicle's unit, (N,)
 
 
 class GlobalMpc:
@@ -73,7 +73,7 @@ class GlobalMpc:
         )
 
     def initial(self, rotor_speed: float) -> GlobalMemory:
-        speeds = np.full(4, rotor_speed)
+        speeds = np.full(self._mixer.rotors, rotor_speed)
         return GlobalMemory(self._mixer.wrench(speeds), speeds)
 
     def step(

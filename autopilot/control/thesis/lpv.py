@@ -6,7 +6,7 @@ import numpy as np
 
 from colibri.autopilot.control.thesis.lpv_model import ATTITUDE_OUTPUT, Discretisation, attitude_model, discretise
 from colibri.common.matrices import dot
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 STATES = ("phi", "phi_rate", "theta", "theta_rate", "psi", "psi_rate")
@@ -24,7 +24,7 @@ class Point(NamedTuple):
 
     phi_rate_rad_s: float = 0.0
     theta_rate_rad_s: float = 0.0
-    rotor_speeds: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    rotor_speeds: PerRotor = (0.0, 0.0, 0.0, 0.0)
 
 
 HOVER = Point()

@@ -1,7 +1,7 @@
 """The autopilot's model of the vehicle's motion, x' = f(x), and its integration.
 
-x, 17: position and velocity, ENU; quaternion, FLU to ENU; body rates, FLU; rotor speeds, the vehicle's unit. Neither
-wind nor ground is modelled.
+x, 13 + N: position and velocity, ENU; quaternion, FLU to ENU; body rates, FLU; rotor speeds, the vehicle's unit.
+Neither wind nor ground is modelled, nor forces across the z axis of tilted rotors.
 """
 
 from math import ceil, sqrt
@@ -15,8 +15,8 @@ from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-STATES = 17
-POSITION, VELOCITY, ATTITUDE, RATE, ROTORS = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), slice(13, 17)
+RIGID = 13
+POSITION, VELOCITY, ATTITUDE, RATE, ROTORS = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), slice(13, None)
 
 _STEP_S = 0.002
 _ROUNDING = 1e-6
@@ -28,15 +28,15 @@ class MotionModel(NamedTuple):
     mass_kg: float
     gravity_m_s2: float
     inertia: Array  # kg m², (3,)
-    allocation: Array  # squared rotor speeds to U1 (N), U2, U3, U4 (N m), (4, 4)
-    momentum: Array  # of each rotor along body z, signed, N m s per speed unit, (4,)
-    arms_m: Array  # forward and left of each rotor, (4, 2)
+    allocation: Array  # squared rotor speeds to U1 (N), U2, U3, U4 (N m), (4, N)
+    momentum: Array  # of each rotor along body z, signed, N m s per speed unit, (N,)
+    arms_m: Array  # forward and left of each rotor, (N, 2)
     drag: Array  # along the FLU axes, N s/m, (3,)
     rotor_drag: float  # of one rotor in its plane, N per m/s and per speed unit
     lag_up_s: float
     lag_down_s: float
     top_speed: float  # at the battery's full voltage
-    power_w: Array  # electrical, W per speed unit cubed, (4,)
+    power_w: Array  # electrical, W per speed unit cubed, (N,)
     full_voltage_v: float  # without load
     resistance_ohm: float
 
@@ -44,20 +44,20 @@ class MotionModel(NamedTuple):
 def motion_model(vehicle: Vehicle) -> MotionModel:
     rotors, drag, battery = vehicle.rotors, vehicle.drag, vehicle.battery
     allocation = vehicle.allocation()
-    torque = np.abs(allocation[3]) * vehicle.rad_s_per_speed_unit
+    torque = rotors.torque_coefficient * np.array(rotors.strength) * vehicle.rad_s_per_speed_unit
     return MotionModel(
         mass_kg=vehicle.body.mass_kg,
         gravity_m_s2=vehicle.gravity_m_s2,
         inertia=np.array(vehicle.body.inertia_kg_m2),
         allocation=allocation,
         momentum=vehicle.rotor_momentum(),
-        arms_m=np.array(rotors.position_m),
+        arms_m=vehicle.arms_m()[:, :2].copy(),
         drag=np.array(drag.linear_n_s_m if drag else (0.0, 0.0, 0.0)),
         rotor_drag=drag.rotor_coefficient if drag else 0.0,
         lag_up_s=rotors.lag.time_constant_up_s if rotors.lag else 0.0,
         lag_down_s=rotors.lag.time_constant_down_s if rotors.lag else 0.0,
         top_speed=rotors.max_speed,
-        power_w=torque / battery.efficiency if battery else np.zeros(4),
+        power_w=torque / battery.efficiency if battery else np.zeros(rotors.count),
         full_voltage_v=battery.full_voltage_v if battery else 1.0,
         resistance_ohm=battery.resistance_ohm if battery else 0.0,
     )
@@ -67,7 +67,7 @@ def motion_model(vehicle: Vehicle) -> MotionModel:
 def carry(
     x: Array, durations_s: Array, commands: Array, disturbance: Array, open_voltage_v: float, packed: Packed
 ) -> Array:
-    """Return x after `commands`, rotor speeds in the vehicle's unit, (n, 4), by the classical Runge-Kutta rule.
+    """Return x after `commands`, rotor speeds in the vehicle's unit, (n, N), by the classical Runge-Kutta rule.
 
     `disturbance` is acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, (6,).
     """
@@ -94,7 +94,7 @@ def carry(
 @compiled
 def thrust_n(speeds: Array, packed: Packed) -> float:
     thrust = 0.0
-    for i in range(4):
+    for i in range(speeds.shape[0]):
         thrust += packed[0].allocation[0, i] * speeds[i] * speeds[i]
     return thrust
 
@@ -105,7 +105,7 @@ def _write_derivative(
 ) -> None:
     top = _top_speed(x[13:], open_voltage_v, model)
     h, h_rate, u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(4):
+    for i in range(len(model.momentum)):
         speed = x[13 + i]
         way = min(target[i], top) - speed
         lag_s = model.lag_up_s if way > 0.0 else model.lag_down_s
@@ -122,7 +122,7 @@ def _write_derivative(
     vx, vy, vz = x[3], x[4], x[5]
     u, v, w = a * vx + d * vy + g * vz, b * vx + e * vy + j * vz, c * vx + f * vy + k * vz
     fx, fy, fz = -model.drag[0] * u, -model.drag[1] * v, u1 - model.drag[2] * w
-    for i in range(4):
+    for i in range(len(model.momentum)):
         drag, ahead_m, left_m = -model.rotor_drag * x[13 + i], model.arms_m[i, 0], model.arms_m[i, 1]
         rotor_fx, rotor_fy = drag * (u - r * left_m), drag * (v + r * ahead_m)
         fx += rotor_fx
@@ -145,7 +145,7 @@ def _write_derivative(
 @compiled
 def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> float:
     power_w = 0.0
-    for i in range(4):
+    for i in range(len(model.momentum)):
         power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
     voltage_v = loaded_voltage_v(open_voltage_v, power_w, model.resistance_ohm)
     return model.top_speed * (voltage_v / model.full_voltage_v)
@@ -156,5 +156,5 @@ def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: Motio
     if model.lag_up_s > 0.0:
         return
     top = _top_speed(target, open_voltage_v, model)
-    for i in range(4):
+    for i in range(len(model.momentum)):
         x[13 + i] = min(target[i], top)

@@ -107,6 +107,6 @@ def _swings(part: Samples) -> dict[float, float]:
 def _touches(vehicle: Vehicle, z: Array, up: Array) -> NDArray[np.bool_]:
     if vehicle.ground is None:
         return np.zeros(len(z), dtype=np.bool_)
-    heights = z[:, None] + up @ vehicle.ground.contacts_m(vehicle.rotors).T
+    heights = z[:, None] + up @ vehicle.contacts_m().T
     touches: NDArray[np.bool_] = heights.min(axis=1) <= vehicle.ground_height_m
     return touches

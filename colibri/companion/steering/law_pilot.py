@@ -91,11 +91,11 @@ class LawPilot:
         self._parts, self._tick = parts, 0
         self._heading = (0.0, 0.0, 0.0)
         self._ahead_s = 1e-6 * self._loop.preview.interval_us * np.arange(self._loop.preview.samples)
-        self._rotors = np.full(4, vehicle.hover_speed)
+        self._rotors = np.full(vehicle.rotors.count, vehicle.hover_speed)
         self._task: FlightTask = HoldTask()
-        carried = np.zeros(motion.STATES)
+        carried = np.zeros(motion.RIGID + vehicle.rotors.count)
         carried[6] = 1.0
-        motion.carry(carried, np.ones(1), np.zeros((1, 4)), _NO_DISTURBANCE, 1.0, self._motion)
+        motion.carry(carried, np.ones(1), np.zeros((1, vehicle.rotors.count)), _NO_DISTURBANCE, 1.0, self._motion)
 
     @property
     def start_enu_m(self) -> Vector:
@@ -116,7 +116,7 @@ class LawPilot:
         frame = _frame(0, y)
         self._tick = 0
         self._loop.begin(self._vehicle.hover_speed, self._loop.observe(frame).euler[2])
-        self._rotors = np.full(4, self._vehicle.hover_speed)
+        self._rotors = np.full(self._vehicle.rotors.count, self._vehicle.hover_speed)
         self._generator.follow(self._loop.observe(frame))
         self._task = HoldTask()
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from colibri.common.types import Array
+from colibri.common.types import Array, PerRotor
 from colibri.view.geometry import (
     Colour,
     about_up,
@@ -45,7 +45,7 @@ class VehicleScene:
         self._root = f"/world/{number}"
         self._airframe = airframe
         self._scale = scale
-        self._angles = (0.0, 0.0, 0.0, 0.0)
+        self._angles: PerRotor = (0.0,) * len(airframe.rotors_m)
         self._time_s: float | None = None
         colour = COLOURS[number % len(COLOURS)]
         self._frame = scene.add_frame(self._root, show_axes=False)
@@ -53,7 +53,7 @@ class VehicleScene:
         self._blades, self._discs = self._build(colour)
         self._thrust = scene.add_arrows(
             f"{self._root}/vehicle/thrust",
-            thrust_arrows(airframe, (0.0, 0.0, 0.0, 0.0), scale),
+            thrust_arrows(airframe, self._angles, scale),
             colors=(200, 60, 60),
             shaft_radius=0.06 * airframe.radius_m * scale,
             head_radius=0.16 * airframe.radius_m * scale,

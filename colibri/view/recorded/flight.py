@@ -167,9 +167,12 @@ class RecordedFlight:
 
 
 def airframe_of(vehicle: Vehicle) -> VehicleShape:
-    a, b, c, d = (1.0 if direction == "ccw" else -1.0 for direction in vehicle.rotors.direction)
     foot_m = vehicle.ground.foot_depth_m if vehicle.ground else 0.0
-    return VehicleShape(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
+    return VehicleShape(
+        rotors_m=tuple((x, y) for x, y, _ in vehicle.arms_m().tolist()),
+        spins=tuple(vehicle.rotors.spin().tolist()),
+        foot_m=foot_m,
+    )
 
 
 def _read(log: FlightFile, topic: Topic, apart_s: float) -> LogColumns:

@@ -40,7 +40,7 @@ def test_a_level_demand_at_hover_is_hover(name: str) -> None:
     demand = held(controller.preview.samples, 0.0, 0.0, 0.0)
     memory = controller.initial(VEHICLE.hover_speed)
     _, decision = controller.step_attitude(memory, 0, turned(0.0), demand)
-    check_rotor_speeds(name, decision.rotor_speeds, VEHICLE.rotors.max_speed)
+    check_rotor_speeds(name, decision.rotor_speeds, VEHICLE.rotors)
     assert decision.rotor_speeds == pytest.approx(np.full(4, VEHICLE.hover_speed), rel=1e-6)
     assert decision.attitude_reference == (0.0, 0.0, 0.0)
 

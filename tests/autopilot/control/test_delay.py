@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from colibri.autopilot.control.delay import MAX_DELAY_US, DelayCompensation
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.weather import Weather, Wind
@@ -20,7 +20,7 @@ HOVER = VEHICLE.hover_speed / VEHICLE.rotors.max_speed
 STILL = (0.0, 0.0, 0.0, 0.0)
 
 
-def wobble(sample: int) -> FourRotors:
+def wobble(sample: int) -> PerRotor:
     a, b = 0.02 * (-1) ** (sample // 5), 0.01 * (-1) ** (sample // 3)
     return (HOVER + a, HOVER + b, HOVER - a, HOVER - b)
 

@@ -30,7 +30,7 @@ def test_noise_depends_on_seed_and_time_alone() -> None:
     noise = Noise(noise_values("force=0.1,moment=0.01,motors=0.001"), 1)
     assert noise.over(4_000, 4_000) == Noise(noise_values("force=0.1,moment=0.01,motors=0.001"), 1).over(4_000, 4_000)
     assert noise.over(4_000, 4_000) != noise.over(8_000, 4_000)
-    assert Noise({"force": 0.1}, 2).over(0, 4_000)[1:] == ((0.0,) * 3, (1.0,) * 4)
+    assert Noise({"force": 0.1}, 2).over(0, 4_000)[1:] == ((0.0,) * 3, (1.0,) * 8)
 
 
 @pytest.mark.parametrize(

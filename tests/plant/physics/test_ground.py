@@ -77,7 +77,7 @@ def test_the_wrench_is_the_sum_over_the_points_that_touch(
     assert ground is not None
     R = np.array(rotation_matrix(attitude))
     force, moment = np.zeros(3), np.zeros(3)
-    for point in ground.contacts_m(VEHICLE.rotors):
+    for point in VEHICLE.contacts_m():
         depth_m = VEHICLE.ground_height_m - height_m - (R @ point)[2]
         slip = R @ (np.array(velocity) + np.cross(rate, point))
         normal_n = max(0.0, ground.stiffness_n_m * depth_m - ground.damping_n_s_m * slip[2]) * (depth_m > 0.0)

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.mavparm import MAVParmDict
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, enu_of
-from colibri.common.types import Array, FourRotors
+from colibri.common.types import Array, PerRotor
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.parameters.file import read
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
@@ -31,7 +31,7 @@ FRAME_US = 4000
 _EXACT = ("horizontal_noise_m", "vertical_noise_m", "horizontal_drift_m", "vertical_drift_m", "velocity_noise_m_s")
 
 
-def wrench(vehicle: Vehicle, controls: FourRotors) -> Array:
+def wrench(vehicle: Vehicle, controls: PerRotor) -> Array:
     """Return U1 (N), U2, U3, U4 (N m, FLU) at the controls of another autopilot's motors, in its order."""
     rotors = vehicle.rotors
     speeds = np.array(rotors.speeds_of(rotors.numbering().to_vehicle(controls))) * rotors.max_speed
@@ -44,7 +44,7 @@ def curve(expo: float, thrust: float) -> float:
     return thrust if expo == 0.0 else (expo - 1.0 + sqrt((1.0 - expo) ** 2 + 4.0 * expo * thrust)) / (2.0 * expo)
 
 
-def px4_motors(values: dict[str, int | float], thrust: float, torque_frd_nm: Array, max_n: float) -> FourRotors:
+def px4_motors(values: dict[str, int | float], thrust: float, torque_frd_nm: Array, max_n: float) -> PerRotor:
     """Return the controls by which PX4 answers a collective thrust (0 to 1) and a torque, by its parameters alone.
 
     The torque of a motor at p is p x F - KM F along its axis (0, 0, -1): KM above 0 turns counter-clockwise.

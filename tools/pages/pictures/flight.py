@@ -77,8 +77,8 @@ def _lines_at(table: SampleTable, first: int, last: int) -> list[Array]:
     turn = np.array(rotation_matrix(quaternion_from_euler(row["phi"], row["theta"], row["psi"])))
     here = trail[-1]
     thrust = np.array([here, here + turn @ [0.0, 0.0, _THRUST_M_N * row["U1"]]])
-    rotors = load_vehicle("hummingbird").rotors.position_m
-    tips = [here + turn @ [*(np.array(place) / np.hypot(*place) * _ARM_M), 0.0] for place in rotors]
+    arms_m = load_vehicle("hummingbird").arms_m()
+    tips = [here + turn @ (arm / np.linalg.norm(arm) * _ARM_M) for arm in arms_m]
     return [trail * [1.0, 1.0, 0.0], trail, thrust, np.array([tips[0], tips[2]]), np.array([tips[1], tips[3]])]
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.rotor_loss.detector import ALARM, MAX_EVIDENCE, RotorWatch
-from colibri.common.types import FourRotors
+from colibri.common.types import PerRotor
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
@@ -40,7 +40,7 @@ touchdowns = st.builds(
 
 
 class Watched:
-    def __init__(self, controls: FourRotors, start: Start = LEVEL) -> None:
+    def __init__(self, controls: PerRotor, start: Start = LEVEL) -> None:
         self.world = starting_world(start, HUMMINGBIRD)
         self.watch = RotorWatch(HUMMINGBIRD, SAMPLE_US * 1e-6)
         begin = start.rotors / rpm(HUMMINGBIRD, HUMMINGBIRD.rotors.max_speed)
@@ -76,7 +76,7 @@ def test_a_lost_rotor_is_named_after_two_samples(rotor: int) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(about_hover, starts, st.integers(0, 3))
-def test_it_is_named_in_any_attitude_and_at_any_rate(controls: FourRotors, start: Start, rotor: int) -> None:
+def test_it_is_named_in_any_attitude_and_at_any_rate(controls: PerRotor, start: Start, rotor: int) -> None:
     flight = Watched(controls, start)
     assert flight.fly(WHOLE, 5) is None
     assert flight.fly(lacking(rotor), WITHIN_SAMPLES) is not None
@@ -85,7 +85,7 @@ def test_it_is_named_in_any_attitude_and_at_any_rate(controls: FourRotors, start
 
 @settings(max_examples=30, deadline=None)
 @given(commands, starts, st.integers(0, 3), st.floats(0.6, 1.0))
-def test_a_weak_rotor_is_none_that_is_lost(controls: FourRotors, start: Start, rotor: int, part: float) -> None:
+def test_a_weak_rotor_is_none_that_is_lost(controls: PerRotor, start: Start, rotor: int, part: float) -> None:
     flight = Watched(controls, start)
     assert flight.fly(lacking(rotor, part), 25) is None
     assert flight.watch.max_evidence < 0.5 * ALARM

@@ -36,7 +36,7 @@ def flown(
         decision = decide(time_us, state_of(plant.world))
         if decision is None:
             break
-        plant.answer(ActuatorCommand(time_us, controls_of(decision, vehicle.rotors.max_speed), armed=True), ())
+        plant.answer(ActuatorCommand(time_us, controls_of(decision, vehicle.rotors), armed=True), ())
     return plant.world
 
 
