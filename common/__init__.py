@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from colibri.common.rotations import rotation_matrix as rotation_matrix
     from colibri.common.types import Address as Address
     from colibri.common.types import Array as Array
-    from colibri.common.types import PerRotor as PerRotor
     from colibri.common.types import Matrix as Matrix
+    from colibri.common.types import PerRotor as PerRotor
     from colibri.common.types import Quaternion as Quaternion
     from colibri.common.types import Vector as Vector
 else:

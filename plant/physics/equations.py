@@ -16,7 +16,7 @@ import numpy as np
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
 from colibri.common.matrices import put
-from colibri.common.types import Array, PerRotor, Matrix, Quaternion, Vector
+from colibri.common.types import Array, Matrix, PerRotor, Quaternion, Vector
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz")
 ROTORS = slice(13, -1)

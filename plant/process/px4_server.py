@@ -62,7 +62,7 @@ class Simulator:
         self._interval_us = round(1e3 / spec.rate) * 1000
         self._seed, self._speed, self._duration_us = spec.seed, spec.pace, spec.duration * 1e6
         self._link, self._status, self._stop = link, status, stop
-        self._end = SimulatorEnd(system_id=spec.system_id)
+        self._end = SimulatorEnd(system_id=spec.system_id, rotors=vehicle.rotors.count)
         self._logs = PlantLogs(spec.out, vehicle, spec.boot_unix_us, tlog=spec.tlog) if spec.out else None
         self._logged_calls = 1
         self._time_us = 0

@@ -39,6 +39,7 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
         frame_interval_us=interval_us,
         serves=tuple(builder.starts),
         waits=not spec.realtime,
+        rotors=builder.vehicle.rotors.count,
         is_there=is_bound,
     )
     server = Server(link, end, status, stop, logs, streams_truth=spec.truth)

@@ -40,7 +40,12 @@ class MemoryPlant:
             raise SettingError(str(error)) from error
         serves = tuple(self._builder.starts)
         self._answered = False
-        self._end = PlantEnd(system_id=spec.system_id, frame_interval_us=round(1e3 / spec.rate) * 1000, serves=serves)
+        self._end = PlantEnd(
+            system_id=spec.system_id,
+            frame_interval_us=round(1e3 / spec.rate) * 1000,
+            serves=serves,
+            rotors=self._builder.vehicle.rotors.count,
+        )
         self.plant: Plant | None = None
         self.clock: LinkClock = clock or StoppedClock()
 

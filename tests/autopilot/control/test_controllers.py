@@ -112,7 +112,7 @@ def test_a_foreign_law_that_goes_wild_ends_in_words(fly_theirs: FlyTheirs, link:
     wild = EXAMPLE.replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
     done = fly_theirs(wild, *THEIRS, link)
     assert done.returncode == 1
-    said = "colibri: error: controller their-name gave rotor speeds [nan nan nan nan] at t = 0.000 s: expected four"
+    said = "colibri: error: controller their-name gave rotor speeds [nan nan nan nan] at t = 0.000 s: expected 4"
     assert said in done.stderr
     assert "Traceback" not in done.stderr
 

@@ -167,9 +167,9 @@ class Faulty:
     [
         (1.0, "way: not this one"),
         (2.0, "ZeroDivisionError"),
-        (3.0, "controller faulty gave rotor speeds [nan nan nan nan]: expected four from 0 to 838"),
-        (4.0, "controller faulty gave rotor speeds [-1. -1. -1. -1.]: expected four from 0 to 838"),
-        (5.0, "controller faulty gave rotor speeds [1.e+09 1.e+09 1.e+09 1.e+09]: expected four from 0 to 838"),
+        (3.0, "controller faulty gave rotor speeds [nan nan nan nan]: expected 4 from 0 to 838"),
+        (4.0, "controller faulty gave rotor speeds [-1. -1. -1. -1.]: expected 4 from 0 to 838"),
+        (5.0, "controller faulty gave rotor speeds [1.e+09 1.e+09 1.e+09 1.e+09]: expected 4 from 0 to 838"),
         (6.0, "KeyError: 'nobody has this'"),
     ],
 )
