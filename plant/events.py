@@ -14,7 +14,6 @@ import msgspec
 from colibri.common.config import plain, read_toml
 from colibri.common.errors import shown, unknown
 from colibri.common.process.arguments import number
-from colibri.common.types import Vector
 from colibri.mavlink.client.events import EventError, Mode, Setpoint, StationEvent, TimedEvent
 from colibri.mavlink.hil import faults
 from colibri.mavlink.hil.faults import Equipment, Fault

@@ -8,6 +8,7 @@ import numpy as np
 from colibri.common.types import PerRotor, Vector
 from colibri.plant.environment.random_streams import RandomStream
 
+_ROTORS = 8  # the most of a vehicle
 NOISES = ("force", "moment", "motors")
 """N, N m, and parts of each rotor's command, for each root of hertz."""
 
@@ -17,8 +18,7 @@ class Disturbed(NamedTuple):
 
     force_n: Vector
     moment_n_m: Vector
-    factors: PerRotor
-    """For `MAX_ROTORS` rotors."""
+    factors: PerRotor  # at least as many as rotors
 
 
 class Noise:
@@ -26,7 +26,7 @@ class Noise:
 
     def __init__(self, densities: Mapping[str, float], seed: int) -> None:
         force, moment, motors = (densities.get(name, 0.0) for name in NOISES)
-        self._densities = np.array([force] * 3 + [moment] * 3 + [motors] * MAX_ROTORS)
+        self._densities = np.array([force] * 3 + [moment] * 3 + [motors] * _ROTORS)
         self._key = np.random.SeedSequence(seed, spawn_key=(RandomStream.NOISE,)).generate_state(2, np.uint64)
 
     def over(self, time_us: int, duration_us: int) -> Disturbed:

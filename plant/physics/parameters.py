@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from colibri.common.matrices import inverse
 from colibri.common.types import Vector
 from colibri.plant.physics.equations import PlantParameters
 from colibri.plant.vehicle.description import Vehicle
@@ -54,5 +55,5 @@ def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> PlantParameters:
     if not vehicle.is_flat:
         inertia = vehicle.body.inertia()
         axes = np.concatenate([rotors.axes(), arms_m[:, 2:]], axis=1)
-        numbers = numbers._replace(axes=axes, inertia=np.array([inertia, np.linalg.inv(inertia)]))
+        numbers = numbers._replace(axes=axes, inertia=np.array([inertia, inverse(inertia)]))
     return numbers

@@ -214,7 +214,7 @@ class FreeServer(Server):
             self._silence.end(now_us * 1e-6)
         waiting = ": the rotors are stopped, waiting for the autopilot"
         if self._silence.lasts(begin_us * 1e-6, self._missing, begin_us, waiting):
-            plant.arrive(begin_us, ActuatorCommand(begin_us, plant.vehicle.rotors.stopped, armed=False))
+            plant.arrive(begin_us, ActuatorCommand(begin_us, (0.0,) * len(plant.world.rotor_speeds), armed=False))
         plant.inject(faults)
         plant.go_on()
         return True
