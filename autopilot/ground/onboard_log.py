@@ -1,8 +1,10 @@
-"""A ULog of each flight for ground stations."""
+"""A log of each flight for ground stations, as ULog or DataFlash."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, Protocol
 
-from colibri.mavlink.files.flight_log import FlightLog
+from colibri.mavlink.dataflash.recorder import DataFlashRecorder
+from colibri.mavlink.files.flight_log import ULOG_NAMES, FlightLog, LogNames
 from colibri.mavlink.files.tree import Files
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.statustext import Line
@@ -11,26 +13,68 @@ from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.recorder import Recorder
 
 LOGS = "logs"
+Write = Callable[[bytes], None]
+
+
+class FlightRecorder(Protocol):
+    """Encodes a flight as a log of one format."""
+
+    def begin(self) -> bytes: ...
+
+    def update(self, snapshot: TelemetrySnapshot) -> None: ...
+
+    def say(self, time_us: int, severity: int, text: str) -> None: ...
+
+    def flush(self) -> None: ...
+
+
+class LoggedVehicle(NamedTuple):
+    """What a log says of its vehicle."""
+
+    name: str
+    system_id: int
+    parameters: Parameters
+    banner: str = ""  # program and version, by which readers of DataFlash know the vehicle
+    boot_unix_us: int = 0  # Unix time at simulated time 0; 0 if unknown
+
+
+class LogFormat(NamedTuple):
+    """Format of the logs, and numbers as their readers expect them."""
+
+    names: LogNames
+    first_id: int  # of LOG_ENTRY
+    recorder: Callable[[LoggedVehicle, Write], FlightRecorder]
 
 
 class _Topics(TopicLog):
     """Appends topics to the log of the current flight."""
 
-    def __init__(self, log: FlightLog) -> None:
+    def __init__(self, write: Write) -> None:
         super().__init__()
-        self._log = log
+        self._write = write
 
     def append(self, encoded: bytes) -> None:
-        self._log.record(encoded)
+        self._write(encoded)
+
+
+def _ulog(vehicle: LoggedVehicle, write: Write) -> FlightRecorder:
+    return Recorder(_Topics(write), vehicle.name, vehicle.system_id, vehicle.parameters, with_battery=True)
+
+
+def _dataflash(vehicle: LoggedVehicle, write: Write) -> FlightRecorder:
+    return DataFlashRecorder(write, vehicle.parameters, vehicle.banner, vehicle.boot_unix_us)
+
+
+ULOG = LogFormat(ULOG_NAMES, 0, _ulog)
+DATAFLASH = LogFormat(LogNames(".BIN", 8), 1, _dataflash)
 
 
 class OnboardLog:
     """Records snapshots and status texts while armed."""
 
-    def __init__(self, vehicle: str, system_id: int, parameters: Parameters, files: Files) -> None:
-        self._log = FlightLog(files, (LOGS,))
-        self._topics = _Topics(self._log)
-        self._recorder = Recorder(self._topics, vehicle, system_id, parameters, with_battery=True)
+    def __init__(self, vehicle: LoggedVehicle, files: Files, form: LogFormat = ULOG) -> None:
+        self._log = FlightLog(files, (LOGS,), form.names)
+        self._recorder = form.recorder(vehicle, self._log.record)
         self._snapshot: TelemetrySnapshot | None = None
         self._armed = False
 
@@ -41,10 +85,10 @@ class OnboardLog:
     def update(self, snapshot: TelemetrySnapshot | None, said: Iterable[Line], now_us: int, *, armed: bool) -> None:
         begins, ends = armed and not self._armed, self._armed and not armed
         self._armed = armed
-        if begins:
-            self._log.update(armed, now_us)
-            self._log.record(self._recorder.begin())
         log, recorder = self._log, self._recorder
+        if begins:
+            log.update(armed, now_us)
+            log.record(recorder.begin())
         if log.name is None:
             return
         for line in said:
@@ -53,9 +97,9 @@ class OnboardLog:
             recorder.update(snapshot)
         self._snapshot = snapshot
         if ends:
-            self._topics.flush()
+            recorder.flush()
         log.update(armed, now_us)
 
     def close(self) -> None:
-        self._topics.flush()
+        self._recorder.flush()
         self._log.close()

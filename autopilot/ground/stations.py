@@ -13,7 +13,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import MODES, custom_mode
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.ground.fault_injection import Failures
-from colibri.autopilot.ground.onboard_log import LOGS, OnboardLog
+from colibri.autopilot.ground.onboard_log import LOGS, LoggedVehicle, OnboardLog
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
@@ -157,7 +157,8 @@ class Stations:
         )
         self.snapshot: TelemetrySnapshot | None = None
         self._logged: TelemetrySnapshot | None = None
-        self.log = OnboardLog(vehicle_name, settings.system_id, parameters, files)
+        logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, boot_unix_us=settings.boot_unix_us)
+        self.log = OnboardLog(logged, files)
 
     def use(self, channel: int, kind: str) -> None:
         self._streams.use(channel, kind)

@@ -1,19 +1,39 @@
 """Numbered logs of flights, from arming to disarming."""
 
+from typing import NamedTuple
+
 from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names
 
-SUFFIX = ".ulg"
 KEPT = 50
 WRITE_BYTES = 4096
 WRITE_EVERY_US = 1_000_000
 
 
+class LogNames(NamedTuple):
+    """Names of logs: a number of at least so many digits, and a suffix."""
+
+    suffix: str
+    digits: int
+
+    def name(self, number: int) -> str:
+        return f"{number:0{self.digits}}{self.suffix}"
+
+    def number(self, name: str) -> int:
+        """Return the number in a log's name, 0 for another file."""
+        number = name.removesuffix(self.suffix)
+        return int(number) if name != number and number.isascii() and number.isdigit() else 0
+
+
+ULOG_NAMES = LogNames(".ulg", 5)
+
+
 class FlightLog:
     """Writer of logs into a folder; removes the oldest for new ones."""
 
-    def __init__(self, files: Files, folder: Names = (), kept: int = KEPT) -> None:
+    def __init__(self, files: Files, folder: Names = (), names: LogNames = ULOG_NAMES, kept: int = KEPT) -> None:
         self._files = files
         self._folder = folder
+        self._names = names
         self._kept = kept
         self.name: str | None = None  # of the open file
         self.refusal: FileRefusal | None = None  # of the last write, which ended the log
@@ -46,8 +66,7 @@ class FlightLog:
         logs = self._logs()
         for log in logs[: max(len(logs) - self._kept + 1, 0)]:
             self._files.remove((*self._folder, log.name))
-        number = _number(logs[-1].name) + 1 if logs else 1
-        name = f"{number:05}{SUFFIX}"
+        name = self._names.name(self._names.number(logs[-1].name) + 1 if logs else 1)
         place = (*self._folder, name)
         self.refusal = self._files.create(place)
         if self.refusal is FileRefusal.NOT_FOUND and self._folder:  # a ground station removed it
@@ -77,9 +96,5 @@ class FlightLog:
     def _logs(self) -> list[Entry]:
         found = self._files.list(self._folder)
         entries = [] if isinstance(found, FileRefusal) else found
-        return sorted((entry for entry in entries if _number(entry.name)), key=lambda entry: _number(entry.name))
-
-
-def _number(name: str) -> int:
-    number = name.removesuffix(SUFFIX)
-    return int(number) if name != number and number.isascii() and number.isdigit() else 0
+        number = self._names.number
+        return sorted((entry for entry in entries if number(entry.name)), key=lambda entry: number(entry.name))

@@ -1,7 +1,8 @@
 """Flight logs: listed, downloaded and erased.
 
 Specification: messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html.
-Logs are the files of one folder sorted by name; a log's id is its index in the client's last list.
+Logs are the files of one folder sorted by name; a log's id is its index in the client's last list, counted from 0 as
+in PX4 or from 1 as in ArduPilot.
 """
 
 from collections import deque
@@ -55,8 +56,13 @@ class Logs:
         folder: Names = (),
         being_written: Callable[[], str | None] = lambda: None,
         budget: Budget | None = None,
+        *,
+        suffix: str = "",
+        first_id: int = 0,
     ) -> None:
+        """Serve the files that end in `suffix`; `being_written` returns the name of the one that is not erased."""
         self._files, self._budget = files, budget or Budget()
+        self._suffix, self._first_id = suffix, first_id
         self._folder = folder
         self._being_written = being_written
         self._shown: dict[Peer, list[Entry]] = {}
@@ -67,7 +73,8 @@ class Logs:
     def receive(self, message: Message, peer: Peer, _now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "LOG_REQUEST_LIST":
-            return self._list(peer, fields.start, fields.end)
+            first = self._first_id
+            return self._list(peer, max(fields.start - first, 0), fields.end - first)
         if message.name == "LOG_REQUEST_DATA":
             return self._transfer(peer, fields.id, fields.ofs, fields.count)
         if message.name == "LOG_ERASE":
@@ -107,8 +114,13 @@ class Logs:
         until = min(last + 1, listing.next + at_most)
         for number in range(listing.next, until):
             log = logs[number]
-            facts = (len(logs), len(logs) - 1, log.modified_s & _UINT32_MAX, min(log.size, _UINT32_MAX))
-            yield to(listing.peer, "LOG_ENTRY", number, *facts)
+            facts = (
+                len(logs),
+                len(logs) - 1 + self._first_id,
+                log.modified_s & _UINT32_MAX,
+                min(log.size, _UINT32_MAX),
+            )
+            yield to(listing.peer, "LOG_ENTRY", number + self._first_id, *facts)
         listing.next = until
         if until > last:
             self._listings.pop(listing.peer, None)
@@ -117,7 +129,7 @@ class Logs:
         found = self._files.list(self._folder)
         logs = () if isinstance(found, FileRefusal) else found
         self._budget.spend(ENTRY_US * len(logs))
-        logs = [entry for entry in logs if not entry.is_folder and entry.name not in self._erasing]
+        logs = [entry for entry in logs if self._is_log(entry) and entry.name not in self._erasing]
         self._shown.pop(peer, None)
         if len(self._shown) >= MAX_PEERS:
             forgotten = first_to_go(self._shown)
@@ -129,7 +141,9 @@ class Logs:
     def _transfer(self, peer: Peer, number: int, offset: int, count: int) -> Iterable[Send]:
         logs = self._shown.pop(peer) if peer in self._shown else self._look(peer)
         self._shown[peer] = logs  # last in line to be forgotten
-        reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else FileRefusal.NOT_FOUND
+        place = number - self._first_id
+        known = 0 <= place < len(logs)
+        reading = self._files.open((*self._folder, logs[place].name)) if known else FileRefusal.NOT_FOUND
         if isinstance(reading, FileRefusal) or offset >= reading.size or count == 0:
             return (_block(peer, number, offset, b""),)  # "zero for end of log"
         transfer = _Transfer(peer, number, reading, offset, offset + count)
@@ -143,6 +157,9 @@ class Logs:
             self._transfers.append(transfer)
         return ()
 
+    def _is_log(self, entry: Entry) -> bool:
+        return not entry.is_folder and entry.name.endswith(self._suffix)
+
     def _stop(self, peer: Peer) -> None:
         self._listings.pop(peer, None)
         self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
@@ -152,7 +169,7 @@ class Logs:
         kept = self._being_written()
         logs = () if isinstance(found, FileRefusal) else found
         self._budget.spend(ENTRY_US * len(logs))
-        self._erasing = {entry.name: None for entry in logs if not entry.is_folder and entry.name != kept}
+        self._erasing = {entry.name: None for entry in logs if self._is_log(entry) and entry.name != kept}
         self._shown.clear()
         self._listings.clear()
         self._transfers.clear()

@@ -52,6 +52,9 @@ class Recorder:
     def say(self, time_us: int, severity: int, text: str) -> None:
         self._log.append(messages.SYNC + messages.logged_string(time_us, severity, text))
 
+    def flush(self) -> None:
+        self._log.flush()
+
     def _record_parameters(self) -> None:
         if self._parameters.revision == self._revision:
             return

@@ -1,23 +1,27 @@
 """The log that ground stations download: what is recorded, and that it is whole at every instant."""
 
 from io import BytesIO
+from pathlib import Path
 
 import pytest
 from pyulog import ULog
 
-from colibri.autopilot.ground.onboard_log import OnboardLog
+from colibri.autopilot.ground.onboard_log import DATAFLASH, ULOG, LogFormat, LoggedVehicle, OnboardLog
 from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.files.tree import OpenFile
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
 from colibri.mavlink.services.statustext import INFO, Line
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog.blocks import EVERY_US
+from colibri.mavlink.wire.dialect import mav
+from tests.support.dataflash import read_dataflash
 
 SAMPLE_US = 8_000
 
 
 class Flight:
-    def __init__(self, memory: MemoryFiles | None = None) -> None:
+    def __init__(self, memory: MemoryFiles | None = None, form: LogFormat = ULOG) -> None:
+        self.form = form
         self.memory = memory or MemoryFiles()
         self.memory.make_folder(("logs",))
         self.parameters = Parameters([Parameter(name="A", kind=ParamType.REAL, default=1.0, description="")])
@@ -25,7 +29,7 @@ class Flight:
         self.now_us = 0
 
     def begun(self) -> OnboardLog:
-        return OnboardLog("Test", 1, self.parameters, self.memory)
+        return OnboardLog(LoggedVehicle("Test", 1, self.parameters, "ArduCopter V4.7.0"), self.memory, self.form)
 
     def run(self, samples: int, *said: str, armed: bool = True) -> None:
         for number in range(samples):
@@ -84,3 +88,19 @@ def test_who_was_killed_in_flight_begins_another_one(flight: Flight) -> None:
     first, second = (times_us(flight.read(name)) for name in names(flight))
     assert first[0] < second[0]
     assert second[-1] > flight.now_us - EVERY_US
+
+
+def test_as_dataflash_a_log_opens_in_ardupilots_reader(tmp_path: Path) -> None:
+    flight = Flight(form=DATAFLASH)
+    flight.run(50, "Arming motors")
+    flight.parameters.set("A", 2.5)
+    flight.run(50)
+    flight.run(1, armed=False)
+    assert names(flight) == ["00000001.BIN"]
+    kind, found = read_dataflash(tmp_path / "log.BIN", flight.content("00000001.BIN"))
+    assert kind == mav.MAV_TYPE_QUADROTOR
+    assert [row.Message for row in found["MSG"]] == ["ArduCopter V4.7.0", "Arming motors"]
+    assert [row.Value for row in found["PARM"]] == [1.0, 2.5]
+    assert [row.Id for row in found["EV"]] == [10, 11]
+    assert [row.ArmState for row in found["ARM"]] == [1, 0]
+    assert [row.TimeUS for row in found["ATT"]] == [8_000, *range(40_000, 808_001, 40_000)]

@@ -66,6 +66,17 @@ def data(logs: Logs, number: int, offset: int, count: int, peer: Peer = GROUND) 
     return blocks(drain(logs, ask(logs, "LOG_REQUEST_DATA", number, offset, count, peer=peer)))
 
 
+def test_ids_may_begin_at_one(memory: MemoryFiles) -> None:
+    memory.create(("logs", "00000001.BIN"))
+    memory.create(("logs", "00000002.BIN"))
+    memory.write(("logs", "00000002.BIN"), 0, b"two")
+    logs = Logs(memory, ("logs",), suffix=".BIN", first_id=1)
+    assert entries(logs) == [(1, 2, 2, 0, 0), (2, 2, 2, 0, 3)]
+    assert entries(logs, 2, 2) == [(2, 2, 2, 0, 3)]
+    assert data(logs, 2, 0, ALL) == [(2, 0, b"two")]
+    assert data(logs, 0, 0, ALL) == [(0, 0, b"")]
+
+
 def test_logs_are_listed(logs: Logs) -> None:
     assert entries(logs) == [(0, 3, 2, 0, 30_001), (1, 3, 2, 0, 0), (2, 3, 2, 0, 180)]
     assert entries(logs, 1, 1) == [(1, 3, 2, 0, 0)]

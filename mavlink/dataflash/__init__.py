@@ -1,0 +1,1 @@
+"""ArduPilot's log of a flight, DataFlash `.BIN`."""
