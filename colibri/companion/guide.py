@@ -7,27 +7,36 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.rotations import tilt_deg
-from colibri.companion.home import moved_m
-from colibri.companion.identification.step_flight import StepFlight
-from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
-from colibri.companion.setpoint_forms import message_of, row_of
+from colibri.companion.setpoints import LogRow, TrackErrors, message_of, row_of
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.stack import Response
-from colibri.companion.stacks.thrust_curve import Thrust
+from colibri.companion.stack import Response, Thrust
 from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
-from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
-from colibri.companion.steering.smooth_start import smoothly_started
-from colibri.companion.supervision.ages import ages_s, too_old
+from colibri.companion.steering.references import PastReference, ReferenceHistory, smoothly_started
+from colibri.companion.steps import StepFlight
 from colibri.companion.supervision.checks import CheckFacts, failing
-from colibri.companion.supervision.conditions import Situation, conditions
-from colibri.companion.supervision.consistency import Consistency
-from colibri.companion.supervision.ending import CompanionEnd, how_it_ended
-from colibri.companion.supervision.limits import CRITICAL, FlightFacts, FlightRegion, Limit, box_of, exceeded
-from colibri.companion.supervision.pace import SetpointRate
-from colibri.companion.supervision.phases import CompanionPhase, PhaseCondition, next_phase
-from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer
+from colibri.companion.supervision.limits import (
+    CRITICAL,
+    FlightFacts,
+    FlightRegion,
+    Limit,
+    ages_s,
+    box_of,
+    exceeded,
+    too_old,
+)
+from colibri.companion.supervision.monitors import Consistency, SetpointRate
+from colibri.companion.supervision.phases import (
+    CompanionEnd,
+    CompanionPhase,
+    PhaseCondition,
+    Situation,
+    conditions,
+    how_it_ended,
+    next_phase,
+)
+from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer, moved_m
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 

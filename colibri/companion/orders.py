@@ -3,7 +3,7 @@
 from math import nan
 
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.stack import Stack, TakeOffOrder
+from colibri.companion.stack import Stack, TakeOffOrder
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.companion.vehicle_peer import VehiclePeer
 from colibri.mavlink.client.conversation import UNANSWERED

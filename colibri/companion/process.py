@@ -21,17 +21,16 @@ from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
-from colibri.companion.home import HomeSeeker, LocalOrigin
-from colibri.companion.log import FlightSummary, LogRow
 from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
 from colibri.companion.report import report
 from colibri.companion.response_file import read_response
+from colibri.companion.setpoints import FlightSummary, LogRow
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stacks.recognition import STACKS
-from colibri.companion.steering.stay import stay_of
+from colibri.companion.stacks import STACKS
+from colibri.companion.steering.references import stay_of
 from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import CompanionPhase
-from colibri.companion.vehicle_peer import VehiclePeer
+from colibri.companion.vehicle_peer import HomeSeeker, LocalOrigin, VehiclePeer
 from colibri.flights.folder import occupied
 from colibri.mavlink.links.link import GroundLink, LinkError
 from colibri.mavlink.links.open import check_reach, open_ground_link
@@ -293,8 +292,7 @@ def _signing(path: Path | None) -> tuple[Signing | None, str]:
 
 
 def _identify(companion: Companion, status: Status, out: Path) -> None:
-    from colibri.companion.identification.figure import draw
-    from colibri.companion.identified import identified
+    from colibri.companion.identification import draw, identified
 
     try:
         found, text, fitted = identified(companion)

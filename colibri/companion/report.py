@@ -5,7 +5,7 @@ from typing import Any
 
 from colibri.autopilot.control.interface import Fallback
 from colibri.companion.guide import Companion
-from colibri.companion.log import FlightSummary
+from colibri.companion.setpoints import FlightSummary
 
 SETTLED_AFTER_S = 20.0
 

@@ -8,7 +8,7 @@ import msgspec
 from colibri.common.config import UNREADABLE, NotNegative, Positive, Table
 from colibri.common.files import read_text
 from colibri.companion.errors import CompanionError
-from colibri.companion.stacks.stack import Response
+from colibri.companion.stack import Response
 
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
 Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
 
-from colibri.companion.home import LocalOrigin
-from colibri.companion.stacks.stack import Response, Stack
-from colibri.companion.steering.stay import Stay
+from colibri.companion.stack import Response, Stack
+from colibri.companion.steering.references import Stay
 from colibri.companion.supervision.limits import FlightLimits
+from colibri.companion.vehicle_peer import LocalOrigin
 
 
 class SetpointKind(StrEnum):

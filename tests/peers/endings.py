@@ -15,7 +15,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.stacks.px4 import HOLD
+from colibri.companion.stacks import HOLD
 from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.mavlink.wire.dialect import mav

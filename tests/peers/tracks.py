@@ -13,7 +13,7 @@ from time import perf_counter
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.companion.guide import Companion
-from colibri.companion.identified import identified
+from colibri.companion.identification import identified
 from colibri.companion.settings import CompanionSettings
 from colibri.plant.vehicle.description import load_vehicle
 from tests.peers.half_speed import PATIENT, Bench, on_the_plant, own_physics

@@ -13,9 +13,9 @@ from colibri.common.jit import packed
 from colibri.common.kernels import exp
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array, Vector
-from colibri.companion.stacks.stack import Response
+from colibri.companion.stack import Response
 from colibri.companion.steering import response as model
-from colibri.companion.steering.slowness import lateness_s, slowness
+from colibri.companion.steering.response import lateness_s, slowness
 from colibri.mavlink.client.states import TimedState
 from colibri.plant.vehicle.description import Vehicle
 

@@ -4,10 +4,8 @@ from collections.abc import Callable, Mapping
 from math import hypot, inf, isfinite
 from typing import NamedTuple
 
-from colibri.companion.stacks.stack import Stack, TakeOffOrder
-from colibri.companion.stacks.thrust_curve import Thrust
-from colibri.companion.supervision.ages import missing, too_old
-from colibri.companion.supervision.limits import FlightLimits, FlightRegion
+from colibri.companion.stack import Stack, TakeOffOrder, Thrust
+from colibri.companion.supervision.limits import FlightLimits, FlightRegion, missing, too_old
 from colibri.mavlink.client.clock import MAX_DRIFT
 from colibri.mavlink.client.report import VehicleReport
 

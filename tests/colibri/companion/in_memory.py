@@ -10,8 +10,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
-from colibri.companion.supervision.ending import CompanionEnd
-from colibri.companion.supervision.phases import CompanionPhase
+from colibri.companion.supervision.phases import CompanionEnd, CompanionPhase
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.vehicle import Sitl

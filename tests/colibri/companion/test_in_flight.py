@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.companion.identified import identified
+from colibri.companion.identification import identified
 from colibri.companion.settings import CompanionSettings, SetpointKind
-from colibri.companion.stacks.colibri import COLIBRI
+from colibri.companion.stacks import COLIBRI
 from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import CompanionPhase
 from colibri.mavlink.wire.dialect import Codec, Message, mav

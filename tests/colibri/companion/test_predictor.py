@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from colibri.common.jit import packed
-from colibri.companion.stacks.stack import Response
+from colibri.companion.stack import Response
 from colibri.companion.steering import response as model
 from colibri.companion.steering.predictor import Predictor
 from colibri.mavlink.client.states import TimedState

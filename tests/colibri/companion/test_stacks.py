@@ -4,11 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.companion.stacks.ardupilot import ARDUPILOT
-from colibri.companion.stacks.colibri import COLIBRI
-from colibri.companion.stacks.px4 import PX4
-from colibri.companion.stacks.recognition import recognised
-from colibri.companion.stacks.thrust_curve import MiddleHovers, ThrustCurve
+from colibri.companion.stack import MiddleHovers, ThrustCurve
+from colibri.companion.stacks import ARDUPILOT, COLIBRI, PX4, recognised
 from colibri.mavlink.wire.dialect import mav
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from colibri.companion.identified import identified
+from colibri.companion.identification import identified
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.supervision.phases import CompanionPhase
 from tests.colibri.companion.in_memory import Ride

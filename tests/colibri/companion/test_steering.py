@@ -10,14 +10,14 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.companion.errors import CompanionError
-from colibri.companion.identification.fit import RateLog, fit
-from colibri.companion.identification.steps import duration_s, step_at
+from colibri.companion.identification import RateLog, fit
 from colibri.companion.response_file import read_response, response_text
-from colibri.companion.stacks.px4 import PX4
-from colibri.companion.stacks.stack import Response
+from colibri.companion.stack import Response
+from colibri.companion.stacks import PX4
 from colibri.companion.steering import response as model
 from colibri.companion.steering.law_pilot import turning_no_faster
-from colibri.companion.steering.smooth_start import OVER_S, smoothly_started
+from colibri.companion.steering.references import OVER_S, smoothly_started
+from colibri.companion.steps import duration_s, step_at
 from colibri.plant.vehicle.description import load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird")

@@ -7,13 +7,11 @@ from typing import Any
 
 import pytest
 
-from colibri.companion.stacks.ardupilot import ARDUPILOT
-from colibri.companion.stacks.px4 import PX4
-from colibri.companion.stacks.thrust_curve import ThrustCurve
-from colibri.companion.supervision.ages import AGES
+from colibri.companion.stack import ThrustCurve
+from colibri.companion.stacks import ARDUPILOT, PX4
 from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
-from colibri.companion.supervision.limits import LIMITS, FlightFacts, FlightLimits, FlightRegion, exceeded
-from colibri.companion.supervision.pace import SetpointRate
+from colibri.companion.supervision.limits import AGES, LIMITS, FlightFacts, FlightLimits, FlightRegion, exceeded
+from colibri.companion.supervision.monitors import SetpointRate
 from colibri.companion.supervision.phases import TABLE, CompanionPhase, PhaseCondition, next_phase
 from colibri.mavlink.client.report import VehicleReport
 

@@ -1,16 +1,21 @@
-"""Fit a rate lag to commanded and measured body rates by its output error.
+"""Identification of the body-rate response: a lag fitted by its output error, its figure, and its file.
 
 The simulated rates follow the commands alone, so feedback of the law does not bias the fit.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from colibri.common.types import Array
 from colibri.companion.errors import CompanionError
+from colibri.companion.guide import Companion
+from colibri.companion.response_file import response_text
+from colibri.companion.stack import Response
 
 _GRID_S = 0.002
 MAX_LATENCY_S = 0.12
@@ -147,3 +152,67 @@ def _second_order(lag_s: float, behind_s: float) -> tuple[Array, Array]:
     first = (1.0 + (slow * u - fast * v) / (fast - slow)).real
     last = (u * v + (slow * v - fast * u) / (fast - slow)).real
     return np.array([0.0, first, last]), np.array([1.0, -(u + v).real, (u * v).real])
+
+
+_AXES = ("p", "q", "r")
+
+
+def draw(fit: Fit, path: Path) -> None:
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    t = fit.grid_s - fit.grid_s[0]
+    for axis, (name, plot) in enumerate(zip(_AXES, figure.subplots(3, 1, sharex=True), strict=True)):
+        plot.plot(t, fit.measured[:, axis], label="measured", linewidth=1.0)
+        plot.plot(t, fit.modelled[:, axis], label=f"lag of order {fit.order}", linewidth=1.0)
+        lag_ms, explained = 1e3 * fit.time_constant_s[axis], 100.0 * fit.explained[axis]
+        plot.set_title(f"{name}: {lag_ms:.0f} ms, after {1e3 * fit.latency_s:.0f} ms; {explained:.0f} % explained")
+        plot.set_ylabel("rad/s")
+        plot.grid(alpha=0.3)
+    figure.axes[0].legend(loc="upper right")
+    figure.axes[-1].set_xlabel("s")
+    figure.savefig(path, dpi=110)
+
+
+class Identified(NamedTuple):
+    """A response, the text of its file, and its fit."""
+
+    response: Response
+    text: str
+    fit: Fit
+
+
+def identified(companion: Companion) -> Identified:
+    """Fit the response to a companion's steps."""
+    stack, steps = companion.peer.stack, companion.steps
+    assert stack is not None, "it has flown"
+    assert steps is not None, "it was an identification"
+    commanded, measured = (np.reshape(rows, (-1, 4)) for rows in (steps.commanded, steps.measured))
+    found = fit(RateLog(commanded[:, 0], commanded[:, 1:], measured[:, 0], measured[:, 1:]))
+    p, q, r = found.time_constant_s.tolist()
+    response = stack.response._replace(time_constant_s=(p, q, r), latency_s=found.latency_s)
+    if found.order > 1:
+        response = _of_second_order(response, found)
+    explained = ", ".join(f"{100.0 * part:.0f}" for part in found.explained)
+    remarks = [
+        f"Identified in flight on {stack.name}: a lag of order {found.order} of the body rates p, q, r.",
+        f"It explains {explained} % of their variance. For colibri companion --response.",
+    ]
+    return Identified(response, response_text(response, companion.thrust_scale, remarks), found)
+
+
+def _of_second_order(response: Response, found: Fit) -> Response:
+    """Add the lags of the accelerations, and raise their limits to the rate loop's largest demand.
+
+    A law built for less would brake late after a disturbance, and swing.
+    """
+    p, q, r = found.acceleration_lag_s.tolist()
+    most_p, most_q, most_r = (
+        max(assumed, rate / lag_s) if behind_s > 0.0 else assumed
+        for assumed, rate, lag_s, behind_s in zip(
+            response.max_acceleration_rad_s2,
+            response.max_rate_rad_s,
+            response.time_constant_s,
+            (p, q, r),
+            strict=True,
+        )
+    )
+    return response._replace(acceleration_lag_s=(p, q, r), max_acceleration_rad_s2=(most_p, most_q, most_r))
