@@ -1,6 +1,6 @@
 """The attitude under a law that commands moments, as an uncertain loop (docs/certificate.md).
 
-State, 12: errors of the attitude, angles as in the law's `Kinematics`, each before its body rate; moments M1, M2, M3;
+State, 12: errors of the attitude, angles as in `of_error`, each before its body rate; moments M1, M2, M3;
 and the remembered commands. Over an interval h
 
     ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + κ e3 (M(h) - M) + ξ_ω
@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
+from colibri.common.types import Array
 
 PHI, P, THETA, Q, PSI, R, M1, M2, M3 = range(9)
 """States of the attitude and its moments; the remembered commands follow."""
@@ -41,6 +42,17 @@ _STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
 """phi, theta, psi, rad, to p, q, r, rad/s."""
 
 
+Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
+"""From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""
+
+
+class CertifiedConditions(NamedTuple):
+    """Conditions of a certificate: disturbing moment, and used part of the battery's charge."""
+
+    disturbance_n_m: float
+    charge_part: float
+
+
 class AttitudeNumbers(NamedTuple):
     """The numbers of a loop, as a certificate holds them.
 
@@ -48,7 +60,7 @@ class AttitudeNumbers(NamedTuple):
         stays: exp(-h / lag), to 16 digits.
         commanded: C, (2, 3, 12): commanded and remembered moments.
         unsure: Bounds of their further dependence on each state, (2, 3, 12).
-        angles: Ranges, as the `Kinematics` need them.
+        angles: Ranges, as in `of_error`.
         momentum_n_m_s: Range of the rotors' |h| along body z.
         spin_s: κ Iz of rotors at one speed; `spin_spread_s` is its variation by each moment.
         from_moments: Squared rotor speeds of moments, in units of the largest, (4, 3).
@@ -85,7 +97,26 @@ class Kinematic(NamedTuple):
     max_angles: AnyArray
 
 
-Kinematics: TypeAlias = Callable[[AttitudeNumbers], Kinematic]
+def of_error(n: AttitudeNumbers) -> Kinematic:
+    """Return T of ε, twice the vector part of the error quaternion, in body axes: ε' = (η + ½ [ε]×) ω.
+
+    It is affine in ε and η = √(1 - ¼ ε²). `n.angles` are the ranges of |ε|, and the least η.
+    """
+    *ranges, least = n.angles
+    x, y, z = ranges = np.array(ranges)
+    if least <= 0 or 4 * least * least > 4 - x * x - y * y - z * z:
+        raise RangeError("errors of the attitude are too large together")
+    corners = np.array(list(product((-1, 1), repeat=3))) * ranges
+    vertices = np.array([_of_quaternion(corner, eta) for corner in corners for eta in (least, 1)])
+    change = abs(vertices).max(0) @ n.rates_rad_s / 2  # of ½ ε
+    along = ranges @ n.rates_rad_s / 4
+    dx, dy, dz = change
+    return Kinematic(vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges)
+
+
+def _of_quaternion(error: AnyArray, eta: Any) -> AnyArray:
+    x, y, z = error
+    return np.array([[eta, -z / 2, y / 2], [z / 2, eta, -x / 2], [-y / 2, x / 2, eta]])
 
 
 class VertexBox(NamedTuple):
@@ -100,9 +131,9 @@ class VertexBox(NamedTuple):
     max_angles: AnyArray
 
 
-def attitude_loop(numbers: AttitudeNumbers, number: Number, kinematics: Kinematics) -> UncertainLoop:
+def attitude_loop(numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
     n = AttitudeNumbers(*(_made(value, number) for value in numbers))
-    box = box_of(n, kinematics)
+    box = box_of(n)
     eye: AnyArray = np.array([[number(float(i == j)) for j in range(_SIZE)] for i in range(_SIZE)])
     applied, _ = n.commanded
     change = applied - eye[_COMMANDS]
@@ -128,8 +159,8 @@ def _made(value: Any, number: Number) -> Any:
     return np.array([_made(item, number) for item in value]) if isinstance(value, list) else number(value)
 
 
-def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> VertexBox:
-    kinematic, max_change, max_angles = kinematics(n)
+def box_of(n: AttitudeNumbers) -> VertexBox:
+    kinematic, max_change, max_angles = of_error(n)
     p, q, r = n.rates_rad_s
     gyroscopic = np.array([_gyroscopic(n.inertia_kg_m2, a * p, b * q, c * r) for a, b, c in product(_SIGNS, repeat=3)])
     return VertexBox(

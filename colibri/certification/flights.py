@@ -4,12 +4,13 @@ The law's own kinematics, Euler's equation with the rotors' momentum, and the la
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
-from colibri.certification.attitude import ANGLES, INPUTS, M1, RATES, STATES, AttitudeNumbers
-from colibri.certification.certificate import CertifiedLaw, ProofEntry
+from colibri.certification.attitude import ANGLES, INPUTS, M1, RATES, STATES, Momentum
+from colibri.certification.certificate import ProofEntry
+from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.common.types import Array
 
 _SUBSTEPS = 4
@@ -19,55 +20,6 @@ _RESONANCE_RAD_S = 28.0
 _KINDS = 4
 _INSIDE = 1.0 - 1e-9
 _NO_LENGTH = 1e-12
-
-Momentum: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
-"""From moments and their rates, (flights, 3), to the rotors' momentum along body z and its rate, (flights,)."""
-
-
-class CertifiedConditions(NamedTuple):
-    """Conditions of a certificate: disturbing moment, and used part of the battery's charge."""
-
-    disturbance_n_m: float
-    charge_part: float
-
-
-class Flyer(Protocol):
-    """A law in flight."""
-
-    def commands(self, z: Array) -> tuple[Array, Array]:
-        """Return commanded and remembered moments, (flights, 3), at `z`, (flights, 12)."""
-
-    def turn(self, angles: Array, rates: Array) -> Array:
-        """Return the rates of the angle errors, rad/s."""
-
-    def momentum(self) -> Momentum: ...
-
-
-class AttitudeLaw(CertifiedLaw, Protocol):
-    """A law of the attitude, to be certified and flown."""
-
-    what: str
-    axes: tuple[str, str, str]
-    not_proven: tuple[str, ...]
-    conditions: CertifiedConditions
-    terminal_weight: Array
-    """Of the law's plans, (12, 12)."""
-    thrust_n: tuple[float, float, float]
-    """Hover between both ends of the profile's range."""
-    thrust_part: float = 1.0
-    """Part of the scale for the thrust."""
-
-    def thrusts_n(self, scale: float) -> tuple[float, float]:
-        """Return the range of the thrust at a scale of the ranges."""
-        (low, hover, high), part = self.thrust_n, self.thrust_part * scale
-        return hover - part * (hover - low), hover + part * (high - hover)
-
-    def ranges(self, numbers: AttitudeNumbers) -> str: ...
-
-    def held(self, entry: ProofEntry) -> Array:
-        """Return the largest |phi| and |theta|, rad, around which an entry's set may lie."""
-
-    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> Flyer: ...
 
 
 class FlownErrors(NamedTuple):
@@ -97,7 +49,7 @@ class BorderFlights(NamedTuple):
     seed: int
 
 
-def fly(law: AttitudeLaw, entry: ProofEntry, plan: BorderFlights) -> FlownErrors:
+def fly(law: PlannedAttitude, entry: ProofEntry, plan: BorderFlights) -> FlownErrors:
     """Fly from points all over the border V = 1 to attitudes that may be held, under the largest disturbance.
 
     The moment is constant, random at every sample, at the resonance, or always the worst for V.
@@ -105,7 +57,7 @@ def fly(law: AttitudeLaw, entry: ProofEntry, plan: BorderFlights) -> FlownErrors
     numbers, proof = entry.numbers, entry.proof
     flights, rng = plan.flights, np.random.default_rng(plan.seed)
     z = np.linalg.solve(np.linalg.cholesky(proof.P).T, _directions(rng, flights, STATES + INPUTS).T).T * _INSIDE
-    held = rng.uniform(-1.0, 1.0, (flights, 2)) * law.held(entry)
+    held = rng.uniform(-1.0, 1.0, (flights, 2)) * HELD_RAD
     constant, kinds = _directions(rng, flights, INPUTS), np.arange(flights)[:, None] % _KINDS
     inertia, gain = np.array(numbers.inertia_kg_m2), np.array(numbers.commanded[0])
     flyer = law.flyer(entry, held, rng)

@@ -26,12 +26,12 @@ from colibri.certification.attitude import (
     RATES,
     STATES,
     AttitudeNumbers,
-    Kinematic,
+    CertifiedConditions,
+    Momentum,
     attitude_loop,
 )
 from colibri.certification.certificate import ProofEntry
-from colibri.certification.flights import AttitudeLaw, CertifiedConditions, Flyer, Momentum
-from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
+from colibri.certification.loop import Number, RangeError, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
@@ -46,7 +46,7 @@ _STEP = 1e-4
 """Step of a derivative, rad, rad/s and N m."""
 _SPARED = 0.2
 """Part of the thrust's squared speed that moments leave to every rotor."""
-_HELD_RAD = radians(20.0)
+HELD_RAD = radians(20.0)
 """Largest held |phi| and |theta|: the gain depends on phi, as the heading has its own weight."""
 _GRID = 4
 _BETWEEN = 1.5
@@ -55,7 +55,7 @@ _ETA_SPARE = 1e-9
 _PREDICTED = 16
 
 
-class PlannedAttitude(AttitudeLaw):
+class PlannedAttitude:
     """The unconstrained attitude law of a profile; C as in `AttitudeNumbers`."""
 
     what = "unconstrained attitude law of lpv-mpc"
@@ -90,20 +90,21 @@ class PlannedAttitude(AttitudeLaw):
         self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, hover_n).round(_GAIN_DIGITS)])
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
-        return attitude_loop(numbers, number, of_error)
+        return attitude_loop(numbers, number)
 
     def ranges(self, numbers: AttitudeNumbers) -> str:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
 
-    def held(self, entry: ProofEntry) -> Array:
-        del entry
-        return np.full(2, _HELD_RAD)
+    def thrusts_n(self, scale: float) -> tuple[float, float]:
+        """Return the range of the thrust at a scale of the ranges."""
+        (low, hover, high), part = self.thrust_n, self.thrust_part * scale
+        return hover - part * (hover - low), hover + part * (high - hover)
 
-    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> Flyer:
+    def flyer(self, entry: ProofEntry, held: Array, rng: np.random.Generator) -> "PlanFlyer":
         flights = len(held)
         thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
         headings = rng.uniform(-pi, pi, flights)
-        return _PlanFlyer(self, np.column_stack([held, headings]), thrusts_n)
+        return PlanFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
         momentum = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed
@@ -192,13 +193,13 @@ class PlannedAttitude(AttitudeLaw):
         return np.stack(columns, axis=2)
 
     def _unsure(self, thrusts_n: tuple[float, float]) -> Array:
-        grid = product(np.linspace(-_HELD_RAD, _HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self.thrust_n[1]))
+        grid = product(np.linspace(-HELD_RAD, HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self.thrust_n[1]))
         differs = [np.abs(self._gain(phi, thrust_n) - self.commanded) for phi, thrust_n in grid]
         unsure: Array = (_BETWEEN * np.max(differs, axis=0)).round(_GAIN_DIGITS)
         return unsure
 
 
-class _PlanFlyer:
+class PlanFlyer:
     """Flights by the law's own steps, each with its plan."""
 
     def __init__(self, law: PlannedAttitude, held: Array, thrusts_n: Array) -> None:
@@ -237,25 +238,3 @@ def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, 
         w * j - x * k + y * v + z * i,
         w * k + x * j - y * i + z * v,
     )
-
-
-def of_error(n: AttitudeNumbers) -> Kinematic:
-    """Return T of ε, twice the vector part of the error quaternion, in body axes: ε' = (η + ½ [ε]×) ω.
-
-    It is affine in ε and η = √(1 - ¼ ε²). `n.angles` are the ranges of |ε|, and the least η.
-    """
-    *ranges, least = n.angles
-    x, y, z = ranges = np.array(ranges)
-    if least <= 0 or 4 * least * least > 4 - x * x - y * y - z * z:
-        raise RangeError("errors of the attitude are too large together")
-    corners = np.array(list(product((-1, 1), repeat=3))) * ranges
-    vertices = np.array([_of_quaternion(corner, eta) for corner in corners for eta in (least, 1)])
-    change = abs(vertices).max(0) @ n.rates_rad_s / 2  # of ½ ε
-    along = ranges @ n.rates_rad_s / 4
-    dx, dy, dz = change
-    return Kinematic(vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges)
-
-
-def _of_quaternion(error: AnyArray, eta: Any) -> AnyArray:
-    x, y, z = error
-    return np.array([[eta, -z / 2, y / 2], [z / 2, eta, -x / 2], [-y / 2, x / 2, eta]])

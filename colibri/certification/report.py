@@ -1,23 +1,85 @@
-"""`colibri certify`: certify a profile's law, fly it, and print a table."""
+"""`colibri certify`: certify a profile's law, fly it, print a table and draw a figure."""
 
 from argparse import Namespace
-from math import log
+from math import degrees, log
+from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from scipy.linalg import eigh
 
 from colibri.analysis.tables import print_table, write_table
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.certification import certificate as certificates
-from colibri.certification.attitude import ANGLES, RATES
+from colibri.certification.attitude import ANGLES, PHI, PSI, RATES, THETA, CertifiedConditions, P, R
 from colibri.certification.certificate import Certificate, NotCertifiedError, ProofEntry
-from colibri.certification.figure import draw
-from colibri.certification.flights import AttitudeLaw, BorderFlights, CertifiedConditions, FlownErrors, fly
-from colibri.certification.planned_attitude import PlannedAttitude
+from colibri.certification.flights import BorderFlights, FlownErrors, fly
+from colibri.certification.loop import AnyArray
+from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+_SHOWN = 60
+_POINTS = 181
+_RATE_NAMES = {P: "p (rad/s)", R: "r (rad/s)"}
+
+
+def draw(certificate: Certificate, flown: FlownErrors, axes_names: tuple[str, ...], path: Path) -> None:
+    errors = zip((PHI, THETA, PSI), axes_names, strict=True)
+    names = _RATE_NAMES | {state: f"error {name} (deg)" for state, name in errors}
+    figure = Figure(figsize=(8.6, 6.9), layout="constrained")
+    axes = figure.subplots(2, 2)
+    for ax, pair in zip(axes.flat, ((PHI, P), (PHI, THETA), (PSI, R)), strict=False):
+        _draw_sets(ax, certificate, flown, *pair)
+        ax.set(xlabel=names[pair[0]], ylabel=names[pair[1]])
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=8, frameon=False)
+    _draw_values(axes[1, 1], certificate, flown)
+    figure.savefig(path, dpi=150)
+
+
+def _draw_sets(ax: Axes, certificate: Certificate, flown: FlownErrors, across: int, up: int) -> None:
+    units = np.array([_unit(across), _unit(up)])
+    shown = flown.states[:, :_SHOWN][:, :, [across, up]] * units
+    never_left, tended_to = (np.linalg.inv(each.proof.P) for each in (certificate.invariant, certificate.attractor))
+    plane = np.ix_([across, up], [across, up])
+    at_rest = np.linalg.inv(certificate.invariant.proof.P[plane])
+    for shape, color, style, label in (
+        (never_left[plane], "#0072B2", "-", "invariant set: its projection"),
+        (at_rest, "#0072B2", "--", "its section: no other error"),
+        (tended_to[plane], "#D55E00", "-", "ultimate bound"),
+    ):
+        border = _border(shape) * units[:, None]
+        ax.plot(*border, color=color, linestyle=style, linewidth=1.6, label=label, zorder=3)
+    ax.plot(shown[:, 0, 0], shown[:, 0, 1], color="#999999", linewidth=0.7, label=f"{shown.shape[1]} of the flights")
+    ax.plot(shown[:, 1:, 0], shown[:, 1:, 1], color="#999999", linewidth=0.4)
+    ax.plot(shown[0, :, 0], shown[0, :, 1], ".", color="#444444", markersize=3, label="their starts: V = 1")
+    ax.grid(color="#DDDDDD", linewidth=0.6)
+
+
+def _draw_values(ax: Axes, certificate: Certificate, flown: FlownErrors) -> None:
+    times = np.arange(len(flown.values)) * certificate.invariant.numbers.interval_s
+    ax.semilogy(times, flown.values.max(axis=1), color="black", label=f"largest of {flown.values.shape[1]} flights")
+    ax.semilogy(times, np.median(flown.values, axis=1), color="#999999", label="median")
+    ax.axhline(1.0, color="black", linewidth=0.8, linestyle="--")
+    ax.set(xlabel="time (s)", ylabel="V, 1 on the border")
+    ax.grid(color="#DDDDDD", linewidth=0.6)
+    ax.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), fontsize=8)
+
+
+def _border(shape: AnyArray) -> Array:
+    """Return the border, (2, n), of xᵀ shape⁻¹ x <= 1."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS)
+    border: Array = np.linalg.cholesky(shape) @ np.array([np.cos(angles), np.sin(angles)])
+    return border
+
+
+def _unit(state: int) -> float:
+    return 180.0 / np.pi if state in (PHI, THETA, PSI) else 1.0
+
 
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
 LAW = "lpv-mpc"
@@ -76,7 +138,7 @@ def certify_profile(args: Namespace) -> int:
     return 0
 
 
-def law_of(profile: Profile, vehicle: Vehicle, conditions: CertifiedConditions) -> AttitudeLaw:
+def law_of(profile: Profile, vehicle: Vehicle, conditions: CertifiedConditions) -> PlannedAttitude:
     name = profile.controller
     if name != LAW:
         raise UncertifiableError(f"{profile.where}: {name} cannot be certified: only {LAW} can")
@@ -85,11 +147,10 @@ def law_of(profile: Profile, vehicle: Vehicle, conditions: CertifiedConditions) 
     return PlannedAttitude(profile.table(name), vehicle, conditions)
 
 
-def table(found: Certificate, law: AttitudeLaw, flown: FlownErrors) -> list[tuple[str, ...]]:
+def table(found: Certificate, law: PlannedAttitude, flown: FlownErrors) -> list[tuple[str, ...]]:
     _, decay, invariant, attractor, terminal = found
-    held = np.degrees(law.held(invariant))
     rate = -log(decay.proof.ratio) / (2.0 * decay.numbers.interval_s)
-    least, most = law.thrusts_n(invariant.scale)
+    (least, most), held_deg = law.thrusts_n(invariant.scale), degrees(HELD_RAD)
     weights = _relative(terminal.proof.P, law.terminal_weight)
     margin = min(min(entry.margins.values()) for entry in found)
     at_rest = 1.0 / np.sqrt(np.diag(invariant.proof.P))
@@ -100,7 +161,7 @@ def table(found: Certificate, law: AttitudeLaw, flown: FlownErrors) -> list[tupl
         ("decay without disturbance", "", "", f"exp(-{rate:.2f} t), t in s"),
         _reach("invariant set", invariant),
         ("its section: no other error", *_triples(at_rest), ""),
-        ("held attitude", f"{held[0]:.1f}, {held[1]:.1f}, any", "0", ""),
+        ("held attitude", f"{held_deg:.1f}, {held_deg:.1f}, any", "0", ""),
         _reach("ultimate bound, in proportion to the moment", attractor, f"{attractor.numbers.disturbance_n_m:g} N m"),
         ("terminal weight", "", "", f"{weights.min():.2f} to {weights.max():.3g} times the profile's"),
         ("flights: V after the start", "", "", f"at most {flown.values[1:].max():.3f}"),
@@ -116,7 +177,7 @@ def _relative(weight: Array, other: Array) -> Array:
     return found
 
 
-def _ranges(what: str, entry: ProofEntry, law: AttitudeLaw) -> tuple[str, ...]:
+def _ranges(what: str, entry: ProofEntry, law: PlannedAttitude) -> tuple[str, ...]:
     rates = ", ".join(f"{rate:.2f}" for rate in entry.numbers.rates_rad_s)
     return what, law.ranges(entry.numbers), rates, f"{entry.scale:.3f} of the profile's"
 

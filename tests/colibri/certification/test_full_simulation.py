@@ -16,8 +16,8 @@ from colibri.autopilot.control.lpv_mpc.mpc import Plan as QpPlan
 from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.certification import certificate as certificates
-from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.flights import BorderFlights, CertifiedConditions, fly
+from colibri.certification.attitude import AttitudeNumbers, CertifiedConditions
+from colibri.certification.flights import BorderFlights, fly
 from colibri.certification.planned_attitude import PlannedAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion

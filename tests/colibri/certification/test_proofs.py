@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from colibri.certification import exact, lyapunov
+from colibri.certification import certificate, lyapunov
 from colibri.certification.loop import UncertainLoop, supply
-from colibri.certification.semidefinite import Inequality, minimise
+from colibri.certification.lyapunov import Inequality, minimise
 from colibri.common.types import Array
 
 
@@ -31,7 +31,9 @@ def scalar(*poles: float, gain: float = 0.0, disturbance: float = 0.1) -> Uncert
 
 def in_fractions(loop: UncertainLoop) -> UncertainLoop:
     fractions = {
-        name: np.vectorize(exact.exactly, otypes=[object])(each) for name, each in loop._asdict().items() if each.size
+        name: np.vectorize(certificate.exactly, otypes=[object])(each)
+        for name, each in loop._asdict().items()
+        if each.size
     }
     return loop._replace(**fractions | {"mirrors": loop.mirrors})
 
@@ -90,24 +92,24 @@ def test_a_proof_is_confirmed_and_one_that_is_spoilt_is_not() -> None:
     proof = lyapunov.invariant_set(loop)
     assert proof
     fractions = in_fractions(loop)
-    assert exact.decrease_margin(fractions, proof) > 0.0
-    assert exact.supply_margin(fractions, proof) > 0.0
-    assert exact.limit_margin(fractions, proof) > 0.0
-    assert exact.limit_margin(fractions, proof._replace(P=0.9 * proof.P)) == 0.0
-    assert exact.decrease_margin(fractions, proof._replace(ratio=0.6)) == 0.0
-    assert exact.decrease_margin(fractions, proof._replace(multipliers=-proof.multipliers)) == 0.0
-    assert exact.supply_margin(fractions, proof._replace(ratio=1.0)) < 0.0
+    assert certificate.decrease_margin(fractions, proof) > 0.0
+    assert certificate.supply_margin(fractions, proof) > 0.0
+    assert certificate.limit_margin(fractions, proof) > 0.0
+    assert certificate.limit_margin(fractions, proof._replace(P=0.9 * proof.P)) == 0.0
+    assert certificate.decrease_margin(fractions, proof._replace(ratio=0.6)) == 0.0
+    assert certificate.decrease_margin(fractions, proof._replace(multipliers=-proof.multipliers)) == 0.0
+    assert certificate.supply_margin(fractions, proof._replace(ratio=1.0)) < 0.0
 
 
 @pytest.mark.parametrize(("beside", "positive"), [("0.999999999999", True), ("1", False), ("1.000000000001", False)])
 def test_what_is_positive_definite_is_decided_exactly(beside: str, positive: bool) -> None:
     off = Fraction(beside)
     M = np.array([[Fraction(1), off], [off, Fraction(1)]], dtype=object)
-    assert exact.is_positive(M) == positive
+    assert certificate.is_positive(M) == positive
 
 
 def test_decimals_are_taken_as_they_are_written() -> None:
-    assert exact.exactly(0.1) == Fraction(1, 10)
+    assert certificate.exactly(0.1) == Fraction(1, 10)
 
 
 def test_the_quadratic_bound_holds_wherever_the_linear_one_does() -> None:
