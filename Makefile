@@ -112,7 +112,7 @@ bench: setup
 	$(BIN)/python -m tools.bench
 
 # What of docs/ the code writes in no time; the pages with flights in them: python -m tools.pages PAGE docs.
-PAGES := failsafes faults modes parameters pictures.house $(addprefix reference.,command_line files keys messages python)
+PAGES := failsafes faults modes parameters $(addprefix reference.,command_line files keys messages python)
 pages: setup
 	for page in $(PAGES); do $(BIN)/python -m tools.pages $$page docs || exit 1; done
 

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from colibri.sitl.errors import SitlError
-from colibri.sitl.junit import SAID, attachments, in_system_out
 from colibri.sitl.marks import MARKS, arguments, described, setting_values, signature, without_effect, written
-from colibri.sitl.summary import FLOWN, Summary
+from colibri.sitl.summary import FLOWN, SAID, Summary, attachments, in_system_out
 
 if TYPE_CHECKING:
     from colibri.sitl.backends.launcher import Launcher

@@ -1,11 +1,13 @@
-"""Errors of a flight's estimate against the truth, and its tracking errors."""
+"""Errors of a flight's estimate against the truth and its covariance: NEES and NIS against the bounds of χ².
+
+Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, section 5.4.
+"""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from colibri.analysis.consistency import NAVIGATION, Errors
 from colibri.analysis.logs import RecordingError, Rows, at_times, read_blocks, read_series
 from colibri.analysis.recording import path_times, read_lags
 from colibri.autopilot.estimation.measurements.table import KINDS, kinds_of
@@ -15,6 +17,30 @@ from colibri.common.types import Array, Vector
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.ulog.flight_topics import ESTIMATE, FILTER, TRUTH, Topic
 from colibri.mavlink.ulog.log import TopicReader
+
+NAVIGATION = 9
+"""Position, velocity, attitude."""
+
+
+class Errors(NamedTuple):
+    """True minus estimated position, m, velocity, m/s, ENU, and attitude, rad, body, with covariance (9, 9)."""
+
+    error: Array
+    covariance: Array
+
+    def nees(self, first: int = 0, count: int = NAVIGATION) -> float:
+        """Return the normalised estimation error squared of a part."""
+        part = slice(first, first + count)
+        return float(self.error[part] @ np.linalg.solve(self.covariance[part, part], self.error[part]))
+
+
+def bounds(numbers: int, flights: int, level: float = 0.95) -> tuple[float, float]:
+    """Return bounds of the mean of χ² with `numbers` degrees of freedom over `flights`."""
+    from scipy.special import chdtri  # slow to load, and scipy.stats, which has it too, slower: a report does without
+
+    lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
+    return lower / flights, upper / flights
+
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
 MEASURED = KINDS

@@ -8,9 +8,8 @@ from typing import Any
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
-from colibri.bench.speed import Report, real_time_factor, sampled, summarised
+from colibri.bench.speed import TRACK, Report, plan_of, real_time_factor, sampled, summarised
 from colibri.bench.stages import summary
-from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.flights.flight import SYSTEM_ID
 from colibri.flights.fly import fly_plan

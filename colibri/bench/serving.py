@@ -15,9 +15,8 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.copter import copter_autopilot
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.bench.speed import Report, sampled
+from colibri.bench.speed import TRACK, Report, plan_of, sampled
 from colibri.bench.stages import Figures, summary
-from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.flights.flight import Direct, SteppedFlight

@@ -1,17 +1,46 @@
-"""Real-time factors at several frame rates, beside a peer if there is one."""
+"""Flights with variants of profile `flight`, and real-time factors at several rates, beside a peer if there is one."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
+import msgspec
+
 from colibri.autopilot.control.profile import Profile
-from colibri.bench.variants import TRACK, plan_of, with_intervals
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.flights.fly import fly_plan
 from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError
+from colibri.flights.spec import FlightSpec
+from colibri.mavlink.hil.feedback import Feedback
+
+CONTROLLER = "lpv-mpc"
+TRACK = "lemniscate"
+
+
+def with_blocks(profile: Profile, blocks: Sequence[int]) -> Profile:
+    table = profile.table(CONTROLLER)
+    return _with_table(profile, {**table, "plan": {**table["plan"], "blocks": list(blocks)}})
+
+
+def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Profile:
+    simulation = msgspec.structs.replace(profile.simulation, frame_interval_s=frame_s)
+    changed = _with_table(profile, {**profile.table(CONTROLLER), "control_interval_s": control_s})
+    return msgspec.structs.replace(changed, simulation=simulation)
+
+
+def plan_of(
+    profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback = Feedback.STATE
+) -> FlightPlan:
+    options = {"profile": profile, "link": link, "feedback": feedback, "duration": duration_s, "out": folder}
+    return FlightPlan.of(FlightSpec.of(TRACK, **options))
+
+
+def _with_table(profile: Profile, table: Mapping[str, Any]) -> Profile:
+    return msgspec.structs.replace(profile, controllers={**profile.controllers, CONTROLLER: dict(table)})
+
 
 Report: TypeAlias = Callable[[str], None]
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.core.autopilot import Autopilot
-from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_blocks
+from colibri.bench.speed import CONTROLLER, TRACK, plan_of, with_blocks
 from colibri.flights.in_process import fly_locally
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd

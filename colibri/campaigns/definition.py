@@ -11,19 +11,19 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, TypeVar
 import msgspec
 from numpy.random import PCG64, Generator, SeedSequence
 
-from colibri.campaigns.factors import factor_name
-from colibri.campaigns.metrics import Metric, read_metrics, usual
-from colibri.campaigns.values import (
+from colibri.campaigns.factors import (
     CampaignError,
     Choice,
     Draw,
     Level,
+    factor_name,
     first_twice,
     has_levels,
     is_number,
     read_draw,
     read_values,
 )
+from colibri.campaigns.metrics import Metric, read_metrics, usual
 from colibri.common.config import plain, read_settings, read_toml
 from colibri.common.errors import checked, unknown
 from colibri.common.process.arguments import seeds

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
+from colibri.campaigns.factors import is_number
 from colibri.campaigns.flight_table import FlightTable, wilson
-from colibri.campaigns.values import is_number
 from colibri.common.types import Array
 
 COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")

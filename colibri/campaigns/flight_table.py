@@ -9,8 +9,8 @@ import numpy as np
 
 from colibri.analysis.tables import Row
 from colibri.campaigns.definition import Campaign
+from colibri.campaigns.factors import CampaignError, is_number, shown
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.values import CampaignError, is_number, shown
 from colibri.experiments.table import SampleTable
 
 _NORMAL_95 = 1.959963984540054

@@ -13,8 +13,8 @@ import msgspec
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import controller_names, origin_of, origin_of_factory
 from colibri.campaigns.definition import Campaign
+from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flights import Common, FlightResult
-from colibri.campaigns.values import CampaignError, shown
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes, regular
 

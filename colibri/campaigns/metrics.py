@@ -5,7 +5,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.factors import CampaignError
 from colibri.common.errors import checked, unknown
 from colibri.experiments.flight import Flight
 

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from colibri.analysis.tables import comma_separated
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.journal import keep_files
-from colibri.campaigns.values import CampaignError
 from colibri.experiments.notebook import figure_html, table_html
 
 if TYPE_CHECKING:

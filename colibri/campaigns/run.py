@@ -9,12 +9,11 @@ from typing import Any
 from warnings import warn
 
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, campaign_of, tables_of
-from colibri.campaigns.engines.engine import Engine
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines.pool import Engine, Pool
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
 from colibri.campaigns.results import CampaignResults, parquet_writer
-from colibri.campaigns.values import CampaignError
 from colibri.common.errors import checked
 from colibri.common.process.folder_lock import FolderLock
 from colibri.flights.effects import NoEffectWarning

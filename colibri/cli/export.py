@@ -35,7 +35,7 @@ def run(args: Namespace) -> int:
         if args.csv:
             written.append(write_csv(log, tables))
         if args.mat:
-            from colibri.analysis.mat import write_mat
+            from colibri.analysis.export import write_mat
 
             written.append(write_mat(log, path, path.with_suffix(".mat")))
         if args.parquet:

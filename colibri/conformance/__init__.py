@@ -9,12 +9,12 @@ if TYPE_CHECKING:
     from colibri.conformance.check import check_controller as check_controller
     from colibri.conformance.loop_flight import held as held
     from colibri.conformance.loop_flight import restarted as restarted
-    from colibri.conformance.rebuild import rebuilt as rebuilt
-    from colibri.conformance.rows import Result as Result
-    from colibri.conformance.rows import Row as Row
+    from colibri.conformance.restart_checks import rebuilt as rebuilt
     from colibri.conformance.step_records import FlownStep as FlownStep
     from colibri.conformance.step_records import flown_steps as flown_steps
     from colibri.conformance.step_records import jumped as jumped
+    from colibri.conformance.subject import Result as Result
+    from colibri.conformance.subject import Row as Row
     from colibri.conformance.subject import built as built
 else:
     __getattr__, __dir__ = public(__name__)

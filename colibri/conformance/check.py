@@ -15,8 +15,7 @@ from colibri.conformance.limit_checks import limit_checks
 from colibri.conformance.memory_checks import memory_checks
 from colibri.conformance.optional_checks import optional_checks
 from colibri.conformance.restart_checks import restart_checks
-from colibri.conformance.rows import Check, Result, Row
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Check, Result, Row, Subject
 from colibri.experiments.notebook import table_html
 
 CHECKS: dict[str, Check] = {

@@ -9,9 +9,8 @@ from colibri.analysis.outcome import fly_to_its_end
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.registry import in_words
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.conformance.rows import Result, Row, judged, not_applicable
 from colibri.conformance.step_records import fly_for_steps
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 
 AREA, TIME_AREA = "flights", "time"
 _HOVER_S, _MAX_DRIFT_M = 8.0, 0.5

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.control.interface import Controller, Preview
 from colibri.autopilot.control.registry import BuildError, in_words
 from colibri.common.errors import Error
-from colibri.conformance.rows import Result, Row, judged
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Result, Row, Subject, judged
 
 AREA = "interface"
 

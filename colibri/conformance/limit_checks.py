@@ -9,9 +9,8 @@ from colibri.autopilot.control.interface import Decision
 from colibri.autopilot.control.registry import DecisionError, check_rotor_speeds, in_words
 from colibri.common.errors import Error
 from colibri.common.types import Array
-from colibri.conformance.rows import Row, judged, not_applicable
 from colibri.conformance.step_records import FlownStep, fly_for_steps, jumped
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Row, Subject, judged, not_applicable
 
 AREA = "limits"
 _S, _SAMPLES = 0.4, 6

@@ -10,9 +10,8 @@ import numpy as np
 from colibri.autopilot.control.registry import in_words
 from colibri.common.serialization import to_bytes
 from colibri.common.types import Array
-from colibri.conformance.rows import Result, Row, judged, not_applicable
 from colibri.conformance.step_records import FlownStep, fly_for_steps, own_copy
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Result, Row, Subject, judged, not_applicable
 
 AREA = "memory"
 _TRACK, _OTHER = "lemniscate:lap=10,height=5", "hover:height=3"

@@ -12,9 +12,8 @@ from colibri.conformance import interface_checks as interface
 from colibri.conformance.interface_checks import Protocol, has
 from colibri.conformance.limit_checks import out_of_limits
 from colibri.conformance.loop_flight import HELD_S, hold
-from colibri.conformance.rows import Row, judged, not_applicable
 from colibri.conformance.step_records import FlownStep, fly_for_steps
-from colibri.conformance.subject import Subject
+from colibri.conformance.subject import Row, Subject, judged, not_applicable
 
 AREA = "optional"
 _TRACK = "hover:height=3"

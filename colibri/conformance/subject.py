@@ -1,11 +1,12 @@
-"""The control law under test, and commands that repeat its flights."""
+"""The control law under test, commands that repeat its flights, and rows of the table."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from shlex import join, quote
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 from colibri.autopilot.control.interface import Controller
 from colibri.autopilot.control.law_files import table_of
@@ -117,3 +118,36 @@ def _word(value: Any) -> str:
 def _option(name: str, value: Any) -> str:
     said = ",".join(f"{key}={each!r}" for key, each in value.items()) if isinstance(value, Mapping) else value
     return f"--{name.replace('_', '-')}={said}"
+
+
+class Result(StrEnum):
+    """Result of a trial."""
+
+    OK = "ok"
+    FAILED = "failed"
+    NOT_APPLICABLE = "not applicable"
+    FIGURE = "figure"
+
+
+class Row(NamedTuple):
+    """One trial; `see` is a command, or Python, that shows its failure."""
+
+    area: str
+    tried: str
+    result: Result
+    found: str
+    see: str = ""
+
+
+Check: TypeAlias = Callable[[Subject], Iterator[Row]]
+"""Yields the rows of one area."""
+
+
+def judged(area: str, tried: str, failure: str, found: str, see: str) -> Row:
+    if failure:
+        return Row(area, tried, Result.FAILED, failure, see)
+    return Row(area, tried, Result.OK, found)
+
+
+def not_applicable(area: str, tried: str, why: str) -> Row:
+    return Row(area, tried, Result.NOT_APPLICABLE, why)

@@ -6,11 +6,20 @@ from functools import partial
 from typing import TypeAlias
 
 from colibri.common.process.lifecycle import EXIT_FAILED
-from colibri.doctor.finding import Finding, Severity
-from colibri.doctor.flying import flight, machine_code
-from colibri.doctor.ground_station import ground_station
-from colibri.doctor.network import beyond, loopback, ports
-from colibri.doctor.packages import extras, lock, packages, python
+from colibri.doctor.checks import (
+    Finding,
+    Severity,
+    beyond,
+    extras,
+    flight,
+    ground_station,
+    lock,
+    loopback,
+    machine_code,
+    packages,
+    ports,
+    python,
+)
 from colibri.mavlink.links.open import open_ground_link
 
 Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]

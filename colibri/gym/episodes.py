@@ -15,7 +15,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.sampling import sampled_track
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.autopilot.spec import Trajectory
-from colibri.campaigns.values import CampaignError, Draw, is_number, read_draw
+from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
 from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
 from colibri.common.matrices import inverse

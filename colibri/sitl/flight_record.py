@@ -1,4 +1,4 @@
-"""The record of a flight."""
+"""The record of a flight: its frames, datagrams, and STATUSTEXT messages before the link loses any."""
 
 import csv
 from hashlib import sha256
@@ -9,9 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.commander.rules.modes import mode_of_custom
+from colibri.mavlink.client.inbox import Inbox
+from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
 from colibri.sitl.backends.lockstep import Instant
+
+_STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
+
+
+class StatusTexts(Inbox):
+    """The texts of a vehicle with the times of sending."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._codec = Codec(0, 0)
+        self.times_us: list[int] = []
+
+    def add_datagram(self, datagram: bytes, now_us: int) -> None:
+        if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
+            return
+        for message in self._codec.decode(datagram):
+            if message.name == "STATUSTEXT":
+                self.add(message)
+                self.times_us += [now_us] * (len(self.texts) - len(self.times_us))
+
 
 COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),

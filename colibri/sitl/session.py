@@ -12,8 +12,7 @@ from colibri.common.spec import values_of
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.launcher import Launcher
-from colibri.sitl.backends.link_clocks import QuickClock
-from colibri.sitl.backends.lockstep import AutopilotSide, LockstepSession, PlantSide
+from colibri.sitl.backends.lockstep import AutopilotSide, LockstepSession, PlantSide, QuickClock
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant

@@ -21,14 +21,13 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.texts import constant_wind
 from colibri.sitl import mission_items as items
-from colibri.sitl.backends.inside import Inside
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.lockstep import LockstepSession
+from colibri.sitl.backends.memory import Inside
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.flight_record import Record
+from colibri.sitl.flight_record import Record, StatusTexts
 from colibri.sitl.ground_station import RefusedError, Station
 from colibri.sitl.mission_items import Item, on_wire
-from colibri.sitl.status_texts import StatusTexts
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
 

@@ -14,9 +14,8 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.wire.ned import ned_from_enu
 from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.flight_record import Columns, Record
+from colibri.sitl.flight_record import Columns, Record, StatusTexts
 from colibri.sitl.ground_station import Station
-from colibri.sitl.status_texts import StatusTexts
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 

@@ -1,21 +1,24 @@
-"""Campaign of `colibri compare`; contents identify completed flights."""
+"""Campaign of `colibri compare`: contenders, profiles with controllers; contents identify completed flights."""
 
 import argparse
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
+from hashlib import sha256
 from pathlib import Path
+from urllib.parse import quote
 
 import msgspec
 
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.campaigns.definition import MAX_UNASKED, Campaign, CampaignTables, Logs, Point, campaign_of
-from colibri.campaigns.engines.pool import Pool
-from colibri.campaigns.engines.progress import with_bar
+from colibri.campaigns.engines.pool import Pool, with_bar
+from colibri.campaigns.factors import CampaignError, shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Common, FlightResult, check, common_of, fly_points, plan_point
 from colibri.campaigns.journal import Journal, read_journal
 from colibri.campaigns.metrics import Metric
-from colibri.campaigns.values import CampaignError, shown
 from colibri.common.config import UNREADABLE
 from colibri.common.files import read_bytes
 from colibri.common.spec import keywords_of
@@ -23,7 +26,39 @@ from colibri.flights.folder import make_folder, prepare
 from colibri.flights.provenance import provenance_of
 from colibri.flights.spec import FlightSpec
 from colibri.plant.vehicle.description import Vehicle
-from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_of
+
+DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
+_MAX_NAME = 200
+
+
+def folder_of(contender: str, track: str) -> str:
+    name = f"{quote(contender.replace(':', '-'), safe='')}-{folder_name(track)}"
+    return name if len(name) <= _MAX_NAME else f"{name[:_MAX_NAME]}-{sha256(name.encode()).hexdigest()[:8]}"
+
+
+def folder_name(track: str) -> str:
+    return quote(track.replace(":", "-", 1), safe="=,")
+
+
+def contenders_of(profiles: Sequence[str], controllers: Sequence[str] | None = None) -> dict[str, dict[str, str]]:
+    """Return the levels of a campaign's factor from `NAME[:CONTROLLER]`.
+
+    A level has the profile's name, or its path where names coincide.
+    """
+    given: dict[tuple[str, str | None], None] = {}
+    for text in profiles:
+        head, toml, tail = text.partition(".toml")
+        profile, _, controller = (head + toml, "", tail[1:]) if toml else text.partition(":")
+        choices: Sequence[str | None] = [controller] if controller and profile else controllers or [None]
+        given |= dict.fromkeys((profile or text, choice) for choice in choices)
+    names = [load_profile(profile).name for profile, _ in given]
+    called = Counter({(name, profile) for name, (profile, _) in zip(names, given, strict=True)})
+    twice = Counter(name for name, _ in called)
+    found = {}
+    for name, (profile, law) in zip(names, given, strict=True):
+        own = profile if twice[name] > 1 else name
+        found[f"{own}:{law}" if law else own] = {"profile": profile} | ({"controller": law} if law else {})
+    return found
 
 
 def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from colibri.analysis.consistency import NAVIGATION, bounds
-from colibri.analysis.estimation import MEASURED
+from colibri.analysis.estimation import MEASURED, NAVIGATION, bounds
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.campaigns.figure import make_room_for_names

@@ -20,7 +20,7 @@ from colibri.analysis.figures import (
 )
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.series.figure_series import POSITION, FigureSeries, Series
-from colibri.campaigns.engines.progress import in_order
+from colibri.campaigns.engines.pool import in_order
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally

@@ -21,8 +21,17 @@ from colibri.campaigns.factors import SCALED, factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
 from colibri.common.errors import Error
 from colibri.common.files import read_text
-from colibri.tuning.objectives import Objective, metrics_of, read_objectives
-from colibri.tuning.space import Range, TuningError, as_flown, as_optuna, check_holds, read_range
+from colibri.tuning.space import (
+    Objective,
+    Range,
+    TuningError,
+    as_flown,
+    as_optuna,
+    check_holds,
+    metrics_of,
+    read_objectives,
+    read_range,
+)
 
 _MIN_SEEDS = 3
 

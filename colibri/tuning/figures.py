@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, round_ticks
+from colibri.campaigns.factors import Choice, LogUniform, shown
 from colibri.campaigns.figure import COLORS, make_room_for_names, scale_values
-from colibri.campaigns.values import Choice, LogUniform, shown
 from colibri.tuning.space import Range
 from colibri.tuning.trials import FinishedTrial
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from colibri.campaigns.definition import Point
-from colibri.campaigns.engines.engine import Engine
+from colibri.campaigns.engines.pool import Engine
 from colibri.campaigns.flights import Common, FlightResult, Verdict, fly_points
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from colibri.analysis.tables import Row, comma_separated
 from colibri.autopilot.control.profile import Profile
+from colibri.campaigns.factors import shown
 from colibri.campaigns.results import CampaignResults
-from colibri.campaigns.values import shown
 from colibri.common.errors import unknown
 from colibri.tuning.definition import Tuning
 from colibri.tuning.profile_file import profile_file

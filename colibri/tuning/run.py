@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from colibri.campaigns.definition import tables_of
-from colibri.campaigns.engines.engine import Engine
+from colibri.campaigns.engines.pool import Engine
 from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.journal import claim, identity_of
 from colibri.campaigns.results import CampaignResults

@@ -9,12 +9,12 @@ from numpy.random import PCG64, Generator, SeedSequence
 from colibri.analysis.tables import Row
 from colibri.autopilot.control.profile import Profile
 from colibri.campaigns.definition import Campaign
+from colibri.campaigns.factors import shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult
-from colibri.campaigns.values import shown
 from colibri.common.types import Array
 from colibri.tuning.definition import Tuning
-from colibri.tuning.objectives import SHARE_LOST, Objective, value_of
+from colibri.tuning.space import SHARE_LOST, Objective, value_of
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
 ALL = "all"

@@ -4,8 +4,10 @@ No I/O: datagrams and time in, datagrams out. It does not identify as a ground s
 trigger a failsafe.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import nan
+
+import numpy as np
 
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
@@ -14,11 +16,64 @@ from colibri.mavlink.client.commands import Command, CommandInt, set_message_int
 from colibri.mavlink.client.conversation import UNANSWERED, Repeat, Target
 from colibri.mavlink.client.modes import ARDUPILOT, PX4, mode_named
 from colibri.mavlink.client.plans import Download
-from colibri.mavlink.mission.items import PLAN_TYPES, MissionItem
+from colibri.mavlink.mission.items import FENCE, MISSION, PLAN_TYPES, RALLY, MissionItem
+from colibri.mavlink.services.command import GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, TYPE_GENERIC, mav
-from colibri.view.plans import drawn
-from colibri.view.snapshot import Surroundings
+from colibri.view.geometry import circle
+from colibri.view.snapshot import Mark, Surroundings, Zone
 from colibri.view.telemetry import INTERVALS_US, Telemetry
+
+_POLYGONS = {
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
+}
+_CIRCLES = {
+    mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: True,
+    mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
+}
+
+Place = Callable[[MissionItem], Vector]
+"""(item) -> its place in the local frame, ENU; nan if unknown."""
+
+
+def drawn(plans: Mapping[int, Sequence[MissionItem]], home_enu_m: Vector, place: Place) -> Surroundings:
+    return Surroundings(
+        ground_m=0.0 if home_enu_m[2] != home_enu_m[2] else home_enu_m[2],
+        home_enu_m=home_enu_m,
+        mission=_marks(plans.get(MISSION, ()), "", place),
+        rally=_marks(plans.get(RALLY, ()), "rally ", place),
+        fence=_zones(plans.get(FENCE, ()), place),
+    )
+
+
+def _marks(items: Sequence[MissionItem], word: str, place: Place) -> tuple[Mark, ...]:
+    marks = []
+    for seq, item in enumerate(items):
+        if item.frame in GLOBAL_FRAMES and (item.x or item.y):
+            there = place(item)
+            if there[0] == there[0]:
+                marks.append(Mark(there, f"{word}{seq + 1}"))
+    return tuple(marks)
+
+
+def _zones(items: Sequence[MissionItem], place: Place) -> tuple[Zone, ...]:
+    zones: list[Zone] = []
+    corners: list[tuple[float, float]] = []
+    for item in items:
+        if item.command not in _POLYGONS and item.command not in _CIRCLES:
+            continue
+        east, north, _ = place(item)
+        if east != east:
+            return ()
+        if item.command in _CIRCLES:
+            zones.append(Zone(circle(east, north, item.p1), _CIRCLES[item.command]))
+            continue
+        corners.append((east, north))
+        if len(corners) == round(item.p1):
+            zones.append(Zone(np.array(corners), _POLYGONS[item.command]))
+            corners = []
+    return tuple(zones)
+
 
 SYSTEM, COMPONENT = 253, 191
 CHOICES: dict[int, tuple[str, ...]] = {

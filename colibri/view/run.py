@@ -15,11 +15,10 @@ import numpy as np
 
 from colibri.common.files import write_bytes
 from colibri.common.process.lifecycle import Stop
-from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
 from colibri.view.observer import CHOICES, VehicleObserver
 from colibri.view.page.page import Page
-from colibri.view.page.server import PageServer, serve
+from colibri.view.page.server import PageServer, Token, serve
 from colibri.view.recorded.flight import RecordedFlight
 from colibri.view.recorded.horizons import HorizonProcess, Horizons
 from colibri.view.recorded.playback import Playback, speed_of

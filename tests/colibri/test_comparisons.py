@@ -15,11 +15,10 @@ from colibri.autopilot.control import loop
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.campaigns.definition import Point
-from colibri.campaigns.engines.engine import Killed
-from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines.pool import Killed, Pool
 from colibri.cli.main import main
 from colibri.studies.compare import COLUMNS
-from colibri.studies.contenders import contenders_of, folder_name
+from colibri.studies.comparison import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 from tests.support.campaigns import Here, Hovers
 from tests.support.commands import Ran, Refused

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from colibri.analysis.consistency import NAVIGATION, Errors, bounds
+from colibri.analysis.estimation import NAVIGATION, Errors, bounds
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import rotation_matrix

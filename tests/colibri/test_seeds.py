@@ -12,9 +12,9 @@ from colibri.analysis.estimation import MEASURED
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.campaigns.definition import CampaignTables, campaign_of
 from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.factors import shown
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.campaigns.values import shown
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures

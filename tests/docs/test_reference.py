@@ -4,7 +4,6 @@ import ast
 import re
 from collections.abc import Callable
 from inspect import getsource
-from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -16,8 +15,6 @@ from colibri.autopilot.control.registry import controller_names
 from colibri.cli.shared.commands import COMMANDS
 from tests.support.pages import DOCS
 from tools.pages import parameters
-from tools.pages.__main__ import main
-from tools.pages.pictures import house
 from tools.pages.reference import command_line, files, keys, messages, python
 
 GENERATED = command_line.PAGES | files.PAGES | keys.PAGES | messages.PAGES | parameters.PAGES | python.PAGES
@@ -51,15 +48,6 @@ def test_the_page_of_files_has_every_column_of_the_csv_and_every_key_of_the_repo
         page = (DOCS / "files.md").read_text(encoding="utf-8")
         _, _, *rows = page.partition(f"| of `{name}` |")[2].partition("\n\n")[0].splitlines()
         assert [column for row in rows for column in re.findall(r"`(\w+)`", row.split("|")[1])] == wanted
-
-
-def test_the_picture_of_the_house_is_current(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert house.layers().keys() == house.PACKAGES.keys()
-    monkeypatch.setattr("sys.argv", ["pages", "pictures.house", str(tmp_path)])
-    assert main() == 0
-    for path in (tmp_path / "house.png", DOCS / "house.png"):
-        with Image.open(path) as drawn:
-            assert drawn.info["Description"] == house.description()
 
 
 def test_the_flight_moves() -> None:

@@ -4,8 +4,7 @@ import pytest
 
 from tools.chaos.places import Thrower
 from tools.random_flights.__main__ import main
-from tools.random_flights.cases import RandomEvent, RandomFlight, case_of
-from tools.random_flights.flights import fly
+from tools.random_flights.flights import RandomEvent, RandomFlight, case_of, fly
 
 
 def case(*events: RandomEvent, well: bool = True) -> RandomFlight:

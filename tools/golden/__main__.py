@@ -8,8 +8,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
-from tools.golden.pythons import other_pythons, set_up
-from tools.golden.variations import ROOT, GoldenHashes, Variation, VariationError, fly, variations
+from tools.golden.variations import (
+    ROOT,
+    GoldenHashes,
+    Variation,
+    VariationError,
+    fly,
+    other_pythons,
+    set_up,
+    variations,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

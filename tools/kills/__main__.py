@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from colibri.common.process.arguments import natural
 from colibri.mavlink.hil.feedback import Feedback
-from tools.kills import autopilots, plants
 from tools.kills.between import HangsError
+from tools.kills.flights import AutopilotKill, KilledMission, PlantKill, fly_autopilots, fly_plants
 
 MAX_TILT_DEG = 35.0 + 45.0
 """45° more than the largest tilt that a pilot may ask for."""
@@ -39,7 +39,7 @@ def main() -> int:
     return 1 if failures else 0
 
 
-def failures_of(number: int, flight: autopilots.KilledMission) -> list[str]:
+def failures_of(number: int, flight: KilledMission) -> list[str]:
     found = [] if flight.flown else [f"mission {number} did not end"]
     found += [f"mission {number}: {flight.words}"] if flight.words else []
     for kill in flight.kills:
@@ -54,8 +54,8 @@ def failures_of(number: int, flight: autopilots.KilledMission) -> list[str]:
 
 
 def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    def fly(folder: Path, number: int, maximum: int) -> tuple[list[autopilots.AutopilotKill], list[str]]:
-        flight = autopilots.fly(folder, feedback, 1000 * seed + number, maximum)
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[AutopilotKill], list[str]]:
+        flight = fly_autopilots(folder, feedback, 1000 * seed + number, maximum)
         return flight.kills, failures_of(number, flight)
 
     done, failures, flights = _killed("mission", kills, fly)
@@ -75,8 +75,8 @@ def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], l
 
 
 def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
-    def fly(folder: Path, number: int, maximum: int) -> tuple[list[plants.PlantKill], list[str]]:
-        killed, words = plants.fly(folder, feedback, 1000 * seed + number, min(_PLANTS_A_FLIGHT, maximum))
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[PlantKill], list[str]]:
+        killed, words = fly_plants(folder, feedback, 1000 * seed + number, min(_PLANTS_A_FLIGHT, maximum))
         found = [f"autopilot {number}: {words}"] if words else []
         for kill in killed:
             where = f"autopilot {number}, t = {kill.time_s:.3f} s"

@@ -10,7 +10,7 @@ import numpy as np
 from colibri.analysis.figures import GRID
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
-from colibri.campaigns.engines.progress import in_order
+from colibri.campaigns.engines.pool import in_order
 from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan

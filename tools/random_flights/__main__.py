@@ -10,8 +10,7 @@ import sys
 from time import perf_counter
 
 from colibri.common.process.lifecycle import use_one_thread
-from tools.random_flights.cases import RandomFlight, case_of
-from tools.random_flights.flights import RandomFlightOutcome, fly
+from tools.random_flights.flights import RandomFlight, RandomFlightOutcome, case_of, fly
 
 MAX_FRAME_MS = 20.0
 

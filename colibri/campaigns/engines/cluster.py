@@ -8,8 +8,8 @@ from typing import Any
 
 import cloudpickle
 
-from colibri.campaigns.engines.engine import Job, Killed, Result
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.engines.pool import Job, Killed, Result
+from colibri.campaigns.factors import CampaignError
 
 _PACKAGE = "colibri-sitl"
 CONNECT_S = 10.0

@@ -1,19 +1,39 @@
-"""Run jobs in a pool of processes."""
+"""Run jobs in a pool of processes, with a progress bar; the interface of engines."""
 
 import os
 import signal
 import sys
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from multiprocessing import active_children, current_process, get_context, parent_process
 from threading import Thread
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import cloudpickle
 
-from colibri.campaigns.engines.engine import Job, Killed, Result
+from colibri.campaigns.factors import CampaignError
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+class Killed:
+    """Replaces the result of a job that killed its worker twice, the second time on its own."""
+
+
+class Engine(Protocol):
+    """Runs many jobs at once; a remote one on other computers."""
+
+    is_remote: bool
+
+    def each(
+        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
+    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+        """Yield each job with its result, in order of completion; `work` and `common` are pickled."""
+
 
 _AHEAD = 2
 """Jobs submitted per worker, so that no worker waits."""
@@ -103,3 +123,38 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
+
+
+Done = TypeVar("Done")
+
+
+def in_order(
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    title: str,
+    *,
+    quiet: bool,
+    keep: Callable[[Result], object] = lambda _result: None,
+) -> list[Result]:
+    """Return results in the order of jobs, and `keep` each at once."""
+    found: dict[int, Result] = {}
+    with closing(Pool().each(_numbered, work, enumerate(jobs))) as done:
+        for (number, job), result in with_bar(done, title, len(jobs), quiet=quiet):
+            if isinstance(result, Killed):
+                raise CampaignError(f"{title}: the process that did {job} was killed, and again when it did this alone")
+            found[number] = result
+            keep(result)
+    return [found[number] for number in range(len(jobs))]
+
+
+def with_bar(done: Iterable[Done], title: str, total: int, *, quiet: bool) -> Generator[Done, None, None]:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, disable=quiet or not console.is_terminal) as bar:
+        yield from bar.track(done, total, description=title)
+
+
+def _numbered(work: Callable[[Job], Result], job: tuple[int, Job]) -> Result:
+    return work(job[1])

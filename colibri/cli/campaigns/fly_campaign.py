@@ -7,11 +7,11 @@ from typing import Any
 
 from colibri.analysis.tables import print_table
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
+from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
-from colibri.campaigns.values import CampaignError, first_twice
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted
 from colibri.common.spec import keywords_of

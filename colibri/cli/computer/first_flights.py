@@ -4,7 +4,7 @@ import sys
 from time import perf_counter
 from typing import Any
 
-from colibri.campaigns.engines.progress import in_order
+from colibri.campaigns.engines.pool import in_order
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 

@@ -1,9 +1,10 @@
 """A flight in lockstep: pass datagrams between plant and autopilot, frame by frame.
 
-Each side may be in this process or another; the bytes are the same.
+Each side may be in this process or another; the bytes are the same. Flights are independent of the link's clock.
 """
 
 from collections.abc import Sequence
+from time import perf_counter, sleep
 from typing import NamedTuple, Protocol
 
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
@@ -25,9 +26,43 @@ from colibri.mavlink.wire.dialect import (
     Codec,
     mav,
 )
-from colibri.sitl.backends.link_clocks import LinkClock
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
+
+_QUICK = 10.0
+_SOON_S = 2e-4
+
+
+class LinkClock(Protocol):
+    """The clock of the delays between plant and autopilot."""
+
+    def now_s(self) -> float: ...
+
+    def wait(self, timeout_s: float) -> None: ...
+
+
+class StoppedClock:
+    """Advances only while the plant waits: both sides are in this process."""
+
+    def __init__(self) -> None:
+        self._now_s = 0.0
+
+    def now_s(self) -> float:
+        return self._now_s
+
+    def wait(self, timeout_s: float) -> None:
+        self._now_s += timeout_s
+
+
+class QuickClock:
+    """Ten times the wall clock, for an autopilot in another process: lost datagrams are repeated sooner."""
+
+    def now_s(self) -> float:
+        return _QUICK * perf_counter()
+
+    def wait(self, timeout_s: float) -> None:
+        sleep(min(timeout_s / _QUICK, _SOON_S))
+
 
 __tracebackhide__ = True  # a failed test shows its own lines, not these
 

@@ -7,8 +7,8 @@ from typing import Any
 import viser
 
 from colibri.common.types import Vector
-from colibri.view.access import Token
 from colibri.view.page.controls import Done
+from colibri.view.page.server import Token
 
 ORDERS = {"Arm": "arm", "Disarm": "disarm", "Take off": "take off", "Land": "land", "Return": "return"}
 """Buttons and their commands."""

@@ -7,13 +7,12 @@ import numpy as np
 import viser
 
 from colibri.common.types import Vector
-from colibri.view.access import Token
 from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
 from colibri.view.page.commands import CommandPanels
 from colibri.view.page.controls import ControlPanel, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
-from colibri.view.page.server import PageServer, address, stop
+from colibri.view.page.server import PageServer, Token, address, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0

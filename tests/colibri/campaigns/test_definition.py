@@ -8,7 +8,7 @@ import pytest
 
 import colibri
 from colibri.campaigns.definition import CampaignTables, campaign_of, read_seeds, tables_of
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.factors import CampaignError
 from tests.support.campaigns import DRAWN, MASS, planned
 
 FILE = """

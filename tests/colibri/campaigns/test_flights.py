@@ -9,8 +9,8 @@ import pytest
 
 import colibri
 from colibri.autopilot.control.profile import profile_text
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flights import Verdict, check, common_of, fly_point
-from colibri.campaigns.values import CampaignError
 from tests.support.campaigns import MASS, SHORT, Hovers, flown, planned
 
 

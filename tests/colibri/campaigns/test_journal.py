@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 import colibri
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flights import common_of
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal
-from colibri.campaigns.values import CampaignError
 from tests.support.campaigns import MASS, SHORT, flown, planned
 
 GRID: dict[str, Any] = {"track": ["hover"], MASS: [0.7, 0.71]}

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.flight_table import wilson
 from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import fly_campaign
-from colibri.campaigns.values import CampaignError
 from tests.support.campaigns import MASS, Here, planned, results, tables_in
 
 LATENCY, FLOOR = "latency", "floor"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import PCG64, Generator
 
-from colibri.campaigns.values import CampaignError, read_draw, read_values, shown
+from colibri.campaigns.factors import CampaignError, read_draw, read_values, shown
 
 
 def drawn(given: dict[str, Any], count: int = 4000) -> list[Any]:

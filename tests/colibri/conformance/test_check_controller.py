@@ -11,8 +11,8 @@ from colibri import conformance
 from colibri.autopilot.control.registry import controller_names
 from colibri.common.errors import Error
 from colibri.conformance.check import CHECKS, Conformance
-from colibri.conformance.rows import Result
 from colibri.conformance.step_records import FlownStep
+from colibri.conformance.subject import Result
 from colibri.plant.vehicle.description import Vehicle
 from tests.colibri.conformance import laws
 from tests.support.commands import Ran

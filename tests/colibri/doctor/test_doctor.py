@@ -9,9 +9,11 @@ import pytest
 
 from colibri.cli.main import main
 from colibri.common.machine_code.on_disk import MachineCode
-from colibri.doctor import examine, flying, network, packages
-from colibri.doctor.finding import Finding, Severity
-from colibri.doctor.ground_station import called, ground_station
+from colibri.doctor import checks as flying
+from colibri.doctor import checks as network
+from colibri.doctor import checks as packages
+from colibri.doctor import examine
+from colibri.doctor.checks import Finding, Severity, called, ground_station
 from colibri.flights.fleet_spec import PLANT_PORT
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec, mav

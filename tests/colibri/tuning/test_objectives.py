@@ -7,8 +7,7 @@ import pytest
 import colibri
 from colibri.campaigns.flights import Verdict
 from colibri.campaigns.metrics import Metric
-from colibri.tuning.objectives import Objective, metrics_of, read_objectives
-from colibri.tuning.space import TuningError
+from colibri.tuning.space import Objective, TuningError, metrics_of, read_objectives
 from tests.support.tuning import flown
 
 METRICS = (Metric("effort_n_m"), Metric("rmse_m"))

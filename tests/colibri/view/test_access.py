@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from colibri.view.access import Token, refusal
 from colibri.view.page.controls import words
-from colibri.view.page.server import PageServer, serve, stop
+from colibri.view.page.server import PageServer, Token, refusal, serve, stop
 from colibri.view.snapshot import Snapshot, ViewError
 
 CONNECTS = {

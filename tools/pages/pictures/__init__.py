@@ -1,1 +1,1 @@
-"""Pictures of docs/ that stand alone: a flight that moves, and the house."""
+"""Pictures of docs/ that stand alone: a flight that moves, and the page of `colibri view`."""

@@ -21,11 +21,10 @@ from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, waypoint
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
-from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
 from colibri.view.observer import CHOICES, VehicleObserver
 from colibri.view.page.page import Page
-from colibri.view.page.server import serve
+from colibri.view.page.server import Token, serve
 from colibri.view.run import WAITS_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from colibri.campaigns.engines.cluster import Cluster
+from colibri.campaigns.factors import CampaignError
 from colibri.campaigns.run import fly_campaign
-from colibri.campaigns.values import CampaignError
 from tests.support.campaigns import MASS, PATIENCE_S, SEEDS, Here, begin, planned, rows, tables_in
 
 DASK = [sys.executable, "-m", "dask"]
@@ -93,7 +93,7 @@ def test_without_dask_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.long
 def test_a_job_that_kills_its_workers_is_given_up(cluster: Processes) -> None:
-    from colibri.campaigns.engines.engine import Killed
+    from colibri.campaigns.engines.pool import Killed
     from tests.colibri.campaigns.engines import jobs
 
     for _ in range(12):  # it takes four with it beside others, and four alone

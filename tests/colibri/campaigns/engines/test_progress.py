@@ -6,8 +6,8 @@ from time import sleep
 
 import pytest
 
-from colibri.campaigns.engines.progress import in_order, with_bar
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.engines.pool import in_order, with_bar
+from colibri.campaigns.factors import CampaignError
 
 
 def late(job: int) -> int:

@@ -5,11 +5,10 @@ from collections.abc import Iterator
 import pytest
 
 from colibri.mavlink.client.modes import PX4
-from colibri.view.access import Token
 from colibri.view.live import LiveVehicle
 from colibri.view.observer import CHOICES
 from colibri.view.page.page import Page
-from colibri.view.page.server import serve
+from colibri.view.page.server import Token, serve
 from colibri.view.run import Show
 
 pytestmark = pytest.mark.view
