@@ -1,6 +1,7 @@
 """The companion without socket or clock: bytes and time in, bytes out."""
 
 from math import dist, inf, nan
+from typing import Any
 
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
@@ -15,17 +16,6 @@ from colibri.companion.steering.law_pilot import LawDemand, LawPilot, first
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.references import PastReference, ReferenceHistory, smoothly_started
 from colibri.companion.steps import StepFlight
-from colibri.companion.supervision.checks import CheckFacts, failing
-from colibri.companion.supervision.limits import (
-    CRITICAL,
-    FlightFacts,
-    FlightRegion,
-    Limit,
-    ages_s,
-    box_of,
-    exceeded,
-    too_old,
-)
 from colibri.companion.supervision.monitors import Consistency, SetpointRate
 from colibri.companion.supervision.phases import (
     CompanionEnd,
@@ -35,6 +25,18 @@ from colibri.companion.supervision.phases import (
     conditions,
     how_it_ended,
     next_phase,
+)
+from colibri.companion.supervision.rules import (
+    CRITICAL,
+    CheckFacts,
+    FlightFacts,
+    FlightRegion,
+    Rule,
+    ages_s,
+    box_of,
+    exceeded,
+    failing,
+    too_old,
 )
 from colibri.companion.vehicle_peer import ReceivedState, VehiclePeer, moved_m
 from colibri.mavlink.wire.dialect import mav
@@ -89,7 +91,7 @@ class Companion:
         self._stopped = self._brakes = self._on_way = self._has_flown = False
         self.failing: list[str] = ["clock"]
         self.ended: CompanionEnd | None = None
-        self.limit: Limit | None = None
+        self.limit: Rule[FlightFacts] | None = None
         self.errors = TrackErrors()
         self.said: list[str] = []
         self.rows: list[LogRow] = []
@@ -208,9 +210,9 @@ class Companion:
             and self.limit is None
         ):
             facts = self._flight_facts(now_us)
-            self.limit = exceeded(facts, self._settings.limits, self._box)
+            self.limit = exceeded(facts)
             if self.limit is not None:
-                self.said.append(f"{self.limit.name}: {self.limit.words(facts, self._settings.limits)}")
+                self.said.append(f"{self.limit.name}: {self.limit.words(facts)}")
         self._consistency.jumped_m = 0.0
 
     def _rehearse(self, now_us: int) -> None:
@@ -353,10 +355,23 @@ class Companion:
         name, fields = message_of(kind, now_us, target, asked, self._asked, thrust, y)
         return [self.peer.client.encode(name, *fields)]
 
+    def _facts(self, now_us: int) -> dict[str, Any]:
+        """Return the facts before and in flight."""
+        peer = self.peer
+        return {
+            "report": peer.report,
+            "state_age_s": self._age_s(now_us),
+            "ages": ages_s(peer.report, peer.clock.answered_us, now_us),
+            "contradiction": self._consistency.contradiction,
+            "limits": self._settings.limits,
+            "box": self._box,
+        }
+
     def _check_facts(self, now_us: int) -> CheckFacts:
         peer = self.peer
         assert peer.stack is not None, "it is connected"
         return CheckFacts(
+            **self._facts(now_us),
             stack=peer.stack,
             systems=tuple(peer.client.vehicles),
             home_moved_m=moved_m(self._settings.home, peer.report),
@@ -364,18 +379,12 @@ class Companion:
             parameters=peer.parameter_values,
             clock_known=peer.clock.known,
             clock_rate=peer.clock.rate,
-            ages=ages_s(peer.report, peer.clock.answered_us, now_us),
             round_trip_s=peer.clock.round_trip_us * 1e-6,
-            state_age_s=self._age_s(now_us),
             state_rate_hz=peer.state_rate_hz(now_us),
             state_delay_s=peer.state_delay_s,
             mode_rate_hz=peer.report.mode_rate_hz(now_us),
-            report=peer.report,
             may_arm=self._settings.may_arm,
             approach_m=self._approach_m(),
-            contradiction=self._consistency.contradiction,
-            box=self._box,
-            limits=self._settings.limits,
         )
 
     def _approach_m(self) -> float:
@@ -386,20 +395,15 @@ class Companion:
 
     def _flight_facts(self, now_us: int) -> FlightFacts:
         newest, flies = self._newest, self.phase is CompanionPhase.FLYING
-        reference = None
-        if newest is not None and flies:
-            past = self._history.at(newest.at_us)
-            reference = None if past is None else past.position_enu_m
+        place = newest.state.position_enu_m if newest else (nan, nan, nan)
+        past = self._history.at(newest.at_us) if newest and flies else None
         return FlightFacts(
-            report=self.peer.report,
-            state_age_s=self._age_s(now_us),
-            position_enu_m=newest.state.position_enu_m if newest else (nan, nan, nan),
+            **self._facts(now_us),
+            position_enu_m=place,
             tilt_deg=tilt_deg(newest.state.attitude) if newest else 0.0,
-            reference_enu_m=reference,
+            error_m=dist(past.position_enu_m, place) if past else 0.0,
             jumped_m=self._consistency.jumped_m,
             law_error=self._law_error,
             pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
             gap_s=self._pace.gap_s(now_us) if flies else 0.0,
-            ages=ages_s(self.peer.report, self.peer.clock.answered_us, now_us),
-            contradiction=self._consistency.contradiction,
         )

@@ -28,8 +28,8 @@ from colibri.companion.setpoints import FlightSummary, LogRow
 from colibri.companion.settings import CompanionSettings, SetpointKind
 from colibri.companion.stacks import STACKS
 from colibri.companion.steering.references import stay_of
-from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import CompanionPhase
+from colibri.companion.supervision.rules import FlightLimits
 from colibri.companion.vehicle_peer import HomeSeeker, LocalOrigin, VehiclePeer
 from colibri.flights.folder import occupied
 from colibri.mavlink.links.link import GroundLink, LinkError

@@ -6,7 +6,7 @@ from math import inf
 
 from colibri.companion.stack import Response, Stack
 from colibri.companion.steering.references import Stay
-from colibri.companion.supervision.limits import FlightLimits
+from colibri.companion.supervision.rules import FlightLimits
 from colibri.companion.vehicle_peer import LocalOrigin
 
 

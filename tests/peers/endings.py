@@ -16,8 +16,8 @@ from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks import HOLD
-from colibri.companion.supervision.limits import FlightLimits
 from colibri.companion.supervision.phases import CompanionPhase
+from colibri.companion.supervision.rules import FlightLimits
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from tests.peers.half_speed import PATIENT, Bench, own_physics

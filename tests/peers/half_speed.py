@@ -14,7 +14,7 @@ from time import perf_counter
 
 from colibri.common.types import Address
 from colibri.companion.guide import Companion
-from colibri.companion.supervision.limits import FlightLimits
+from colibri.companion.supervision.rules import FlightLimits
 from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.commands import Command
 from colibri.mavlink.client.parameters import SetParameter

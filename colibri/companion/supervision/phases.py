@@ -9,7 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from colibri.companion.stack import Stack
-from colibri.companion.supervision.limits import Limit
+from colibri.companion.supervision.rules import FlightFacts, Rule
 
 
 class CompanionPhase(StrEnum):
@@ -149,7 +149,7 @@ class CompanionEnd(NamedTuple):
 
 
 def how_it_ended(
-    before: CompanionPhase, why: PhaseCondition, limit: Limit | None, fault: str, waits_for: Sequence[str]
+    before: CompanionPhase, why: PhaseCondition, limit: Rule[FlightFacts] | None, fault: str, waits_for: Sequence[str]
 ) -> CompanionEnd:
     """Judge an ending; `fault` is a refusal, an emergency or an error, `waits_for` what was missing on the ground."""
     if limit is not None:

@@ -9,10 +9,19 @@ import pytest
 
 from colibri.companion.stack import ThrustCurve
 from colibri.companion.stacks import ARDUPILOT, PX4
-from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
-from colibri.companion.supervision.limits import AGES, LIMITS, FlightFacts, FlightLimits, FlightRegion, exceeded
 from colibri.companion.supervision.monitors import SetpointRate
 from colibri.companion.supervision.phases import TABLE, CompanionPhase, PhaseCondition, next_phase
+from colibri.companion.supervision.rules import (
+    AGES,
+    CHECKS,
+    LIMITS,
+    CheckFacts,
+    FlightFacts,
+    FlightLimits,
+    FlightRegion,
+    exceeded,
+    failing,
+)
 from colibri.mavlink.client.report import VehicleReport
 
 BOX = FlightRegion((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
@@ -43,38 +52,38 @@ GOOD = CheckFacts(
 
 
 def reporting(**changed: Any) -> CheckFacts:
-    return GOOD._replace(report=replace(GOOD.report, **changed))
+    return replace(GOOD, report=replace(GOOD.report, **changed))
 
 
 FAILS: list[tuple[str, CheckFacts]] = [
-    ("vehicle", GOOD._replace(systems=(1, 2))),
-    ("home", GOOD._replace(home_moved_m=1.1)),
-    ("clock", GOOD._replace(clock_known=False)),
-    ("clock", GOOD._replace(clock_rate=0.5)),
-    *(("ages", GOOD._replace(ages={**GOOD.ages, row.name: row.start_s + 0.1})) for row in AGES),
-    ("ages", GOOD._replace(ages={name: age for name, age in GOOD.ages.items() if name != "landed"})),
-    ("reports", GOOD._replace(ages={"landed": 0.1})),
+    ("vehicle", replace(GOOD, systems=(1, 2))),
+    ("home", replace(GOOD, home_moved_m=1.1)),
+    ("clock", replace(GOOD, clock_known=False)),
+    ("clock", replace(GOOD, clock_rate=0.5)),
+    *(("ages", replace(GOOD, ages={**GOOD.ages, row.name: row.start_s + 0.1})) for row in AGES),
+    ("ages", replace(GOOD, ages={name: age for name, age in GOOD.ages.items() if name != "landed"})),
+    ("reports", replace(GOOD, ages={"landed": 0.1})),
     ("altitude", reporting(altitude_amsl_m=nan)),
-    ("consistency", GOOD._replace(contradiction="attitude and body rates contradict each other")),
-    ("start", GOOD._replace(approach_m=50.1)),
-    ("states", GOOD._replace(state_rate_hz=10.0)),
-    ("states", GOOD._replace(state_age_s=inf)),
-    ("delay", GOOD._replace(round_trip_s=0.3)),
-    ("delay", GOOD._replace(state_delay_s=0.09)),
-    ("modes", GOOD._replace(mode_rate_hz=1.0)),
-    ("parameters", GOOD._replace(parameters=None)),
-    ("settings", GOOD._replace(parameters={})),
-    ("settings", GOOD._replace(parameters=PX4_VALUES | {"COM_OF_LOSS_T": 0.31})),
-    ("settings", GOOD._replace(stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_OPTIONS": 4.0})),
-    ("settings", GOOD._replace(stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_TIMEOUT": 0.5})),
-    ("hover thrust", GOOD._replace(thrust=ThrustCurve(hover=0.95))),
-    ("hover thrust", GOOD._replace(thrust=None)),
+    ("consistency", replace(GOOD, contradiction="attitude and body rates contradict each other")),
+    ("start", replace(GOOD, approach_m=50.1)),
+    ("states", replace(GOOD, state_rate_hz=10.0)),
+    ("states", replace(GOOD, state_age_s=inf)),
+    ("delay", replace(GOOD, round_trip_s=0.3)),
+    ("delay", replace(GOOD, state_delay_s=0.09)),
+    ("modes", replace(GOOD, mode_rate_hz=1.0)),
+    ("parameters", replace(GOOD, parameters=None)),
+    ("settings", replace(GOOD, parameters={})),
+    ("settings", replace(GOOD, parameters=PX4_VALUES | {"COM_OF_LOSS_T": 0.31})),
+    ("settings", replace(GOOD, stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_OPTIONS": 4.0})),
+    ("settings", replace(GOOD, stack=ARDUPILOT, parameters=ARDUPILOT_VALUES | {"GUID_TIMEOUT": 0.5})),
+    ("hover thrust", replace(GOOD, thrust=ThrustCurve(hover=0.95))),
+    ("hover thrust", replace(GOOD, thrust=None)),
     ("estimator", reporting(estimator_ok=False)),
     ("pre-arm", reporting(prearm_ok=False)),
     ("battery", reporting(battery=0.2)),
     ("fence", reporting(fence_breached=True)),
-    ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_VER_DIST": 4.0})),
-    ("fence", GOOD._replace(parameters=PX4_VALUES | {"GF_MAX_HOR_DIST": 4.0})),
+    ("fence", replace(GOOD, parameters=PX4_VALUES | {"GF_MAX_VER_DIST": 4.0})),
+    ("fence", replace(GOOD, parameters=PX4_VALUES | {"GF_MAX_HOR_DIST": 4.0})),
 ]
 
 
@@ -89,7 +98,7 @@ def test_a_vehicle_that_is_ready_passes_every_check() -> None:
     assert failing(GOOD) == failing(GOOD, required=False) == []
     assert failing(reporting(battery=nan, estimator_ok=None, prearm_ok=None)) == []
     fenceless = ARDUPILOT_VALUES | {"FENCE_ENABLE": 0.0, "FENCE_RADIUS": 1.0}
-    assert failing(GOOD._replace(stack=ARDUPILOT, parameters=fenceless)) == []
+    assert failing(replace(GOOD, stack=ARDUPILOT, parameters=fenceless)) == []
 
 
 @pytest.mark.parametrize(("name", "facts"), FAILS)
@@ -117,10 +126,10 @@ EXCEEDS = [
     ("control law", FlightFacts(QUIET, law_error="it raised"), ""),
     ("overloaded", FlightFacts(QUIET, pace=0.79), ""),
     ("overloaded", FlightFacts(QUIET, gap_s=0.21), "210 ms ago"),
-    ("box", FlightFacts(QUIET, position_enu_m=(0.0, 3.1, 0.0)), ""),
-    ("box", FlightFacts(QUIET, position_enu_m=(nan, 0.0, 0.0)), ""),
+    ("box", FlightFacts(QUIET, box=BOX, position_enu_m=(0.0, 3.1, 0.0)), ""),
+    ("box", FlightFacts(QUIET, box=BOX, position_enu_m=(nan, 0.0, 0.0)), ""),
     ("tilt", FlightFacts(QUIET, tilt_deg=51.0), ""),
-    ("error", FlightFacts(QUIET, reference_enu_m=(1.6, 0.0, 0.0)), ""),
+    ("error", FlightFacts(QUIET, error_m=1.6), ""),
     ("battery", FlightFacts(VehicleReport(battery=0.1)), ""),
     ("fence", FlightFacts(VehicleReport(fence_breached=True)), ""),
     ("failsafe", FlightFacts(VehicleReport(system_status=5)), ""),
@@ -129,12 +138,12 @@ EXCEEDS = [
 
 def test_each_limit_is_exceeded_alone_and_says_by_how_much() -> None:
     assert {limit.name for limit in LIMITS} == {name for name, _, _ in EXCEEDS}
-    assert exceeded(FlightFacts(QUIET), FlightLimits(), BOX) is None
+    assert exceeded(FlightFacts(QUIET)) is None
     for name, facts, words in EXCEEDS:
-        limit = exceeded(facts, FlightLimits(), BOX)
+        limit = exceeded(facts)
         assert limit is not None
         assert limit.name == name
-        said = limit.words(facts, FlightLimits())
+        said = limit.words(facts)
         assert len(said) > 5
         assert words in said
 
