@@ -13,7 +13,7 @@ from colibri.autopilot.control.interface import AttitudeDemand, Clock, Decision,
 from colibri.autopilot.control.parts.recovery import mix_with_priority
 from colibri.autopilot.control.scaling import capability_of, sagging_speed, scaled
 from colibri.autopilot.control.settings import ControlInterval, interval_us
-from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.vehicle_model.mixer import mixing_of
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.config import Positive, Table, read_settings
 from colibri.common.elementary import square
@@ -66,8 +66,7 @@ class GeometricController:
         self._k_rotation = self._inertia * frequencies**2
         self._k_rate = self._inertia * 2.0 * frequencies
         top = square(vehicle.rotors.max_speed)
-        inverse = exact_inverse(vehicle.allocation() * top)
-        self._from_thrust, self._from_moments = inverse[:, 0].copy(), inverse[:, 1:].copy()
+        self._mixing = mixing_of(vehicle.allocation() * top)
         self._top_speed = vehicle.rotors.max_speed
         self._squared = square(vehicle.rotors.idle_speed) / top, square(sagging_speed(vehicle))
         self._max_feedback_m_s2 = max(capability_of(vehicle).climb_m_s2, _MIN_FEEDBACK * vehicle.gravity_m_s2)
@@ -123,7 +122,7 @@ class GeometricController:
 
     def _rotor_speeds(self, thrust_n: float, moment_n_m: Array) -> Array:
         least, most = self._squared
-        squared = mix_with_priority(thrust_n, moment_n_m, self._from_thrust, self._from_moments, least, most)
+        squared = mix_with_priority(thrust_n, moment_n_m, self._mixing, least, most)
         speeds: Array = np.sqrt(squared) * self._top_speed
         return speeds
 

@@ -41,7 +41,7 @@ from colibri.common.errors import Error
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array, PerRotor, Vector
-from colibri.mavlink.hil.state import ROTORS, StateFrame
+from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -260,8 +260,6 @@ def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Fact
         ControllerError, ProfileError, SolverError: The law, its table, or its solver cannot be used.
     """
     factory = law or load_controller(profile.controller)
-    if vehicle.rotors.count != ROTORS:
-        raise BuildError(f'vehicle "{vehicle.name}" has {vehicle.rotors.count} rotors: control laws fly {ROTORS}')
     try:
         controller = factory(profile.table(profile.controller), vehicle, clock)
     except SettingsError as error:

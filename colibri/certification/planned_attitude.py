@@ -78,7 +78,7 @@ class PlannedAttitude:
         self._from_wrench, self._to_wrench = mpc.from_wrench, self._law.tracker.allocation
         of_state = np.zeros((len(mpc.terminal_on_hold), STATES + INPUTS))
         of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
-        of_state[DEVIATIONS:, _MOMENTS] = self._from_wrench[:, 1:]
+        of_state[DEVIATIONS : DEVIATIONS + len(self._from_wrench), _MOMENTS] = self._from_wrench[:, 1:]
         self.terminal_weight = of_state.T @ mpc.terminal_on_hold @ of_state
         self._horizon = sum(self._settings.plan.blocks)
         capacity_ah = vehicle.battery.capacity_ah if vehicle.battery else 0.0

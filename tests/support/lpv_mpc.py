@@ -7,7 +7,7 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
 from colibri.autopilot.control.lpv_mpc import model
 from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc
-from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.planner import Planner
@@ -21,7 +21,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-VEHICLE = load_vehicle("hummingbird")
+VEHICLE, ROTORS = load_vehicle("hummingbird"), 4
 TABLE = load_profile("flight").table("lpv-mpc")
 STEP_US = 8_000
 
@@ -50,8 +50,8 @@ class Flight:
     def take(self, memory: LawMemory, decision: Decision) -> None:
         self.memory = memory
         self.decisions.append(decision)
-        c1, c2, c3, c4 = (decision.rotor_speeds / VEHICLE.rotors.max_speed).tolist()
-        command = ActuatorCommand(self.world.time_us, (c1, c2, c3, c4), armed=True)
+        controls = tuple((decision.rotor_speeds / self.law.tracker.vehicle.rotors.max_speed).tolist())
+        command = ActuatorCommand(self.world.time_us, controls, armed=True)
         self.world = self.physics.step(self.world, command, STEP_US)
 
     def follow(self, name: str, seconds: float) -> np.ndarray:
@@ -93,6 +93,6 @@ def start(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def rolled(vehicle: Vehicle, rigid: np.ndarray, squared: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, ...]:
     motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
-    numbers, drive = packed(model_of(vehicle, INTERVAL_S)), model.empty_drive(STEPS)
+    numbers, drive = packed(model_of(vehicle, INTERVAL_S)), model.empty_drive(STEPS, ROTORS)
     model.roll_out(rigid, squared, commands, CALM, numbers, drive, motion, speeds)
     return motion, speeds

@@ -3,7 +3,7 @@
     z = changes of the corrections: of each rotor in each block, then two slacks if limits are soft
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-With b blocks: nominal motion, (N + 1, 13), and squared speeds, (N + 1, 4), responses, (N + 1, 12, 4 b).
+With b blocks and m rotors: nominal motion, (N + 1, 13), and squared speeds, (N + 1, m), responses, (N + 1, 12, m b).
 """
 
 from math import floor, pi, sqrt
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
 from colibri.autopilot.control.lpv_mpc.feed_forward import HEADING_ABOVE, rate_between
-from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
 from colibri.common.jit import compiled, inlined
@@ -24,11 +23,10 @@ from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
 
-STATES = DEVIATIONS + ROTORS  # of the terminal cost: position, velocity, rotation, rates, body axes; squared speeds
 SLACKS = 2
 TILT_SLACK, RATE_SLACK = 0, 1
 MOTION_ROWS = 7  # of each checked step: tilt, and both sides of p, q and r
-PREDICTED = 16  # position and velocity, ENU; phi, theta, psi; p, q, r; squared rotor speeds
+PREDICTED = 12  # position and velocity, ENU; phi, theta, psi; p, q, r; then m squared rotor speeds
 
 
 class CostWeights(NamedTuple):
@@ -51,8 +49,8 @@ class Problem(NamedTuple):
     counted: Integers  # steps with errors in the cost, (c,)
     checked: Integers  # steps with soft limits, (d,)
     weights: CostWeights
-    terminal: Array  # S on the error at the end, (16, 16), symmetric
-    allocation: Array  # thrust of each rotor at its largest speed, N, (4,)
+    terminal: Array  # S on the error at the end: position, velocity, rotation, rates, body axes; squared speeds; zeros
+    allocation: Array  # thrust of each rotor at its largest speed, N, (m,)
     levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
     min_cos_tilt: float  # of the soft limit; below -1: none, and attitude errors beyond 90° count whole
     max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
@@ -68,9 +66,9 @@ class PlanReferences(NamedTuple):
     attitudes: Array  # body to earth, (n, 3, 3)
     yaw_rad: Array  # in any turn, (n,)
     rates: Array  # rad/s, FLU, at samples 1 to N, (N, 3)
-    squared: Array  # rotor speeds at samples 0 to N, (N + 1, 4)
+    squared: Array  # rotor speeds at samples 0 to N, (N + 1, m)
     thrusts_n: Array  # U1, (n,)
-    end_squared: Array  # rotor speeds at the end, (4,)
+    end_squared: Array  # rotor speeds at the end, (m,)
 
 
 @inlined
@@ -79,7 +77,7 @@ def cost(
     speeds: Array,
     responses: Array,
     target: PlanReferences,
-    corrections: Array,  # the last one flown, then the nominal ones, (b + 1, 4)
+    corrections: Array,  # the last one flown, then the nominal ones, (b + 1, m)
     problem: Problem,
     qp: Qp,
 ) -> None:
@@ -163,10 +161,11 @@ def _add_demand(
     for i in range(2):
         _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
     thrust = -target.thrusts_n[step]
-    for rotor in range(ROTORS):
+    rotors = len(problem.allocation)
+    for rotor in range(rotors):
         thrust += problem.allocation[rotor] * squared[rotor]
     for k in range(used):
-        row[k] = problem.allocation[k % ROTORS] * problem.levels[k // ROTORS, step]
+        row[k] = problem.allocation[k % rotors] * problem.levels[k // rotors, step]
     _add(weights.thrust, thrust, row, used, H, f)
 
 
@@ -206,12 +205,12 @@ def _add_terminal(
     x: Array, squared: Array, X: Array, target: PlanReferences, problem: Problem, H: Array, f: Array
 ) -> None:
     """Add ½ eᵀ S e of the final error in body axes; four rows in a loop, as in `_add_motion`."""
-    S = problem.terminal
+    S, states = problem.terminal, problem.terminal.shape[0]
     steps, moved = target.rates.shape[0], X.shape[1]
     inputs = moved // problem.levels.shape[0]
     R = rotation_matrix((x[6], x[7], x[8], x[9]))
     away = _rotation_error(target.attitudes[steps], R, problem)
-    error, E = np.zeros(STATES), np.zeros((STATES, moved))
+    error, E = np.zeros(states), np.zeros((states, moved))
     for i in range(3):
         for j in range(3):
             turned = R[j][i]
@@ -225,19 +224,19 @@ def _add_terminal(
         error[RATE + i] = x[10 + i] - target.rates[steps - 1, i]
         put(X[ROTATION + i], E[ROTATION + i])
         put(X[RATE + i], E[RATE + i])
-    for rotor in range(ROTORS):
+    for rotor in range(len(problem.allocation)):
         error[DEVIATIONS + rotor] = squared[rotor] - target.end_squared[rotor]
         for block in range(problem.levels.shape[0]):
             E[DEVIATIONS + rotor, inputs * block + rotor] = problem.levels[block, steps]
-    weighted, W = np.zeros(STATES), np.zeros((STATES, moved))
-    for i in range(STATES):
-        for j in range(STATES):
+    weighted, W = np.zeros(states), np.zeros((states, moved))
+    for i in range(states):
+        for j in range(states):
             weighted[i] += S[i, j] * error[j]
-        for j in range(0, STATES, 4):
+        for j in range(0, states, 4):
             s, t, u, v = S[i, j], S[i, j + 1], S[i, j + 2], S[i, j + 3]
             for k in range(moved):
                 W[i, k] = W[i, k] + s * E[j, k] + t * E[j + 1, k] + u * E[j + 2, k] + v * E[j + 3, k]
-    for i in range(0, STATES, 4):
+    for i in range(0, states, 4):
         for k in range(moved):
             s, t, u, v = E[i, k], E[i + 1, k], E[i + 2, k], E[i + 3, k]
             f[k] = f[k] + s * weighted[i] + t * weighted[i + 1] + u * weighted[i + 2] + v * weighted[i + 3]
@@ -249,7 +248,7 @@ def _add_terminal(
 def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
     for block in range(problem.starts.shape[0] - 1):
         weight = problem.weights.first if block == 0 else problem.weights.next
-        for rotor in range(ROTORS):
+        for rotor in range(corrections.shape[1]):
             here = inputs * block + rotor
             change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
             H[here, here] += weight
@@ -264,11 +263,11 @@ def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f:
 def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
     """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
 
-    `commands` of the references, (N, 4); `limits` (N, 2); `corrections` of each block, (b, 4).
+    `commands` of the references, (N, m); `limits` (N, 2); `corrections` of each block, (b, m).
     """
     inputs = lower.shape[0] // corrections.shape[0]
     for block in range(corrections.shape[0]):
-        for rotor in range(ROTORS):
+        for rotor in range(commands.shape[1]):
             least, most = -np.inf, np.inf
             for step in range(starts[block], starts[block + 1]):
                 least = max(least, limits[step, 0] - commands[step, rotor])
@@ -334,7 +333,7 @@ def read_plan(
         for part in range(0, DEVIATIONS, 4):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
             for block in range(levels.shape[0]):
-                for k in range(inputs * block, inputs * block + ROTORS):  # four sums: none waits for another
+                for k in range(inputs * block, inputs * block + speeds.shape[1]):  # four sums: none waits for another
                     a += X[part, k] * z[k]
                     b += X[part + 1, k] * z[k]
                     c += X[part + 2, k] * z[k]
@@ -356,7 +355,7 @@ def read_plan(
         state[6], state[7], state[8] = phi, theta, psi
         for i in range(3):
             state[9 + i] = x[10 + i] + change[RATE + i]
-        for rotor in range(ROTORS):
+        for rotor in range(speeds.shape[1]):
             state[12 + rotor] = speeds[step, rotor]
             for block in range(levels.shape[0]):
                 state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]

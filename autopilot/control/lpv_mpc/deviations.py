@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, ROTORS, Model
+from colibri.autopilot.control.lpv_mpc.model import LEAST_SPEED, RIGID, Model
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.types import Array
@@ -22,7 +22,7 @@ POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
 
 
 class StepTransition(NamedTuple):
-    """Blocks of the transition of every step, (3, 3, N), or (3, 4, N) from the rotors."""
+    """Blocks of the transition of every step, (3, 3, N), or (3, m, N) from m rotors."""
 
     drag: Array  # velocity to velocity, without the unit matrix
     velocity_rotation: Array
@@ -36,7 +36,7 @@ class StepTransition(NamedTuple):
     place: Array  # to position
     moment: Array  # to rates
     turn: Array  # to rotation
-    spin: Array  # change of squared speeds to the rate r, (4, N)
+    spin: Array  # change of squared speeds to the rate r, (m, N)
     up: Array  # body z axis, ENU, (3, N)
     V: Array  # derivative of velocity by rotation
     W: Array  # derivative of rotation by rotation
@@ -48,9 +48,9 @@ class StepTransition(NamedTuple):
     GG: Array
 
 
-def empty_transition(steps: int) -> StepTransition:
-    nine, twelve = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, ROTORS, steps)) for _ in range(4)]
-    return StepTransition._make([*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:]])
+def empty_transition(steps: int, rotors: int) -> StepTransition:
+    nine, driven = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, rotors, steps)) for _ in range(4)]
+    return StepTransition._make([*nine[:8], *driven, np.zeros((rotors, steps)), np.zeros((3, steps)), *nine[8:]])
 
 
 @inlined
@@ -91,7 +91,7 @@ def _differentiate(motion: Array, speeds: Array, model: Model, out: StepTransiti
         R = rotation_matrix((qw / length, qx / length, qy / length, qz / length))
         p, q, r = 0.5 * (x[10] + to[10]), 0.5 * (x[11] + to[11]), 0.5 * (x[12] + to[12])
         thrust, momentum = 0.0, 0.0
-        for i in range(ROTORS):
+        for i in range(len(model.momentum)):
             squared = 0.5 * (speeds[n, i] + speeds[n + 1, i])
             speed = sqrt(max(squared, 0.0))
             thrust += allocation[0, i] * squared
@@ -123,7 +123,7 @@ def _multiply(A: Array, B: Array, product: Array) -> None:
 def _drive(model: Model, out: StepTransition) -> None:
     inertia, allocation, h = model.inertia, model.allocation, model.interval_s
     for i in range(3):
-        for rotor in range(ROTORS):
+        for rotor in range(len(model.momentum)):
             thrust = allocation[0, rotor]
             for n in range(out.up.shape[1]):
                 force = out.up[i, n] * thrust / model.airframe.mass_kg
@@ -146,7 +146,7 @@ def respond(
     """Write the deviations by a unit change of one rotor's command in one block.
 
     `means`, (b, N), and `levels`, (b, N + 1), are the squared speeds by that change over steps and at their ends;
-    column 4 j + i of `responses` is rotor i in block j.
+    column m j + i of `responses` is rotor i in block j.
     """
     model = packed[0]
     inputs = responses.shape[2] // means.shape[0]
@@ -161,7 +161,7 @@ def respond(
         X = responses[step + 1]
         for block in range(blocks):
             mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
-            for rotor in range(ROTORS):
+            for rotor in range(len(model.momentum)):
                 column = inputs * block + rotor
                 for i in range(3):
                     X[POSITION + i, column] += T.place[i, rotor, step] * mean
@@ -199,10 +199,10 @@ def _advance(X: Array, n: int, T: StepTransition, h: float, used: int) -> None:
 @compiled
 def _hover(thrust_n: float, packed: Packed, T: StepTransition, X: Array) -> None:
     model = packed[0]
-    level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
+    level, squared = np.zeros((2, RIGID)), np.empty((2, len(model.momentum)))
     level[:, 6] = 1.0
     total = 0.0
-    for i in range(ROTORS):
+    for i in range(len(model.momentum)):
         total += model.allocation[0, i]
     squared[:] = thrust_n / total
     _linearise(level, squared, model, T)
@@ -211,15 +211,16 @@ def _hover(thrust_n: float, packed: Packed, T: StepTransition, X: Array) -> None
 
 
 def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:
-    """Return A, (16, 16), and B, (16, 4), of deviations and squared speeds in level flight."""
-    T, X = empty_transition(1), np.empty((2, DEVIATIONS, DEVIATIONS))
+    """Return A, (12 + m, 12 + m), and B, (12 + m, m), of deviations and squared speeds in level flight."""
+    rotors = packed["momentum"].shape[1]
+    T, X = empty_transition(1, rotors), np.empty((2, DEVIATIONS, DEVIATIONS))
     _hover(thrust_n, packed, T, X)
-    lag, n = packed[0]["lag"], DEVIATIONS + ROTORS
-    A, B = np.zeros((n, n)), np.zeros((n, ROTORS))
+    lag, n = packed[0]["lag"], DEVIATIONS + rotors
+    A, B = np.zeros((n, n)), np.zeros((n, rotors))
     A[:DEVIATIONS, :DEVIATIONS] = X[1]
     effects = np.concatenate([part[:, :, 0] for part in (T.place, T.force, T.turn, T.moment)])
     A[:DEVIATIONS, DEVIATIONS:], B[:DEVIATIONS] = effects * lag["left_mean"], effects * (1.0 - lag["left_mean"])
     A[RATE + 2, DEVIATIONS:] += T.spin[:, 0] * (lag["left"] - 1.0)
     B[RATE + 2] += T.spin[:, 0] * (1.0 - lag["left"])
-    A[DEVIATIONS:, DEVIATIONS:], B[DEVIATIONS:] = lag["left"] * np.eye(ROTORS), (1.0 - lag["left"]) * np.eye(ROTORS)
+    A[DEVIATIONS:, DEVIATIONS:], B[DEVIATIONS:] = lag["left"] * np.eye(rotors), (1.0 - lag["left"]) * np.eye(rotors)
     return A, B

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.model import Disturbance
 from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limit_force, overcome_drag
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
@@ -37,7 +37,7 @@ class Approach(NamedTuple):
     interval_s: float
     recovery_1_s2: float  # gains of the recovery, slower than plans
     recovery_1_s: float
-    from_wrench: Array  # U1, N, and U2..U4, N m, to squared speeds, (4, 4)
+    from_wrench: Array  # U1, N, and U2..U4, N m, to the squared speeds of m rotors, (m, 4)
 
 
 class Flat(NamedTuple):
@@ -46,7 +46,7 @@ class Flat(NamedTuple):
     forces: Array  # of the thrust, N, ENU, (n, 3)
     attitudes: Array  # body to earth, (n, 3, 3)
     rates: Array  # rad/s, FLU, at samples 1 to N, (N, 3)
-    squared: Array  # rotor speeds at samples 0 to N, (N + 1, 4)
+    squared: Array  # rotor speeds at samples 0 to N, (N + 1, m)
 
 
 @compiled
@@ -106,7 +106,7 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
     model = packed[0]
     inertia, h = model.inertia, model.interval_s
     steps = flat.rates.shape[0]
-    before, after, rate, wrench = np.empty(3), np.empty(3), np.empty(3), np.empty(ROTORS)
+    before, after, rate, wrench = np.empty(3), np.empty(3), np.empty(3), np.empty(4)
     momentum = 0.0
     rate_between(flat.attitudes[0], flat.attitudes[1], h, before)
     for n in range(1, steps + 1):
@@ -121,23 +121,23 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
         wrench[2] -= (iz - ix) * p * r + momentum * p
         wrench[3] -= (ix - iy) * p * q
         momentum = 0.0
-        for rotor in range(ROTORS):
+        for rotor in range(len(model.momentum)):
             squared = 0.0
-            for i in range(ROTORS):
+            for i in range(4):
                 squared += from_wrench[rotor, i] * wrench[i]
             flat.squared[n, rotor] = squared
             momentum += model.momentum[rotor] * sqrt(max(squared, 0.0))
         before, after = after, before
-    for rotor in range(ROTORS):
+    for rotor in range(len(model.momentum)):
         ahead = flat.squared[1 : min(4, steps + 1), rotor]
         flat.squared[0, rotor] = 3.0 * (ahead[0] - ahead[1]) + ahead[2] if ahead.shape[0] == 3 else ahead[0]
 
 
 @compiled
 def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
-    """Fill the commands, (N, 4), within limits, (N, 2), from one of the squared speeds, (N + 1, 4), to the next."""
+    """Fill the commands, (N, m), within limits, (N, 2), from one of the squared speeds, (N + 1, m), to the next."""
     for n in range(commands.shape[0]):
-        for rotor in range(ROTORS):
+        for rotor in range(commands.shape[1]):
             command = squared[n, rotor] + (squared[n + 1, rotor] - squared[n, rotor]) / (1.0 - left)
             commands[n, rotor] = min(max(command, limits[n, 0]), limits[n, 1])
 

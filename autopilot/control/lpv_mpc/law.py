@@ -19,8 +19,9 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.lpv_mpc import planning
+from colibri.autopilot.control.lpv_mpc.condensing import PREDICTED
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach
-from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan, PlanSettings, WeightSettings
 from colibri.autopilot.control.lpv_mpc.path import PathSettings
 from colibri.autopilot.control.lpv_mpc.planning import Now
@@ -96,7 +97,7 @@ class LawInputs(NamedTuple):
 
 
 class LpvMpc(TrackingLaw[LawMemory]):
-    """The control law; its predicted outputs are `condensing.PREDICTED`."""
+    """The control law; its predicted outputs are `condensing.PREDICTED`, then the squared speeds of the rotors."""
 
     reads_motion = False
     plan_columns = PlanColumns(6, 7, 8, 11)
@@ -131,7 +132,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         tilt_tangent = tan(radians(max_tilt_deg)) if max_tilt_deg < 90.0 else -1.0
         self._force = ForceLimits(tilt_tangent, min_n, min_n, min_up_n)
         limits = np.empty((self._mpc.horizon, 2))
-        self._now = packed(Now(np.empty(RIGID), np.empty(ROTORS), _NO_DISTURBANCE, limits, self._force))
+        self._now = packed(Now(np.empty(RIGID), np.empty(vehicle.rotors.count), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
         self._agile = max_tilt_deg > 90.0
@@ -183,7 +184,9 @@ class LpvMpc(TrackingLaw[LawMemory]):
         tracked, battery = memory.tracked, self.tracker.battery
         observed = self.tracker.observe(tracked, state)
         self._model_kg[0] = observed.mass_kg
-        expected = memory.plan.states[memory.age :, 12:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
+        expected = (
+            memory.plan.states[memory.age :, PREDICTED:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
+        )
         max_n = self._span_n * square(battery.max_common_speed(tracked.charge_ah))
         planning.begin(
             observed.rigid,
@@ -242,7 +245,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self, inputs: LawInputs, force: Array, diagnostics: Diagnostics
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         least, most = self._arrays.limits[0].tolist()
-        squared = self.recovered(force, inputs.observed, self._mpc.from_wrench, least, most)
+        squared = self.recovered(force, inputs.observed, least, most)
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
 
 

@@ -1,7 +1,7 @@
 """The vehicle's model and its nominal motion, as compiled kernels.
 
 The motion is a Runge-Kutta rollout of the rigid body with the expected commands. Squared rotor speeds, in parts of the
-largest, follow their commands as one linear lag.
+largest, follow their commands as one linear lag. m is the number of rotors.
 """
 
 from math import sqrt
@@ -14,7 +14,6 @@ from colibri.common.jit import Packed, inlined
 from colibri.common.matrices import put
 from colibri.common.types import Array
 
-ROTORS = 4
 RIGID = 13  # position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU
 _VELOCITY, _QUATERNION, _BODY_RATE = 3, 6, 10
 LEAST_SPEED = 1e-3  # of a rotor as a divisor
@@ -34,8 +33,8 @@ class Model(NamedTuple):
 
     airframe: Airframe
     inertia: Array  # kg m², (3,)
-    allocation: Array  # squared speeds to U1, N, and U2, U3, U4, N m, (4, 4)
-    momentum: Array  # of each rotor along body z at its largest speed, N m s, (4,)
+    allocation: Array  # squared speeds to U1, N, and U2, U3, U4, N m, (4, m)
+    momentum: Array  # of each rotor along body z at its largest speed, N m s, (m,)
     lag: Lag
     interval_s: float
 
@@ -56,30 +55,30 @@ class Drive(NamedTuple):
     yaw: Array  # N m
     momentum: Array  # along body z, N m s
     spin_up: Array  # its rate, N m
-    halfway: Array  # squared rotor speeds in the middle of each step, (N, 4)
+    halfway: Array  # squared rotor speeds in the middle of each step, (N, m)
 
 
-def empty_drive(steps: int) -> Drive:
-    return Drive._make([*(np.zeros((3, steps)) for _ in range(6)), np.zeros((steps, ROTORS))])
+def empty_drive(steps: int, rotors: int) -> Drive:
+    return Drive._make([*(np.zeros((3, steps)) for _ in range(6)), np.zeros((steps, rotors))])
 
 
 @inlined
 def roll_out(
     rigid: Array,  # (13,)
-    squared: Array,  # rotor speeds, (4,)
-    commands: Array,  # (N, 4)
+    squared: Array,  # rotor speeds, (m,)
+    commands: Array,  # (N, m)
     disturbance: Disturbance,
     packed: Packed,
     drive: Drive,
     motion: Array,  # from now on, (N + 1, 13)
-    speeds: Array,  # squared, from now on, (N + 1, 4)
+    speeds: Array,  # squared, from now on, (N + 1, m)
 ) -> None:
     model = packed[0]
     lag, h = model.lag, model.interval_s
     put(rigid, motion[0])
     put(squared, speeds[0])
     for step in range(commands.shape[0]):
-        for i in range(ROTORS):
+        for i in range(len(model.momentum)):
             away = speeds[step, i] - commands[step, i]
             drive.halfway[step, i] = commands[step, i] + away * lag.left_half
             speeds[step + 1, i] = commands[step, i] + away * lag.left
@@ -114,7 +113,7 @@ def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) 
     for n in range(commands.shape[0]):
         thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
         momentum, spin_up = 0.0, 0.0
-        for i in range(ROTORS):
+        for i in range(len(model.momentum)):
             s = max(squared[n, i], 0.0)
             speed = max(sqrt(s), LEAST_SPEED)
             thrust += allocation[0, i] * s

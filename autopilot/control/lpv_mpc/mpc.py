@@ -1,6 +1,6 @@
 """The LPV-MPC: linearise about the previous plan, condense, solve, read the plan."""
 
-from math import radians
+from math import inf, radians
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -9,7 +9,7 @@ import numpy as np
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
 from colibri.autopilot.control.lpv_mpc import condensing, deviations, model, planning
 from colibri.autopilot.control.lpv_mpc.condensing import CostWeights, Problem
-from colibri.autopilot.control.lpv_mpc.model import ROTORS, Lag, Model
+from colibri.autopilot.control.lpv_mpc.model import Lag, Model
 from colibri.autopilot.control.lpv_mpc.path import PathNow, read_speeds, speed_effects
 from colibri.autopilot.control.lpv_mpc.planning import QpKind, Workspace
 from colibri.autopilot.control.parts.riccati import lqr
@@ -20,8 +20,9 @@ from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
+from colibri.common.matrices import matmul
 from colibri.common.types import Array
-from colibri.plant.vehicle.description import Vehicle
+from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
 
 
 class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -58,8 +59,8 @@ class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 class Plan(NamedTuple):
     """A solved QP."""
 
-    commands: Array  # squared speeds at each step, (N, 4)
-    states: Array  # `condensing.PREDICTED`, (N + 1, 16)
+    commands: Array  # squared speeds at each step, (N, m)
+    states: Array  # `condensing.PREDICTED`, then the squared speeds of m rotors, (N + 1, 12 + m)
     speeds: Array | None = None  # along the path, (N + 2,); None by the clock
 
 
@@ -93,16 +94,19 @@ class Mpc:
         interval_s: float,
         clock: Clock,
     ) -> None:
-        self.horizon = n = sum(settings.blocks)
+        self.horizon, rotors = sum(settings.blocks), vehicle.rotors.count
+        n = self.horizon
         self._solver, self._clock = solver, clock
         numbers = model_of(vehicle, interval_s)
         self.model = packed(numbers)
-        self.from_wrench = exact_inverse(numbers.allocation)  # U1..U4, N, N m, to squared speeds, (4, 4)
+        self.turns = len(controlled_axes(numbers.allocation)) == len(AXES)  # whether the rotors can set the yaw
+        self.from_wrench = exact_inverse(numbers.allocation)  # U1..U4, N, N m, to squared speeds, (m, 4)
         starts = np.cumsum((0, *settings.blocks))
         means, levels = lagging(starts, numbers.lag)
+        each = len(AXES) / rotors  # a force takes smaller changes of more rotors
         on_hold = CostWeights(
-            0.0, 0.0, weights.tilt, weights.heading, weights.rate, weights.thrust,
-            weights.first_correction, weights.next_correction,
+            0.0, 0.0, weights.tilt, weights.heading if self.turns else 0.0, weights.rate, weights.thrust,
+            each * weights.first_correction, each * weights.next_correction,
         )  # fmt: skip
         on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
@@ -110,12 +114,12 @@ class Mpc:
         self.starts, self._effects = starts, speed_effects(starts, interval_s)
         blocks, rows = len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
         shared = Workspace(
-            np.empty((n, ROTORS)),
-            np.empty((blocks + 1, ROTORS)),
+            np.empty((n, rotors)),
+            np.empty((blocks + 1, rotors)),
             np.empty((n + 1, model.RIGID)),
-            np.empty((n + 1, ROTORS)),
-            model.empty_drive(n),
-            deviations.empty_transition(n),
+            np.empty((n + 1, rotors)),
+            model.empty_drive(n, rotors),
+            deviations.empty_transition(n, rotors),
             np.empty(0),
             means,
             levels,
@@ -132,39 +136,44 @@ class Mpc:
                         numbers.allocation[0].copy(),
                         levels,
                         cos(radians(settings.max_tilt_deg)) if settings.max_tilt_deg < 180.0 else -9.0,
-                        np.array(settings.max_rate_rad_s),
+                        np.array(settings.max_rate_rad_s) * ((1.0, 1.0, 1.0) if self.turns else (1.0, 1.0, inf)),
                     ),
                     shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),
                     empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
                     empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
                 )
             )
-            for each, inputs in ((on_track, ROTORS), (on_track, ROTORS + 1), (on_hold, ROTORS))
+            for each, inputs in ((on_track, rotors), (on_track, rotors + 1), (on_hold, rotors))
         )
-        self._none = np.empty((0, ROTORS))
+        self._none = np.empty((0, rotors))
 
     def _terminal(self, weights: CostWeights, count_every: int, thrust_n: float) -> Array:
-        """Return S, (16, 16), of the LQR in level flight after the horizon."""
+        """Return S of the LQR in level flight after the horizon, filled up with zeros to a multiple of four."""
         A, B = deviations.hover_transition(thrust_n, self.model)
-        Q = np.zeros((condensing.STATES, condensing.STATES))
+        Q, rotors = np.zeros_like(A), B.shape[1]
         of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
-        np.fill_diagonal(Q, np.array([*of_axes, *([weights.rate] * 3), 0.0, 0.0, 0.0, 0.0]) / count_every)
+        np.fill_diagonal(Q, np.array([*of_axes, *([weights.rate] * 3), *([0.0] * rotors)]) / count_every)
         thrust = np.array(self.model["allocation"][0, 0])
         Q[12:, 12:] += weights.thrust / count_every * thrust[:, None] * thrust
-        kept = slice(0, None) if weights.position > 0.0 else slice(deviations.ROTATION, None)
-        S = np.zeros_like(Q)
+        if rotors > len(AXES):  # speeds without effect return to those of the references
+            Q[12:, 12:] += weights.next * (np.eye(rotors) - matmul(self.from_wrench, self.model["allocation"][0]))
+        kept = np.arange(0 if weights.position > 0.0 else deviations.ROTATION, len(A))
+        if not self.turns:
+            kept = np.setdiff1d(kept, (deviations.ROTATION + 2, deviations.RATE + 2))
+        square = np.ix_(kept, kept)
+        S = np.zeros((-(-len(A) // 4) * 4,) * 2)
         cost, _ = lqr(
-            np.ascontiguousarray(A[kept, kept]), np.ascontiguousarray(B[kept]), np.ascontiguousarray(Q[kept, kept]),
-            weights.next * np.eye(ROTORS),
+            np.ascontiguousarray(A[square]), np.ascontiguousarray(B[kept]), np.ascontiguousarray(Q[square]),
+            weights.next * np.eye(rotors),
         )  # fmt: skip
-        S[kept, kept] = 0.5 * (cost + cost.T)
+        S[square] = 0.5 * (cost + cost.T)
         return S
 
     def plan(
         self,
         now: Packed,
         target: Packed,
-        last: Array | None,  # the previous plan's commands from now on, (n, 4)
+        last: Array | None,  # the previous plan's commands from now on, (n, m)
         psi: float,  # unwrapped
         path: PathNow | None = None,  # if the speed is free
         *,
@@ -182,7 +191,9 @@ class Mpc:
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations)
-        commands, states = np.empty((self.horizon, ROTORS)), np.empty((self.horizon + 1, condensing.PREDICTED))
+        rotors = self._none.shape[1]
+        commands = np.empty((self.horizon, rotors))
+        states = np.empty((self.horizon + 1, condensing.PREDICTED + rotors))
         binding = planning.read(qps.kind, z, psi, commands, states)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,

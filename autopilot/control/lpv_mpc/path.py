@@ -16,7 +16,6 @@ import numpy as np
 from colibri.autopilot.control.interface import Horizon
 from colibri.autopilot.control.lpv_mpc.condensing import Integers
 from colibri.autopilot.control.lpv_mpc.deviations import POSITION, VELOCITY
-from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.qp import Qp
 from colibri.common.config import Positive, Table
 from colibri.common.jit import compiled
@@ -125,10 +124,10 @@ def slide(
 @compiled
 def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
     """Write the effect of each σ on the tracking error, the last column of each block."""
-    inputs = ROTORS + 1
+    inputs = responses.shape[2] // effects.shares.shape[1]
     for step in range(responses.shape[0]):
         for block in range(effects.shares.shape[1]):
-            column = inputs * block + ROTORS
+            column = inputs * block + inputs - 1
             share, passed = path.part * effects.shares[step, block], path.part * effects.passed[step, block]
             for i in range(3):
                 P1, P2 = path.slopes[step, i], path.slopes[step, 3 + i]
@@ -138,9 +137,9 @@ def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
 
 @compiled
 def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> None:
-    inputs, limits = ROTORS + 1, path.limits
+    inputs, limits = qp.f.shape[0] // (starts.shape[0] - 1), path.limits
     for block in range(starts.shape[0] - 1):
-        here = inputs * block + ROTORS
+        here = inputs * block + inputs - 1
         before, after = path.speeds[starts[block]], path.speeds[starts[block + 1]]
         qp.lower[here], qp.upper[here] = limits.lower - after, limits.upper - after
         change = limits.change * (after - before)
@@ -156,9 +155,9 @@ def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> Non
 
 @compiled
 def read_speeds(speeds: Array, shares: Array, z: Array) -> Array:
-    inputs = ROTORS + 1
+    inputs = z.shape[0] // shares.shape[1]
     planned = speeds.copy()
     for sample in range(shares.shape[0]):
         for block in range(shares.shape[1]):
-            planned[sample] += shares[sample, block] * z[inputs * block + ROTORS]
+            planned[sample] += shares[sample, block] * z[inputs * block + inputs - 1]
     return planned

@@ -1,6 +1,6 @@
 """From the previous plan to the QP, and from its solution to the next plan, as compiled kernels.
 
-Commands and corrections are squared rotor speeds in parts of the largest.
+Commands and corrections are squared rotor speeds in parts of the largest; m is the number of rotors.
 """
 
 from math import sqrt
@@ -21,7 +21,7 @@ from colibri.autopilot.control.lpv_mpc.condensing import (
 )
 from colibri.autopilot.control.lpv_mpc.deviations import StepTransition, respond
 from colibri.autopilot.control.lpv_mpc.feed_forward import lead
-from colibri.autopilot.control.lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
+from colibri.autopilot.control.lpv_mpc.model import Disturbance, Drive, roll_out
 from colibri.autopilot.control.lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.qp import Qp
@@ -38,7 +38,7 @@ class Now(NamedTuple):
     """Start of a plan."""
 
     rigid: Array  # state, see `model.RIGID`, (13,)
-    squared: Array  # rotor speeds, (4,)
+    squared: Array  # rotor speeds, (m,)
     disturbance: Disturbance
     limits: Array  # least and largest squared speed of each step, (N, 2)
     force: ForceLimits  # demanded by references
@@ -47,13 +47,13 @@ class Now(NamedTuple):
 class Workspace(NamedTuple):
     """Arrays filled by every plan, except the last two."""
 
-    commands: Array  # of the references, within the limits, (N, 4)
-    corrections: Array  # nominal: the last one flown, then of each block, (b + 1, 4)
+    commands: Array  # of the references, within the limits, (N, m)
+    corrections: Array  # nominal: the last one flown, then of each block, (b + 1, m)
     motion: Array  # nominal, (N + 1, 13)
-    speeds: Array  # nominal, squared, (N + 1, 4)
+    speeds: Array  # nominal, squared, (N + 1, m)
     drive: Drive
     transition: StepTransition
-    responses: Array  # (N + 1, 12, 4 b)
+    responses: Array  # (N + 1, 12, m b)
     means: Array  # of `deviations.respond`, (b, N)
     levels: Array  # of `deviations.respond`, (b, N + 1)
 
@@ -70,9 +70,9 @@ class QpKind(NamedTuple):
 @compiled
 def begin(
     rigid: Array,
-    speeds: Array,  # of the rotors, parts of the largest, (4,)
+    speeds: Array,  # of the rotors, parts of the largest, (m,)
     estimate: Array,
-    expected: Array,  # squared, (n, 4); their power limits the available speeds
+    expected: Array,  # squared, (n, m); their power limits the available speeds
     least: float,  # squared speed at idle
     open_v: float,  # of the battery without load
     max_n: float,
@@ -82,7 +82,7 @@ def begin(
     """Fill the start of a plan, except the constant limits of the force."""
     start = now[0]
     put(rigid, start.rigid)
-    for i in range(ROTORS):
+    for i in range(speeds.shape[0]):
         start.squared[i] = speeds[i] * speeds[i]
     for i in range(3):
         start.disturbance.acceleration[i], start.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
@@ -111,7 +111,7 @@ def first_angles(target: Packed) -> tuple[float, float, float]:
 
 @compiled
 def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
-    """Fill the QP within the rotor limits; `last`: the previous plan's commands from now on, (n, 4)."""
+    """Fill the QP within the rotor limits; `last`: the previous plan's commands from now on, (n, m)."""
     work = kind[0].work
     _expect(now[0], target[0], last, vehicle, kind[0])
     cost(work.motion, work.speeds, work.responses, target[0], work.corrections, kind[0].problem, kind[0].qp)
@@ -153,7 +153,7 @@ def ease(commands: Array, starts: Integers, limits: Array) -> None:
     """
     for block in range(starts.shape[0] - 1):
         begin, end = starts[block], starts[block + 1]
-        for rotor in range(ROTORS):
+        for rotor in range(commands.shape[1]):
             low, high, least, most = np.inf, -np.inf, -np.inf, np.inf
             for step in range(begin, end):
                 low, high = min(low, commands[step, rotor]), max(high, commands[step, rotor])
@@ -167,7 +167,7 @@ def ease(commands: Array, starts: Integers, limits: Array) -> None:
 
 @compiled
 def carry_over(last: Array, commands: Array, starts: Integers, corrections: Array) -> None:
-    """Fill the correction of each block, and before them the first again, (b + 1, 4).
+    """Fill the correction of each block, and before them the first again, (b + 1, m).
 
     Each is the block's mean of the previous plan's commands, the last one repeated, minus `commands`.
     """
@@ -175,7 +175,7 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
         corrections[block + 1] = 0.0
         steps = starts[block + 1] - starts[block]
         for step in range(starts[block], starts[block + 1]):
-            for rotor in range(ROTORS):
+            for rotor in range(commands.shape[1]):
                 planned = last[min(step, last.shape[0] - 1), rotor]
                 corrections[block + 1, rotor] += (planned - commands[step, rotor]) / steps
     put(corrections[1], corrections[0])
@@ -183,26 +183,26 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
 
 @compiled
 def is_free(kind: Packed, z: Array) -> bool:
-    return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, z)
+    return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, len(kind[0].problem.allocation), z)
 
 
 @compiled
-def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
+def free_minimum(qp: Qp, blocks: int, rotors: int, z: Array) -> bool:
     """Write the unconstrained minimum by Cholesky factors; return whether it is within all bounds.
 
     Speeds along the path stay at their upper bounds, optimal while the vehicle is on time.
     """
     n, inputs = z.shape[0], z.shape[0] // blocks
-    first_speed = ROTORS if inputs > ROTORS else n
+    first_speed = rotors if inputs > rotors else n
     L, left = np.empty((n, n)), np.empty(n)
     for i in range(n):
         left[i] = -qp.f[i]
         for k in range(first_speed, n, inputs):
             left[i] -= qp.H[i, k] * qp.upper[k]
-        speed = i % inputs == ROTORS
+        speed = i % inputs == rotors
         for j in range(i + 1):
             total = qp.H[i, j]
-            if speed or j % inputs == ROTORS:
+            if speed or j % inputs == rotors:
                 total = 1.0 if i == j else 0.0
             for k in range(j):
                 total -= L[i, k] * L[j, k]
@@ -213,7 +213,7 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
             else:
                 return False
     for i in range(n):
-        total = qp.upper[i] if i % inputs == ROTORS else left[i]
+        total = qp.upper[i] if i % inputs == rotors else left[i]
         for k in range(i):
             total -= L[i, k] * z[k]
         z[i] = total / L[i, i]
@@ -228,7 +228,7 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
     for i in range(first_speed, n, inputs):
         slope = -left[i]
         for k in range(n):
-            if k % inputs != ROTORS:
+            if k % inputs != rotors:
                 slope += qp.H[i, k] * z[k]
         if slope > 0.0:
             return False
@@ -249,7 +249,7 @@ def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> 
     inputs = z.shape[0] // corrections.shape[0]
     binding = 0
     for block in range(corrections.shape[0]):
-        for rotor in range(ROTORS):
+        for rotor in range(corrections.shape[1]):
             k = inputs * block + rotor
             corrections[block, rotor] += z[k]
             if z[k] <= qp.lower[k] + _BINDING or z[k] >= qp.upper[k] - _BINDING:
@@ -263,7 +263,7 @@ def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> 
 def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) -> None:
     for block in range(corrections.shape[0]):
         for step in range(starts[block], starts[block + 1]):
-            for rotor in range(ROTORS):
+            for rotor in range(commands.shape[1]):
                 out[step, rotor] = commands[step, rotor] + corrections[block, rotor]
 
 

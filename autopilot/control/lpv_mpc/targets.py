@@ -8,7 +8,6 @@ from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import feed_forward
 from colibri.autopilot.control.lpv_mpc.condensing import PlanReferences
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
-from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
 from colibri.autopilot.control.lpv_mpc.planning import Now
@@ -34,10 +33,11 @@ class TargetBuilder:
         self._guidance, self._path, self._mpc = guidance, path, mpc
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2
-        track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, ROTORS))
+        rotors = len(mpc.from_wrench)
+        track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, rotors))
         attitudes, scalars = np.zeros((n, 3, 3)), np.zeros(n)
         self._record = packed(
-            PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(ROTORS))
+            PlanReferences(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(rotors))
         )
         self._target = target = opened(self._record, PlanReferences)
         self._near = (target.position, target.velocity, target.acceleration)
@@ -64,7 +64,7 @@ class TargetBuilder:
         slide(references, 0.0, np.full(n, begin), h, steady, slopes)
         passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
         slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
-        near, flat, last_flat, target = self._near, self._flat, _flat(3), self._target
+        near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
         feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, self._law, near)
         feed_forward.ask(
@@ -96,12 +96,10 @@ class TargetBuilder:
         target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
         return Wanted(self._record, flat.forces[0].copy())
 
+    def _flat_of(self, n: int) -> Flat:
+        rotors = len(self._mpc.from_wrench)
+        return Flat(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n - 2, 3)), np.empty((n - 1, rotors)))
+
 
 def _motion(samples: int) -> tuple[Array, Array, Array]:
     return np.empty((samples, 3)), np.empty((samples, 3)), np.empty((samples, 3))
-
-
-def _flat(samples: int) -> Flat:
-    return Flat(
-        np.empty((samples, 3)), np.empty((samples, 3, 3)), np.empty((samples - 2, 3)), np.empty((samples - 1, ROTORS))
-    )

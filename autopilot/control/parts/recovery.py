@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.autopilot.control.vehicle_model.mixer import allocate
 from colibri.common.config import Count, Positive, Table
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2
 from colibri.common.types import Array
 
@@ -57,19 +58,22 @@ def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGai
 def mix_with_priority(
     thrust_n: float,
     moment_n_m: Array,  # U2, U3, U4
-    rotors_from_thrust: Array,  # to squared speeds, parts of the largest, (4,)
-    rotors_from_moments: Array,  # (4, 3)
+    mixing: Packed,  # of squared speeds, parts of the largest
     min_squared: float,
     max_squared: float,
 ) -> Array:
-    """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw."""
-    tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
-    yaw = rotors_from_moments[:, 2] * moment_n_m[2]
+    """Return squared rotor speeds, (m,), within their limits: tilting moments first, then thrust, then yaw."""
+    inverse = mixing[0].inverse
+    if inverse.shape[0] != 4:
+        wrench = np.array((thrust_n, moment_n_m[0], moment_n_m[1], moment_n_m[2]))
+        return allocate(wrench, mixing, min_squared, max_squared)
+    tilt = inverse[:, 1] * moment_n_m[0] + inverse[:, 2] * moment_n_m[1]
+    yaw = inverse[:, 3] * moment_n_m[2]
     room = max_squared - min_squared
     spread = tilt.max() - tilt.min()
     if spread > room:
         tilt *= room / spread
-    lift = rotors_from_thrust * thrust_n
+    lift = inverse[:, 0] * thrust_n
     minimum, maximum = (lift + tilt).min(), (lift + tilt).max()
     shift = max(min_squared - minimum, 0.0) + min(max_squared - maximum, 0.0)
     squared = lift + tilt + shift

@@ -8,6 +8,7 @@ from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, 
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
 from colibri.autopilot.control.vehicle_model.mass import MassSettings
+from colibri.autopilot.control.vehicle_model.mixer import mixing_of
 from colibri.common.config import Table
 from colibri.common.matrices import dot, matvec, norm
 from colibri.common.types import Array
@@ -44,16 +45,15 @@ class TrackingLaw(AttitudeController[Memory]):
         self._interval_s = settings.control_interval_s
         self.control_interval_us = interval_us(self._interval_s)
         self.tracker = VehicleTracker(vehicle, settings.observer, settings.mass, self._interval_s)
-        self._fallback = fallback
+        self._fallback, self._mixing = fallback, mixing_of(self.tracker.allocation)
         self._turn = TurnGains(fallback.turn_1_s, fallback.rate_1_s, fallback.max_rate_rad_s)
 
-    def recovered(self, force: Array, observed: Observed, from_wrench: Array, least: float, most: float) -> Array:
-        """Return squared rotor speeds, (4,), that turn the thrust axis to `force` the shortest way."""
+    def recovered(self, force: Array, observed: Observed, least: float, most: float) -> Array:
+        """Return squared rotor speeds, (m,), that turn the thrust axis to `force` the shortest way."""
         direction = matvec(observed.rotation.T, force / norm(force))
         moments = turning_moment(direction, observed.rigid[10:], self.tracker.inertia, self._turn)
         thrust_n = max(dot(force, observed.rotation[:, 2].copy()), 0.0)
-        from_thrust, from_moments = from_wrench[:, 0].copy(), from_wrench[:, 1:].copy()
-        return mix_with_priority(thrust_n, moments, from_thrust, from_moments, least, most)
+        return mix_with_priority(thrust_n, moments, self._mixing, least, most)
 
     def warm_up(self) -> None:
         """Load compiled code by three steps from hover, the last upside down, and one for an attitude."""

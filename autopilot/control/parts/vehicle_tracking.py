@@ -29,7 +29,7 @@ _NOTHING = np.empty(0)
 class Tracked(NamedTuple):
     """State of the tracker."""
 
-    speeds: Array  # of the rotors, parts of the largest, (4,)
+    speeds: Array  # of the rotors, parts of the largest, (m,)
     wrench: Array  # now: U1, N, and U2..U4, N m, (4,)
     mean_wrench: Array  # over the interval that ends now, (4,)
     measured: Array | None  # by the observer a sample ago, (9,)
@@ -66,7 +66,7 @@ class VehicleTracker:
         self._rotors = packed(RotorModel(self.lag, self.allocation))
 
     def initial(self, rotor_speed: float) -> Tracked:
-        speeds = np.full(4, rotor_speed / self.vehicle.rotors.max_speed)
+        speeds = np.full(self.vehicle.rotors.count, rotor_speed / self.vehicle.rotors.max_speed)
         wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES)
         return Tracked(speeds, wrench, wrench, None, estimate, 0.0, self.vehicle.body.mass_kg)
 
@@ -98,10 +98,10 @@ class VehicleTracker:
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state."""
         _, _, measured, estimate, mass_kg, max_speed, current_a = observed
-        actuated = np.empty((4, 4))
+        actuated, wrenches = np.empty((2, len(squared))), np.empty((2, 4))
         top = self.vehicle.rotors.max_speed
-        rotor_lag.actuate(tracked.speeds, squared, max_speed, top, self._rotors, actuated)
-        commands, speeds, wrench, mean_wrench = actuated
+        rotor_lag.actuate(tracked.speeds, squared, max_speed, top, self._rotors, actuated, wrenches)
+        (commands, speeds), (wrench, mean_wrench) = actuated, wrenches
         charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
         after = Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
         return commands, after

@@ -35,7 +35,7 @@ class BatteryModel:
     """The battery of one vehicle; without one, power is unlimited."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self._battery = vehicle.battery
+        self._battery, self._rotors = vehicle.battery, float(vehicle.rotors.count)
         drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
@@ -81,7 +81,7 @@ class BatteryModel:
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
-            power_w = 4.0 * self._full_power_w * speed * speed * speed
+            power_w = self._rotors * self._full_power_w * speed * speed * speed
             voltage_v = loaded_voltage_v(open_v, power_w, battery.resistance_ohm)
             enough = voltage_v >= speed * battery.full_voltage_v
             low, high = (speed, high) if enough else (low, speed)
@@ -118,7 +118,7 @@ def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float
 def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
     """Fill the largest squared rotor speeds, (N,), in parts of the largest, at the power of all rotors.
 
-    `expected` squared speeds, (n, 4), give the power; the last limit is repeated.
+    `expected` squared speeds, (n, m), give the power; the last limit is repeated.
     """
     numbers = packed[0]
     for n in range(limits.shape[0]):

@@ -1,13 +1,72 @@
-"""Thrust and moments to rotor speeds within their limits: the inverse of THESIS [2.2]."""
+"""Thrust and moments to rotor speeds within their limits: the inverse of THESIS [2.2].
+
+More than four rotors use the null space of the allocation to stay within limits. Where that does not suffice, they come
+as near as possible, in the order of `_PRIORITY`: bounded least squares, O. Härkegård, CDC 2002.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.elementary import square
 from colibri.common.errors import checked
+from colibri.common.jit import Packed, compiled, packed
 from colibri.common.matrices import dot, inverse, matmul, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
+
+_PRIORITY = (1.0, 10.0, 10.0, 0.1)
+"""Weights of thrust, roll, pitch and yaw, each in parts of what the rotors can set."""
+_SWEEPS, _REGULAR = 200, 1e-6
+
+
+class Mixing(NamedTuple):
+    """The allocation of m rotors."""
+
+    allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, m)
+    inverse: Array  # (m, 4)
+
+
+def mixing_of(allocation: Array) -> Packed:
+    return packed(Mixing(allocation, exact_inverse(allocation)))
+
+
+@compiled
+def allocate(wrench: Array, mixing: Packed, least: float, most: float) -> Array:
+    """Return the squared speeds, (m,), from `least` to `most`, whose wrench, (4,), is the nearest."""
+    allocation, inverse = mixing[0].allocation, mixing[0].inverse
+    rotors = inverse.shape[0]
+    free, squared, missed = np.zeros(rotors), np.empty(rotors), np.empty(4)
+    within = True
+    for i in range(rotors):
+        for row in range(4):
+            free[i] += inverse[i, row] * wrench[row]
+        squared[i] = min(max(free[i], least), most)
+        within &= squared[i] == free[i]
+    if within:
+        return free
+    scaled = np.empty((4, rotors))
+    for row in range(4):
+        whole = 0.0
+        for i in range(rotors):
+            whole += abs(allocation[row, i])
+        scale = _PRIORITY[row] / whole if whole > 0.0 else 0.0
+        missed[row] = -scale * wrench[row]
+        for i in range(rotors):
+            scaled[row, i] = scale * allocation[row, i]
+            missed[row] += scaled[row, i] * squared[i]
+    for _ in range(_SWEEPS):
+        for i in range(rotors):
+            slope, curve = _REGULAR * (squared[i] - free[i]), _REGULAR
+            for row in range(4):
+                slope += scaled[row, i] * missed[row]
+                curve += scaled[row, i] * scaled[row, i]
+            to = min(max(squared[i] - slope / curve, least), most)
+            for row in range(4):
+                missed[row] += scaled[row, i] * (to - squared[i])
+            squared[i] = to
+    return squared
 
 
 class Mixer:
@@ -16,13 +75,16 @@ class Mixer:
     def __init__(self, vehicle: Vehicle) -> None:
         checked("vehicle", vehicle, Vehicle, "a Vehicle", AutopilotError)
         self._allocation = vehicle.allocation()
-        self._inverse = exact_inverse(self._allocation)
+        self._mixing = mixing_of(self._allocation)
+        self._inverse = self._mixing["inverse"][0]
         self._momentum = vehicle.rotor_momentum()
         self.rotors = vehicle.rotors.count
         self._squared_max = square(vehicle.rotors.max_speed)
 
     def rotor_speeds(self, wrench: Array) -> Array:
         """Return rotor speeds (N,), in the vehicle's unit, for U1 (N), U2, U3, U4 (N m), within the limits."""
+        if self.rotors > len(AXES):
+            return np.sqrt(allocate(wrench, self._mixing, 0.0, self._squared_max))
         return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
     def wrench(self, speeds: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The rotor lag and its inverse, as compiled kernels; speeds in parts of the largest, (4,).
+"""The rotor lag and its inverse, as compiled kernels; speeds in parts of the largest, (m,).
 
 Control laws plan forces with one linear lag, the slower of the rotors' two. Commands then bring each squared speed, the
 force, to its planned value at the next sample.
@@ -29,7 +29,7 @@ class RotorModel(NamedTuple):
     """The rotors of a vehicle."""
 
     lag: SampledLag
-    allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4)
+    allocation: Array  # squared speeds to U1 (N), U2, U3, U4 (N m), (4, m)
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> SampledLag:
@@ -62,10 +62,12 @@ def lead(speeds: Array, squared_commands: Array, lag: SampledLag, max_speed: flo
 
 
 @compiled
-def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
-    """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, (4, 4)."""
+def actuate(
+    speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array, wrenches: Array
+) -> None:
+    """Write commands, vehicle's unit, and speeds a sample later, (2, m); the wrench then, and on average, (2, 4)."""
     lag, allocation = packed[0].lag, packed[0].allocation
-    commands, after, wrench, mean = out[0], out[1], out[2], out[3]
+    commands, after, wrench, mean = out[0], out[1], wrenches[0], wrenches[1]
     put(lead(speeds, squared_commands, lag, max_speed), commands)
     put(follow(speeds, commands, lag), after)
     wrench[:], mean[:] = 0.0, 0.0

@@ -11,9 +11,10 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, Horizon, VehicleState
 from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priority, turning_moment
 from colibri.autopilot.control.rotor_loss.three_rotors import angles_of
-from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.vehicle_model.mixer import Mixing, exact_inverse
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.elementary import square
+from colibri.common.jit import packed
 from colibri.common.kernels import tan
 from colibri.common.matrices import matvec, norm
 from colibri.common.rotations import rotation_matrix
@@ -37,9 +38,8 @@ class PlainLaw:
         self._interval_s = interval_s
         self._max_speed = vehicle.rotors.max_speed
         self._min_squared = square(vehicle.rotors.idle_speed / self._max_speed)
-        squared_from_wrench = exact_inverse(vehicle.allocation()) / square(self._max_speed)
-        self._from_thrust = squared_from_wrench[:, 0].copy()
-        self._from_moments = squared_from_wrench[:, 1:].copy()
+        allocation, top = vehicle.allocation(), square(self._max_speed)
+        self._mixing = packed(Mixing(allocation * top, exact_inverse(allocation) / top))
         self._inertia = np.array(vehicle.body.inertia_kg_m2)
         self._mass_kg, self._gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
         lag_s = vehicle.rotors.lag.time_constant_down_s if vehicle.rotors.lag else 0.0
@@ -75,14 +75,8 @@ class PlainLaw:
         R = np.array(rotation_matrix(state.attitude))
         direction = matvec(R.T, along / norm(along))
         moments = turning_moment(direction, np.array(state.rate_flu_rad_s), self._inertia, self._turn)
-        squared = mix_with_priority(
-            max(thrust_n * float(direction[2]), 0.0),
-            moments,
-            self._from_thrust,
-            self._from_moments,
-            self._min_squared,
-            1.0,
-        )
+        thrust_n = max(thrust_n * float(direction[2]), 0.0)
+        squared = mix_with_priority(thrust_n, moments, self._mixing, self._min_squared, 1.0)
         return Decision(np.sqrt(squared) * self._max_speed, angles_of(along / norm(along), state.euler[2]))
 
 

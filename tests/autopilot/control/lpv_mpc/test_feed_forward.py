@@ -8,13 +8,14 @@ import pytest
 
 from colibri.autopilot.control.lpv_mpc import feed_forward, model
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
-from colibri.autopilot.control.lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
 from colibri.autopilot.control.lpv_mpc.mpc import model_of
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.jit import packed
 from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
+from tests.support.lpv_mpc import ROTORS
 
 INTERVAL_S = 0.008
 STEPS = 40
@@ -63,7 +64,7 @@ def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> No
     rate = 2.0 * asked.rates[0] - asked.rates[1]
     rigid = np.concatenate([p[0], v[0], quaternion_from_euler(phi, theta, psi), rate])
     motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
-    drive = model.empty_drive(STEPS)
+    drive = model.empty_drive(STEPS, ROTORS)
     model.roll_out(rigid, asked.squared[0], commands, disturbance, PACKED, drive, motion, speeds)
     assert np.abs(motion[:, :3] - p[:-1]).max() < 2e-3
     assert np.abs(motion[:, 3:6] - v[:-1]).max() < 0.03

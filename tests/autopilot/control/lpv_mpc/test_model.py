@@ -5,13 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, empty_transition, respond
-from colibri.autopilot.control.lpv_mpc.model import ROTORS, Model
+from colibri.autopilot.control.lpv_mpc.model import Model
 from colibri.autopilot.control.lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import rotation_matrix
 from colibri.plant.physics.equations import derivative
 from colibri.plant.physics.parameters import parameters_of
-from tests.support.lpv_mpc import HUMMINGBIRD, INTERVAL_S, STARTS, STEPS, rolled, start
+from tests.support.lpv_mpc import HUMMINGBIRD, INTERVAL_S, ROTORS, STARTS, STEPS, rolled, start
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -67,7 +67,7 @@ def test_deviations_are_the_motions_derivative(seed: int, without: list[str]) ->
     commands[:] = commands[0]
     motion, speeds = rolled(vehicle, rigid, squared, commands)
     responses = np.full((STEPS + 1, DEVIATIONS, ROTORS * (len(STARTS) - 1)), np.nan)
-    respond(motion, speeds, means, levels, packed(numbers), empty_transition(STEPS), responses)
+    respond(motion, speeds, means, levels, packed(numbers), empty_transition(STEPS, ROTORS), responses)
     step = 1e-4
     for column in range(responses.shape[2]):
         block, rotor = divmod(column, ROTORS)

@@ -7,7 +7,6 @@ from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.lpv_mpc import path, planning
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, POSITION, VELOCITY
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
-from colibri.autopilot.control.lpv_mpc.model import ROTORS
 from colibri.autopilot.control.lpv_mpc.path import PathLimits, PathNow
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpSolver
@@ -17,7 +16,7 @@ from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.config import SettingsError
 from colibri.common.types import Array
 from colibri.plant.physics.start import Start
-from tests.support.lpv_mpc import TABLE, VEHICLE, Flight
+from tests.support.lpv_mpc import ROTORS, TABLE, VEHICLE, Flight
 
 INTERVAL_S = 0.008
 STARTS = np.array([0, 2, 6, 20])
@@ -82,7 +81,7 @@ def test_a_minimum_with_speeds_at_their_bounds_can_be_free(reward: float) -> Non
     f[ROTORS :: ROTORS + 1] -= reward
     lower[ROTORS :: ROTORS + 1], upper[ROTORS :: ROTORS + 1] = -0.5, 0.1
     qp, z = Qp(root @ root.T + np.eye(n), f, np.zeros((0, n)), np.zeros(0), lower, upper), np.empty(n)
-    assert planning.free_minimum(qp, 2, z) is (reward > 0.0)
+    assert planning.free_minimum(qp, 2, ROTORS, z) is (reward > 0.0)
     solved = QpSolver("daqp", 1e-10).solve(qp).x
     assert solved is not None
     assert np.allclose(z, solved, atol=1e-8) is (reward > 0.0)

@@ -6,23 +6,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priority, turning_moment
-from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.vehicle_model.mixer import mixing_of
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.strategies import quaternions, reals, vectors
 
 VEHICLE = load_vehicle("hummingbird")
-FROM_WRENCH = exact_inverse(VEHICLE.allocation()) / VEHICLE.rotors.max_speed**2
-FROM_THRUST, FROM_MOMENTS = FROM_WRENCH[:, 0].copy(), FROM_WRENCH[:, 1:].copy()
 ALLOCATION = VEHICLE.allocation() * VEHICLE.rotors.max_speed**2
+MIXING = mixing_of(ALLOCATION)
 MIN_SQUARED, MAX_SQUARED = 0.01, 1.0
 INERTIA = np.array(VEHICLE.body.inertia_kg_m2)
 GAINS = TurnGains(6.0, 20.0, 8.0)
 
 
 def mixed(thrust_n: float, moment: np.ndarray) -> np.ndarray:
-    return mix_with_priority(thrust_n, moment, FROM_THRUST, FROM_MOMENTS, MIN_SQUARED, MAX_SQUARED)
+    return mix_with_priority(thrust_n, moment, MIXING, MIN_SQUARED, MAX_SQUARED)
 
 
 @given(st.floats(-10.0, 40.0), reals(5.0), reals(5.0), reals(2.0))
