@@ -1,7 +1,12 @@
-# Two commands do all: `make fly` flies the spiral, `make test` runs every check. Both set up .venv from the lock.
+# Two commands do all: `make fly` flies the spiral, `make test` runs every check. Each sets up of .venv what it needs.
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
+# Installs and says how far it is.
+PIP := -m pip install --disable-pip-version-check --progress-bar off
+COUNT := | awk '/^Collecting/ { printf "  %d %s\n", ++n, $$2; fflush() } /^Installing/ { print "  installing " n; fflush() }'
 # Every command starts processes, the tests hundreds of them: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -10,18 +15,26 @@ unexport PYTHONDONTWRITEBYTECODE
 
 setup: .venv/.ready
 
-.venv/.ready: requirements.lock pyproject.toml
+# What flying, figures and ground stations need.
+.venv/.flies: requirements-fly.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "colibri needs Python 3.11 or later: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
-	@echo "setting up .venv from requirements.lock (once, about three minutes)"
+	@echo "setting up .venv from requirements-fly.lock (once, about a minute)"
 	@$(PYTHON) -m venv --clear .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@$(BIN)/colibri compile --quiet
+	@$(BIN)/python $(PIP) --no-compile --no-deps --require-hashes -r requirements-fly.lock $(COUNT)
+	@$(BIN)/python $(PIP) --quiet --no-deps --no-build-isolation --editable .
+	@$(BIN)/colibri compile flight
+	@touch $@
+
+# What tests, docs and every option need, installed while the rest of the kernels is compiled.
+.venv/.ready: .venv/.flies requirements.lock
+	@echo "adding to .venv from requirements.lock (once, about two minutes)"
+	@($(BIN)/python $(PIP) --require-hashes -r requirements.lock $(COUNT)) & pip=$$!; \
+	  $(BIN)/colibri compile; code=$$?; wait $$pip && exit $$code
 	@$(BIN)/colibri sitl --plant-port 0 --gcs udpin:127.0.0.1:0 --speed max --duration 0.1 --quiet
 	@touch $@
 
-fly: setup
+fly: .venv/.flies
 	$(BIN)/colibri fly spiral --out $(OUT)
 
 lint: setup
@@ -122,10 +135,12 @@ docs: setup
 	$(BIN)/zensical build --strict
 	@echo "read it at site/index.html; with search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory site"
 
-# The lock names versions and hashes, no registry. Needs uv.
+# The locks name versions and hashes, no registry. Needs uv.
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra dev pyproject.toml -o requirements.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --group build --constraint requirements.lock pyproject.toml -o requirements-fly.lock
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra clients pyproject.toml -o requirements-clients.lock
 

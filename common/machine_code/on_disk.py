@@ -56,6 +56,10 @@ class MachineCode:
 
         return compile_in_turn
 
+    @property
+    def is_compiling(self) -> bool:
+        return bool(self._turns)
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._cache, name)
 
@@ -88,7 +92,7 @@ class _OnDisk(FunctionCache):
 
 
 waiting: list[Callable[[], object]] = []
-"""Called before this process waits for another that compiles."""
+"""Called before this process waits for another that compiles; what they raise ends the call instead."""
 
 
 def _report_waiting() -> None:

@@ -7,6 +7,7 @@ from colibri.common.process.lifecycle import loading
 
 
 def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument("what", nargs="*", help="flight, thesis, sensors, path, tests (default all of them)")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
 
 
@@ -14,4 +15,4 @@ def run(args: Namespace) -> int:
     with loading():
         from colibri.cli.computer.first_flights import compile_all
 
-    return compile_all(quiet=args.quiet)
+    return compile_all(args.what, quiet=args.quiet)

@@ -1,27 +1,34 @@
 """Short flights that compile what nearly every flight and test needs."""
 
 import sys
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
 from colibri.campaigns.engines.pool import in_order
-from colibri.common.errors import Error
+from colibri.common.errors import Error, unknown
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 
 FLIGHTS: dict[str, dict[str, Any]] = {
-    "profile flight": {},
-    "profile thesis": {"profile": "thesis"},
-    "profile flight on sensors": {"feedback": "sensors", "turbulence": "light"},
-    "profile path": {"profile": "path"},
-    "flight tests": {"sitl": True},
+    "flight": {},
+    "thesis": {"profile": "thesis"},
+    "path": {"profile": "path"},
+    "sensors": {"feedback": "sensors", "turbulence": "light"},
+    "tests": {"sitl": True},
 }
+_SHARED_BY = 2
+"""Processes that fly each: what one compiles, the other need not; further ones would mostly wait."""
 
 
-def compile_all(*, quiet: bool) -> int:
-    """Fly them on all cores; one line at the end, and a progress bar."""
+def compile_all(names: Sequence[str], *, quiet: bool) -> int:
+    """Fly them, or all, on all cores; one line at the end, and a progress bar."""
     began_s = perf_counter()
+    for name in names:
+        if name not in FLIGHTS:
+            fail(unknown("flight to compile", name, FLIGHTS))
+    jobs = [name for name in FLIGHTS if name in (names or FLIGHTS) for _ in range(_SHARED_BY)]
     try:
-        in_order(_fly, list(FLIGHTS), "compiling", quiet=quiet)
+        in_order(_fly, jobs, "compiling", quiet=quiet)
     except Error as error:
         fail(str(error), EXIT_FAILED)
     if not quiet:
@@ -30,6 +37,9 @@ def compile_all(*, quiet: bool) -> int:
 
 
 def _fly(name: str) -> None:
+    from colibri.common.machine_code.interpretation import interpret_while_waiting
+
+    interpret_while_waiting()
     options = dict(FLIGHTS[name])
     if not options.pop("sitl", False):
         from colibri.experiments.flight import fly
