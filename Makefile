@@ -6,7 +6,7 @@ BIN := .venv/bin
 OUT ?= out/spiral
 # Installs and says how far it is.
 PIP := -m pip install --disable-pip-version-check --progress-bar off
-COUNT := | awk '/^Collecting/ { printf "  %d %s\n", ++n, $$2; fflush() } /^Installing/ { print "  installing " n; fflush() }'
+COUNT := | awk '/^(Collecting|Processing) / { printf "  %d %s\n", ++n, $$2; fflush() } /^Installing/ { print "  installing " n; fflush() }'
 # Every command starts processes, the tests hundreds of them: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 

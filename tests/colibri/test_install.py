@@ -3,10 +3,12 @@
 import subprocess
 import sys
 import tarfile
+import tomllib
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from packaging.requirements import Requirement
 
 from tests.support.installs import ROOT, build, environment
 
@@ -60,6 +62,15 @@ def test_a_wheel_of_the_source_distribution_is_the_same(wheel: Path, sdist: Path
     (source,) = tmp_path.iterdir()
     assert {path.name for path in source.iterdir()} >= {"colibri", "docs", "tests", "tools", "README.md", "LICENSE"}
     assert contents(build("wheel", tmp_path / "dist", source)) == contents(wheel)
+
+
+def test_what_flies_is_locked_as_for_development() -> None:
+    flying, developing = (
+        set((ROOT / name).read_text().splitlines()) for name in ("requirements-fly.lock", "requirements.lock")
+    )
+    assert flying <= developing
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert {Requirement(one).name for one in needed} <= {line.partition("==")[0] for line in flying}
 
 
 def test_no_file_is_loaded_under_two_names() -> None:

@@ -10,12 +10,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 from numba.core.event import Event, Listener, install_listener
+from numba.core.registry import CPUDispatcher
 
 from colibri import autopilot, common, mavlink, plant
 from colibri.common.machine_code import on_disk
+from colibri.common.machine_code.interpretation import interpret_while_waiting
 from colibri.common.machine_code.on_disk import files_of
 from colibri.common.machine_code.turns import Turn
 
@@ -160,3 +163,20 @@ def test_one_process_compiles_while_others_wait(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(on_disk, "waiting", [report])
     assert kernel(1.0) == 3.0
     assert said == ["waiting"]
+
+
+def test_a_kernel_is_interpreted_while_another_compiles_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "from colibri.common.jit import compiled\n\n@compiled\ndef reciprocal(of):\n    return 1.0 / of[0].value\n"
+    (tmp_path / "elsewhere.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(on_disk, "waiting", [])
+    monkeypatch.setattr(CPUDispatcher, "__call__", CPUDispatcher.__call__)  # restored by monkeypatch
+    kernel = importlib.import_module("elsewhere").reciprocal
+    argument = np.array([(4.0,)], dtype=[("value", "f8")])
+    interpret_while_waiting()
+    other = Turn(kernel._cache.lock_file(), lambda: None)  # noqa: SLF001
+    assert kernel(argument) == 0.25
+    assert not kernel.signatures
+    other.end()
+    assert kernel(argument) == 0.25
+    assert len(kernel.signatures) == 1

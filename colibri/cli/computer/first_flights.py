@@ -32,7 +32,7 @@ def compile_all(names: Sequence[str], *, quiet: bool) -> int:
     except Error as error:
         fail(str(error), EXIT_FAILED)
     if not quiet:
-        sys.stdout.write(f"compiled in {perf_counter() - began_s:.0f} s: flights and flight tests start at once\n")
+        sys.stdout.write(f"compiled for {', '.join(dict.fromkeys(jobs))} in {perf_counter() - began_s:.0f} s\n")
     return 0
 
 

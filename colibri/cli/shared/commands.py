@@ -144,7 +144,10 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
         "compile": CommandEntry(
             "compile what flights and flight tests need, beforehand",
             "computer",
-            "colibri compile    # once after installation, in CI before pytest",
+            """
+            colibri compile           # once after installation, in CI before pytest
+            colibri compile flight    # only what a flight with the profile flight needs
+            """,
         ),
         "doctor": CommandEntry(
             "look whether everything is there that flights need",
