@@ -88,12 +88,10 @@ class Flight:
         series = FigureSeries(self.plan)
         for part in FlightReader(self.plan, self.log):
             series.add(part)
-        known = []
-        for name, figure in figures_of(series, self.plan):
-            if name == what:
-                return figure
-            known.append(name)
-        raise OptionError(unknown("figure", what, known))
+        figures = figures_of(series, self.plan)
+        if what not in figures:
+            raise OptionError(unknown("figure", what, figures))
+        return figures[what]()
 
     def save(self, folder: str | Path) -> Path:
         """Write log, table, report and provenance to a new or empty folder.

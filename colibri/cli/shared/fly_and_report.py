@@ -41,7 +41,8 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
         with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
             for note in filter(None, (plan.track_note, in_words(plan.without_effect.items()))):
                 say(note)
-            summary = fly_plan(plan, progress, say, compiling)
+            beside = plan.spec.link == "udp" and not args.no_figures
+            summary = fly_plan(plan, _loading_figures(progress) if beside else progress, say, compiling)
     except FlightError as error:
         _keep_what_there_is(plan, str(error))
         if error.said:
@@ -63,6 +64,17 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     if above:
         fail(f"--fail-above: {'; '.join(above)}; the logs are in {plan.out}", EXIT_FAILED)
     return 0
+
+
+def _loading_figures(progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Load what draws at the first call, while two other processes fly."""
+
+    def load_and_show(sim_time_s: float) -> None:
+        import colibri.analysis.figures  # noqa: F401
+
+        progress(sim_time_s)
+
+    return load_and_show
 
 
 def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
