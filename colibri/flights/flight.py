@@ -13,6 +13,7 @@ from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING
+from colibri.mavlink.hil.sensors import sensors_as_received
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, command_as_received, state_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.physics.world import World
@@ -95,13 +96,21 @@ class Direct:
 class InMemory:
     """Carries the datagrams of two processes in memory; `traffic` records all frames.
 
-    A frame of the state alone is only rounded as its datagram would round it, unless traffic is recorded.
+    A frame without others beside it is only rounded as its datagram would round it, unless traffic is recorded. With
+    `replayed`, sensors have their datagrams: a replay needs them.
     """
 
     def __init__(
-        self, frame_interval_us: int, feedback: Feedback, system_id: int = SYSTEM_ID, traffic: Traffic | None = None
+        self,
+        frame_interval_us: int,
+        feedback: Feedback,
+        system_id: int = SYSTEM_ID,
+        traffic: Traffic | None = None,
+        *,
+        replayed: bool = True,
     ) -> None:
         self._traffic = traffic
+        self._rounds = feedback is Feedback.STATE or not replayed
         self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
         self.autopilot_end = AutopilotEnd(
             system_id=system_id, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
@@ -112,10 +121,10 @@ class InMemory:
     def exchange(self, plant: Plant, autopilot: Autopilot[Any]) -> Answered:
         now_us = plant.world.time_us
         frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
-        alone = plant_status == NOTHING and now_us % HEARTBEAT_EVERY_US != 0
-        if alone and self._traffic is None and isinstance(frame, StateFrame):
-            received, datagram = state_as_received(frame), b""
-            assert received is not None, "the plant's state is finite"
+        received, datagram = None, b""
+        if plant_status is NOTHING and self._rounds and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
+            received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)
+        if received is not None:
             step = autopilot.step(received)
             self.autopilot_end.follow(now_us)
             if not step.faults:

@@ -33,7 +33,9 @@ def fly_locally(
     traffic = TlogWriter(plan.out / TRAFFIC) if plan.spec.tlog and topics is None else None
     wire: Wire = Direct()
     if plan.spec.link == "memory":
-        wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=traffic.write if traffic else None)
+        record = traffic.write if traffic else None
+        replayed = log.topics.for_viewers
+        wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=record, replayed=replayed)
     frames = 0
     try:
         truth.write_world(plant.world)

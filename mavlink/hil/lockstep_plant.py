@@ -159,8 +159,8 @@ class PlantEnd:
         return command
 
     def skip(self) -> None:
-        """Count a state frame that was not encoded, so that later ones are numbered as if it had been."""
-        self._codec.skip(STATE_MESSAGES)
+        """Count a frame that was not encoded, so that later ones are numbered as if it had been."""
+        self._codec.skip(STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
 
     def take_faults(self) -> list[Fault | WorldChange]:
         """Return the unchecked faults and changes of the world in the last answer."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 from math import degrees, hypot, inf, isfinite, nan
+from struct import Struct
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.atmosphere import altitude_m
@@ -29,8 +30,10 @@ _FIELDS = (
     "abs_pressure diff_pressure pressure_alt temperature fields_updated"
 )
 _SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
-_BY_SIZE = {layout.size: layout for layout in (_SENSOR, *(FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"))}
-"""By the number of non-zero bytes of `fields_updated`."""
+_SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]
+"""With one and two non-zero bytes of `fields_updated`."""
+_BY_SIZE = {layout.size: layout for layout in (_SENSOR, *_SHORTENED)}
+_SINGLES = Struct("<11f")
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")
 _altitude_m = lru_cache(maxsize=1)(altitude_m)
 """Pressure is measured less often than frames are sent."""
@@ -107,27 +110,29 @@ Frame: TypeAlias = StateFrame | SensorFrame
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    messages = [
-        _SENSOR.encode(
-            codec,
-            (
-                frame.time_us,
-                *frd_from_flu(frame.specific_force_flu_m_s2),
-                *frd_from_flu(frame.rate_flu_rad_s),
-                *frd_from_flu(frame.magnetic_field_flu_gauss),
-                frame.pressure_pa / 100.0,
-                0.0,
-                _altitude_m(frame.pressure_pa),
-                frame.temperature_c,
-                frame.updated,
-            ),
-        )
-    ]
+    time_us, updated, force, rate, field, pressure_pa, temperature_c, gps, distance = frame
+    pressure = (pressure_pa / 100.0, 0.0, _altitude_m(pressure_pa))
+    numbers = (time_us, *frd_from_flu(force), *frd_from_flu(rate), *frd_from_flu(field), *pressure, temperature_c)
+    layout = _SHORTENED[updated > 0xFF] if updated <= 0xFFFF else _SENSOR
+    messages = [layout.encode(codec, (*numbers, updated))]
+    if gps is None and distance is None:
+        return messages
     for row in OWN_MESSAGES:
         value = getattr(frame, row.field)
         if value is not None:
             messages.append(codec.encode(row.message, *row.encoded(value, frame.time_us)))
     return messages
+
+
+def sensors_as_received(frame: SensorFrame) -> SensorFrame | None:
+    """Return a frame of HIL_SENSOR alone as rounded by its message; None with others beside it."""
+    time_us, updated, force, rate, field, pressure_pa, temperature_c, gps, distance = frame
+    if gps is not None or distance is not None:
+        return None
+    fx, fy, fz, p, q, r, mx, my, mz, hpa, temperature_c = _SINGLES.unpack(
+        _SINGLES.pack(*force, *rate, *field, pressure_pa / 100.0, temperature_c)
+    )
+    return SensorFrame(time_us, updated, (fx, fy, fz), (p, q, r), (mx, my, mz), hpa * 100.0, temperature_c)
 
 
 def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:

@@ -3,15 +3,17 @@
 Invalid input (not finite, out of range, halves of different frames) decodes to `None`.
 """
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from functools import cache
 from math import isfinite, sqrt
+from struct import Struct
 from typing import Any, NamedTuple
 
 from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from colibri.mavlink.wire.ned import ned_frd_state
+from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_frd_state
 
 ROTORS = 4
 """Of a plant that is not told otherwise."""
@@ -19,11 +21,11 @@ LOCKSTEP_FLAG = 1
 """HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message."""
 
 _UNIT_NORM_TOLERANCE = 1e-3
+_SINGLES = Struct("<13f")
 _ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
 _POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
 STATE_MESSAGES = 2
 STATE_BYTES = _ATTITUDE.size + _POSITION.size
-"""Size of a state frame's datagram."""
 """Size of a datagram that is nothing but a frame of state feedback."""
 _DISARMED = MODE_CUSTOM | MODE_HIL
 _ARMED = _DISARMED | MODE_ARMED
@@ -59,9 +61,15 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 
 
 def state_as_received(frame: StateFrame) -> StateFrame | None:
-    """Return the frame as rounded by `encode_state` and `read_state`."""
-    turning, moving = _numbers(frame)
-    return _state(_ATTITUDE.rounded(turning), _POSITION.rounded(moving))
+    """Return the frame as rounded by `encode_state` and `read_state`: a sign or another axis alters no digit."""
+    time_us, position, velocity, attitude, rate = frame
+    q1, q2, q3, q4, x, y, z, vx, vy, vz, p, q, r = _SINGLES.unpack(
+        _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
+    )
+    unit = _unit(q1, q2, q3, q4) if isfinite(x + y + z + vx + vy + vz + p + q + r) else None
+    if unit is None:
+        return None
+    return StateFrame(time_us - time_us % 1000, (x, y, z), (vx, vy, vz), ned_frd_from_enu_flu(unit), (p, q, r))
 
 
 def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -89,13 +97,19 @@ def _state(attitude: Sequence[Any], position: Sequence[Any]) -> StateFrame | Non
     position_ms, x, y, z, vx, vy, vz = position
     # Fields are single floats: their sum is finite if each of them is.
     all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
-    squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
-    if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
+    unit = _unit(q1, q2, q3, q4)
+    if attitude_ms != position_ms or not all_finite or unit is None:
         return None
-    norm = sqrt(squared)
-    unit = (q1 / norm, q2 / norm, q3 / norm, q4 / norm)
     state = ned_frd_state((x, y, z), (vx, vy, vz), unit, (rollspeed, pitchspeed, yawspeed))
     return StateFrame(attitude_ms * 1000, *state)
+
+
+def _unit(w: float, x: float, y: float, z: float) -> Quaternion | None:
+    squared = w * w + x * x + y * y + z * z
+    if not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
+        return None
+    norm = sqrt(squared)
+    return (w / norm, x / norm, y / norm, z / norm)
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
@@ -108,8 +122,7 @@ def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
 def command_as_received(command: ActuatorCommand) -> ActuatorCommand | None:
     """Return the command as rounded by `encode_actuators` and `read_actuators`."""
     time_us, controls, armed = command
-    mode = _ARMED if armed else _DISARMED
-    return _command(actuator_frame(len(controls)).rounded((time_us, LOCKSTEP_FLAG, *controls, mode)))
+    return _within_range(time_us, array("f", controls), armed)
 
 
 def read_actuators(datagram: bytes, source: bytes, rotors: int = ROTORS) -> ActuatorCommand | None:
@@ -127,7 +140,11 @@ def decode_actuators(message: Message, rotors: int = ROTORS) -> ActuatorCommand 
 
 def _command(numbers: Sequence[Any]) -> ActuatorCommand | None:
     time_us, _, *controls, mode = numbers
-    for control in controls:
+    return _within_range(time_us, controls, bool(mode & MODE_ARMED))
+
+
+def _within_range(time_us: int, controls: Iterable[float], armed: bool) -> ActuatorCommand | None:
+    for control in (within := tuple(controls)):
         if not 0.0 <= control <= 1.0:
             return None
-    return ActuatorCommand(time_us, tuple(controls), bool(mode & MODE_ARMED))
+    return ActuatorCommand(time_us, within, armed)

@@ -34,7 +34,7 @@ class FixedFrame:
             numbers += f"{count}{code[-1]}{unused}x" if count else letter or code
             self._names.append((wanted, int(count or 0)))
         payload = Struct("<" + numbers)
-        self._pack, self._unpack = payload.pack, payload.unpack
+        self._pack = payload.pack
         self._unpack_from = Struct(f"<4sB2s3s{numbers}H").unpack_from
         self._begins = bytes((MARKER, payload.size, 0, 0))
         self._id = definition.id.to_bytes(3, "little")
@@ -48,9 +48,6 @@ class FixedFrame:
             return codec.framed(payload, self._id, self._crc_extra)
         frame = _HEADER(self._begins, codec.next_sequence(), *codec.source, self._id) + payload
         return frame + crc16(frame[1:] + self._crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
-
-    def rounded(self, numbers: Sequence[Any]) -> tuple[Any, ...]:
-        return self._unpack(self._pack(*numbers))
 
     def read(self, datagram: bytes, at: int, source: bytes) -> tuple[Any, ...] | None:
         """Return the numbers of the frame at byte `at`; `None` unless it is an intact, unsigned one of `source`."""

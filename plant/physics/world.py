@@ -72,19 +72,20 @@ class Physics:
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
-        self._feel_wind(world)
+        time_us, wind = world.time_us, self._air.steady
+        if wind is None:
+            self._wind[:] = world.wind_enu_m_s
         target = self._target(command)
         if self._noise is not None:
-            target = self._disturb(self._noise, target, world.time_us, duration_us)
+            target = self._disturb(self._noise, target, time_us, duration_us)
         x, voltage_v = self._integrate(self._vector(world), target, self._parameters, duration_us * 1e-6)
         if not close_attitude(x):
-            when = f"at t = {world.time_us / 1e6:.3f} s"
+            when = f"at t = {time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state left the range of the model {when}: it is not finite")
         end = x.tolist()
-        state = tuple(end[:_RIGID])
+        state, eddies = tuple(end[:_RIGID]), None
         voltage_v = nan if self._battery is None else voltage_v
-        time_us = world.time_us + duration_us
-        wind, eddies = self._air.steady, None
+        time_us += duration_us
         if wind is None:
             velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
             wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)

@@ -1,12 +1,12 @@
 """The plant as a pure composition of physics, sensors and faults, stepped frame by frame."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedFrame
+from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, WorldChange
@@ -34,15 +34,16 @@ class DelayedCommands:
     def arrive(self, from_us: int, command: ActuatorCommand) -> None:
         self._coming.append((from_us, command))
 
-    def spans(self, begin_us: int, end_us: int) -> Iterator[tuple[ActuatorCommand, int]]:
-        now_us = begin_us
-        while now_us < end_us:
-            while self._coming and self._coming[0][0] <= now_us:
-                from_us, self._now = self._coming.popleft()
+    def spans(self, begin_us: int, end_us: int) -> list[tuple[ActuatorCommand, int]]:
+        coming, spans = self._coming, []
+        while begin_us < end_us:
+            while coming and coming[0][0] <= begin_us:
+                from_us, self._now = coming.popleft()
                 self.delay_us = from_us - self._now.time_us
-            until_us = min(end_us, self._coming[0][0]) if self._coming else end_us
-            yield self._now, until_us - now_us
-            now_us = until_us
+            until_us = min(end_us, coming[0][0]) if coming else end_us
+            spans.append((self._now, until_us - begin_us))
+            begin_us = until_us
+        return spans
 
 
 class Plant:
@@ -81,7 +82,9 @@ class Plant:
 
     def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
         battery = self._physics.battery(self.world) if with_battery else None
-        status = PlantStatus(battery, self._results, self._actuation.delay_us or None)
+        delay_us = self._actuation.delay_us or None
+        alone = battery is None and delay_us is None and not self._results
+        status = NOTHING if alone else PlantStatus(battery, self._results, delay_us)
         return ReceivedFrame(self._measure(self.world), status)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:

@@ -33,10 +33,10 @@ def plant(feedback: Feedback, interval_us: int) -> Plant:
     return PlantBuilder(gusts, VEHICLE, default_starts(VEHICLE)).build(feedback, interval_us)
 
 
-def on_track(feedback: Feedback) -> SteppedFlight[Any]:
+def on_track(feedback: Feedback, **wire_options: Any) -> SteppedFlight[Any]:
     estimator = estimator_for(feedback, VEHICLE, DEFAULT_ORIGIN)
     autopilot = track_autopilot(PROFILE, VEHICLE, track("spiral"), lambda: 0.0, estimator=estimator)
-    wire = InMemory(autopilot.frame_interval_us, feedback)
+    wire = InMemory(autopilot.frame_interval_us, feedback, **wire_options)
     return SteppedFlight(plant(feedback, autopilot.frame_interval_us), autopilot, wire)
 
 
@@ -84,3 +84,18 @@ def test_a_restored_flight_goes_on_with_the_same_bits(feedback: Feedback, begun:
 def test_samples_end_with_the_last_whole_frame() -> None:
     flight = on_track(Feedback.STATE)
     assert [sample.world.time_us for sample in flight.samples(0.0125)] == [4000, 8000, 12000]
+
+
+@pytest.mark.parametrize("feedback", Feedback)
+def test_bits_are_the_same_without_the_codec(feedback: Feedback) -> None:
+    traffic: list[bytes] = []
+    flights = (
+        on_track(feedback, traffic=lambda _us, frames: traffic.extend(frames)),
+        on_track(feedback, replayed=False),
+    )
+    coded, plain = ([flight.step() for _ in range(FRAMES)] for flight in flights)
+    assert [(each.world, each.command) for each in plain] == [(each.world, each.command) for each in coded]
+    assert len(traffic) > 2 * FRAMES
+    sent = [(one.datagram, other.datagram) for one, other in zip(plain, coded, strict=True) if one.datagram]
+    assert 0 < len(sent) < FRAMES // 2
+    assert all(one == other for one, other in sent)
