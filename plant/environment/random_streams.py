@@ -22,9 +22,14 @@ class Chance:
     """Standard normal numbers of 24 bits: beyond, NumPy's tail depends on the computer's libm."""
 
     def __init__(self, seed: SeedSequence) -> None:
-        self._generator = default_rng(seed)
         self._left: list[float] = []
         """Drawn, the next one last."""
+        self.begin(seed)
+
+    def begin(self, seed: SeedSequence) -> None:
+        """Begin again with another seed."""
+        self._generator = default_rng(seed)
+        self._left.clear()
 
     def __iter__(self) -> Iterator[float]:
         return self
@@ -48,5 +53,9 @@ class Chance:
         self._left = self._generator.standard_normal(_BLOCK).astype(np.float32).tolist()[::-1]
 
 
+def seeds(seed: int, source: RandomStream, count: int) -> list[SeedSequence]:
+    return SeedSequence(seed, spawn_key=(source,)).spawn(count)
+
+
 def streams(seed: int, source: RandomStream, count: int) -> list[Chance]:
-    return [Chance(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]
+    return [Chance(child) for child in seeds(seed, source, count)]

@@ -70,6 +70,13 @@ class Physics:
         self._integrate(self._end[1], self._standing, self._parameters, _MOMENT_S)
         close_attitude(self._end[1])
 
+    def become(self, vehicle: Vehicle) -> None:
+        """Go on with another vehicle, in the same air."""
+        self._parameters[:] = packed(parameters_of(vehicle, self._air.steady or CALM))
+        self._as_built = self._parameters.copy()
+        self._power = self._parameters["power"][0].tolist()
+        self._idle, self._top, self._battery = vehicle.rotors.idle_speed, vehicle.rotors.max_speed, vehicle.battery
+
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us`; raise `IntegrationError` if the state is no longer finite."""
         time_us, wind = world.time_us, self._air.steady

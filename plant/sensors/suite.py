@@ -6,7 +6,7 @@ from colibri.common.earth.atmosphere import temperature_c
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import SensorFrame
-from colibri.plant.environment.random_streams import RandomStream, streams
+from colibri.plant.environment.random_streams import RandomStream, seeds, streams
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
 from colibri.plant.sensors.instrument import SensorSurroundings
@@ -38,7 +38,7 @@ class SensorSuite:
         self._faults = faults
         self._origin = origin
         setting = SensorSurroundings(physics, origin, interval_us * 1e-6)
-        chances = streams(seed, RandomStream.SENSORS, len(ROWS))
+        self._chances = chances = streams(seed, RandomStream.SENSORS, len(ROWS))
         self._instruments = [
             (_PLACE[row.field], row.group, row.switched_on(getattr(parts, row.part), setting, chance))
             for row, chance in zip(ROWS, chances, strict=True)
@@ -47,6 +47,11 @@ class SensorSuite:
         nothing = (0.0, 0.0, 0.0)
         self._reported: list[Any] = [*SensorFrame(0, 0, nothing, nothing, nothing, pressure_pa=0.0, temperature_c=0.0)]
         self._frame: SensorFrame | None = None
+
+    def reseed(self, seed: int) -> None:
+        """Draw the noise from now on by another seed; biases stay."""
+        for chance, child in zip(self._chances, seeds(seed, RandomStream.SENSORS, len(ROWS)), strict=True):
+            chance.begin(child)
 
     def measure(self, world: World) -> SensorFrame:
         """Return the frame of `world`: the next one, or the previous one again."""

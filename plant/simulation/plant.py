@@ -70,10 +70,13 @@ class Plant:
         self.interval_us = interval_us
         self._physics = physics
         self._measure: Callable[[World], Frame] = state_frame
+        self._suite: SensorSuite | None = None
         if feedback is Feedback.SENSORS:
             assert vehicle.sensors is not None, "only what has sensors serves them"
             faults = self.faults.sensors
-            suite = SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults)
+            self._suite = suite = SensorSuite(
+                vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
+            )
             self._measure = suite.measure
             physics.specific_force(world)  # loads it, before any frame
         self._actuation = DelayedCommands(_held(world, vehicle))
@@ -116,6 +119,12 @@ class Plant:
         while events and events[0][0] <= self.world.time_us:
             self._change(events.popleft()[1])
         self._next_us = events[0][0] if events else _NEVER_US
+
+    def become(self, vehicle: Vehicle, seed: int) -> None:
+        """Go on as a vehicle with the same sensors, and with other noise."""
+        self._physics.become(vehicle)
+        if self._suite is not None:
+            self._suite.reseed(seed)
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:
         self._actuation.arrive(sent_us + self._round_trip_us, command)
