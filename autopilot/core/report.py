@@ -41,6 +41,8 @@ class Reporter:
         controls = parts.actuation.turning(now_us, armed=pilot.state.armed)
         parts.battery.run(controls, self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
+        if not stations.reports:
+            return
         snapshot = parts.snapshots.take(
             *(now_us, state, pilot, guidance, decision, duration_s, controls),
             *(parts.battery.state(charge_state), fence, parts.state_source),

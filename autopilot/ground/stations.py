@@ -65,6 +65,7 @@ class StationSettings:
     Attributes:
         boot_unix_us: Unix time at simulated time 0, µs; 0 if unknown.
         logs: Folder of flight logs; by default `logs` of the files.
+        reports: Whether samples are reported to ground stations and logged.
     """
 
     system_id: int
@@ -76,6 +77,7 @@ class StationSettings:
     logs: Files | None = None
     feedback: Feedback = Feedback.STATE
     relays_faults: bool = True
+    reports: bool = True
 
 
 class Guarding(Protocol):
@@ -106,7 +108,7 @@ class Stations:
     ) -> None:
         identity = IDENTITIES[settings.identity]
         self._lines, self._pilot, self._guard = lines, pilot, defence.guard
-        self._text = StatusText()
+        self._text, self.reports = StatusText(), settings.reports
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.offboard, self._follow = Offboard(self._text), Follow(self._text)

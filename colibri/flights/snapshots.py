@@ -194,6 +194,7 @@ _CHANGING: tuple[tuple[type, Keep], ...] = (
 )
 _STATELESS_PACKAGES = (
     "numba",
+    "_nrt_python",
     "llvmlite",
     "msgspec",
     "re",

@@ -53,7 +53,7 @@ class StreamedService(ABC, Generic[Value]):
         except Refused as refused:
             self.dropped[str(refused)] += 1
             return self._tell(message.name, refused, now_us) if refused.field else ()
-        if value is not None and not self._keep(peer, value, now_us):
+        if value is not None and not self.keep(peer, value, now_us):
             self.dropped["another client"] += 1
         return ()
 
@@ -83,7 +83,8 @@ class StreamedService(ABC, Generic[Value]):
     def _streams(self, peer: Peer, now_us: int) -> bool:
         return self._value(peer, now_us, self._silent_after_us) is not None
 
-    def _keep(self, peer: Peer, value: Value, now_us: int) -> bool:
+    def keep(self, peer: Peer, value: Value, now_us: int) -> bool:
+        """Take in a client's setpoint; return whether the client is obeyed."""
         if peer not in self._received and len(self._received) >= MAX_CLIENTS:
             self._received = {it: kept for it, kept in self._received.items() if self._streams(it, now_us)}
             if len(self._received) >= MAX_CLIENTS:
