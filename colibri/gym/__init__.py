@@ -19,6 +19,6 @@ for _name, _track in {"colibri/Hover-v0": "hover", "colibri/Track-v0": "lemnisca
         gymnasium.register(
             _name,
             entry_point="colibri.gym.environment:QuadrotorEnv",
-            vector_entry_point="colibri.gym.environment:QuadrotorVectorEnv",
+            vector_entry_point="colibri.gym.environment:vector_env",
             kwargs={"track": _track},
         )

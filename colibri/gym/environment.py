@@ -1,19 +1,21 @@
 """The environments of gymnasium: one vehicle, and a vector of vehicles in one compiled loop."""
 
 from collections.abc import Sequence
+from functools import partial
+from inspect import signature
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Space
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from colibri.common.errors import shown
+from colibri.common.errors import shown, unknown
 from colibri.gym import kernels
-from colibri.gym.episodes import Episodes, EpisodesSnapshot, read_options
+from colibri.gym.episodes import PILOTED, Episodes, EpisodesSnapshot
 from colibri.gym.errors import GymError
 
 Values = NDArray[np.float32]
@@ -35,7 +37,7 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
         if options:
             raise GymError(f'options: none are known, not "{shown(options)}": distributions are the keyword draw')
         self._episodes.begin(0, self.np_random)
-        return self._episodes.observations[0].copy(), {}
+        return self._episodes.observations[0].copy(), self._episodes.info()
 
     def step(self, action: Values) -> tuple[Values, float, bool, bool, dict[str, Any]]:
         """Advance one control interval; `info["why"]` names the reason of a termination."""
@@ -46,9 +48,8 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
         if given.shape != (4,):
             raise GymError(f"action must have the shape (4,), not {given.shape}")
         rewards, terminated, truncated = episodes.step(given[None])
-        ended = bool(terminated[0])
-        info = {"why": episodes.why(0)} if ended else {}
-        return episodes.observations[0].copy(), float(rewards[0]), ended, bool(truncated[0]), info
+        seen: Values = episodes.observations[0].copy()
+        return seen, float(rewards[0]), bool(terminated[0]), bool(truncated[0]), episodes.info()
 
     def snapshot(self) -> EpisodesSnapshot:
         """Keep the episode, with its random numbers."""
@@ -70,9 +71,7 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(self, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> None:
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or not 1 <= num_envs <= _MAX_COUNT:
-            raise GymError(f'num_envs must be a whole number from 1 to {_MAX_COUNT}, not "{shown(num_envs)}"')
-        self._episodes = _episodes(num_envs, render_mode, options)
+        self._episodes = _episodes(_count(num_envs), render_mode, options)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = _spaces(self._episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -129,10 +128,35 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
         return self._episodes.observations.copy()
 
 
+def vector_env(num_envs: int = 1, **options: Any) -> VectorEnv[Values, Values, Any]:
+    """Return the vector of `gymnasium.make_vec`: compiled, or for actions through the autopilot one after another."""
+    if options.get("action") in PILOTED:
+        return SyncVectorEnv([partial(QuadrotorEnv, **options)] * _count(num_envs))
+    return QuadrotorVectorEnv(num_envs, **options)
+
+
+def _count(given: Any) -> int:
+    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= _MAX_COUNT:
+        raise GymError(f'num_envs must be a whole number from 1 to {_MAX_COUNT}, not "{shown(given)}"')
+    return given
+
+
 def _episodes(count: int, render_mode: Any, options: dict[str, Any]) -> Episodes:
     if render_mode is not None:
         raise GymError(f'render_mode must be None, not "{shown(render_mode)}": nothing is drawn')
-    return Episodes(count, **read_options(options))
+    piloted = options.get("action") in PILOTED
+    names = [*signature(Episodes).parameters][1:]
+    if piloted or not options.keys() <= {*names}:
+        from colibri.gym.piloted import PilotedEpisodes  # loads the autopilot
+
+        own = [name for name in signature(PilotedEpisodes).parameters if name not in ("count", "options")]
+        for name in options:
+            if name not in (*names, *own):
+                raise GymError(unknown("keyword", name, [*names, *own]))
+            if not piloted and name not in names:
+                raise GymError(f'keyword "{name}" requires an action through the autopilot: {", ".join(PILOTED)}')
+        return PilotedEpisodes(count, **options)
+    return Episodes(count, **options)
 
 
 def _seed(given: Any) -> int | None:
@@ -150,6 +174,7 @@ def _spaces(episodes: Episodes) -> tuple[Space[Values], Space[Values]]:
             np.full(3, kernels.MAX_RATE_RAD_S),
             np.ones(4),
             np.full(3 * episodes.preview, kernels.MAX_POSITION_M),
+            np.ones(4 * (episodes.history - 1)),
         ]
     ).astype(np.float32)
     spaces: Any = (Box(-most, most, dtype=np.float32), Box(-1.0, 1.0, (4,), dtype=np.float32))

@@ -2,7 +2,6 @@
 
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping, Sequence
-from inspect import signature
 from math import ceil
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -19,10 +18,9 @@ from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
 from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
 from colibri.common.matrices import inverse
-from colibri.common.types import Array, Vector
+from colibri.common.types import Array
 from colibri.gym import kernels
 from colibri.gym.errors import GymError
-from colibri.plant.environment.air import CALM
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import RK4_STEP_S
 from colibri.plant.physics.parameters import parameters_of
@@ -31,9 +29,21 @@ from colibri.plant.physics.world import starting_world
 from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-ActionKind = Literal["rotors", "rates"]
+ActionKind = Literal["rotors", "rates", "attitude", "velocity", "position"]
 ACTIONS: tuple[ActionKind, ...] = get_args(ActionKind)
-ENDS = ("", "too far from the reference", "ground", "state not finite", "action not finite")
+PILOTED: tuple[ActionKind, ...] = ACTIONS[2:]
+"""Actions through the whole autopilot."""
+ENDS = (
+    "",
+    "too far from the reference",
+    "ground",
+    "state not finite",
+    "action not finite",
+    "disarmed",
+    "gate missed",
+    "finished",
+)
+_COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 _START: dict[str, Any] = {
     **{f"start.{key}": {"uniform": [-0.5, 0.5]} for key in ("x", "y", "z", "vx", "vy", "vz", "p", "q", "r")},
     **{f"start.{key}": {"uniform": [-15.0, 15.0]} for key in ("phi", "theta")},
@@ -60,10 +70,15 @@ class EpisodesSnapshot(NamedTuple):
 
     arrays: tuple[Any, ...]
     chances: tuple[Mapping[str, Any] | None, ...]
+    flight: Any = None
+    """With actions through the autopilot: the environment's flight, and its snapshot."""
 
 
 class Episodes:
     """Episodes of `count` vehicles, each row with its own random numbers; arguments as in docs/gym.md."""
+
+    starts: Mapping[str, Any] = _START
+    """Drawn by default."""
 
     def __init__(
         self,
@@ -76,6 +91,7 @@ class Episodes:
         duration: float = 10.0,
         preview: int = 0,
         preview_s: float = 0.1,
+        history: int = 1,
         max_rates: Sequence[float] = (8.0, 8.0, 4.0),
         limit_m: float = 5.0,
         draw: Mapping[str, Any] | None = None,
@@ -83,50 +99,68 @@ class Episodes:
     ) -> None:
         if action not in ACTIONS:
             raise GymError(unknown("action", action, ACTIONS))
-        _within("rate", rate, 10.0, 1000.0, "Hz")
-        _within("duration", duration, 1.0 / rate, 3600.0, "s")
-        _within("limit_m", limit_m, 0.1, 1000.0, "m")
-        _within("preview_s", preview_s, 1.0 / rate, 10.0, "s")
-        if isinstance(preview, bool) or not isinstance(preview, int) or not 0 <= preview <= 100:
-            raise GymError(f'preview must be a whole number from 0 to 100, not "{shown(preview)}"')
+        within("rate", rate, 10.0, 1000.0, "Hz")
+        within("duration", duration, 1.0 / rate, 3600.0, "s")
+        within("limit_m", limit_m, 0.1, 1000.0, "m")
+        within("preview_s", preview_s, 1.0 / rate, 10.0, "s")
+        for name, whole, least in (("preview", preview, 0), ("history", history, 1)):
+            if isinstance(whole, bool) or not isinstance(whole, int) or not least <= whole <= 100:
+                raise GymError(f'{name} must be a whole number from {least} to 100, not "{shown(whole)}"')
         if not isinstance(max_rates, Sequence) or len(max_rates) != 3 or not all(map(is_number, max_rates)):
             raise GymError(f'max_rates must be three numbers, rad/s, not "{shown(max_rates)}"')
         for value in max_rates:
-            _within("max_rates", value, 0.1, 50.0, "rad/s")
+            within("max_rates", value, 0.1, 50.0, "rad/s")
         if reward is not None and not callable(reward):
             raise GymError(
                 f'reward must be a function of a GymTransition, not {type(reward).__name__} "{shown(reward)}"'
             )
-        self.count, self.interval_s, self.preview = count, 1.0 / rate, preview
+        self.count, self.interval_s, self.preview, self.history = count, 1.0 / rate, preview, history
         self.length = max(1, round(duration * rate))
-        self._with_rates, self._reward, self._limit_m = action == "rates", reward, float(limit_m)
+        self.action, self._reward, self._limit_m = action, reward, float(limit_m)
         self._stride = max(1, round(preview_s * rate))
         self._substeps = max(1, ceil(self.interval_s / RK4_STEP_S - 1e-6))
         self._max_rates = tuple(map(float, max_rates))
         self.vehicle = load_vehicle(vehicle)
         self._floor_m = -np.inf if self.vehicle.ground is None else 0.0
         self.reference = self._sampled(track, duration)
-        self._fixed, self._draws = _read_draws({**_START, **_mapping(draw)})
+        self._first = self.reference[0].copy()
+        self._gate_m = 0.0
+        self._fixed, self._draws = _read_draws({**self.starts, **_mapping(draw)})
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
         self._x = np.zeros((count, first.x.size))
-        self._last, self._steps = np.zeros((count, 4)), np.zeros(count, dtype=np.int64)
+        self._last, self._older = np.zeros((count, 4)), np.zeros((count, history - 1, 4))
+        self._steps, self._passed = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
         self._parameters = np.empty(count, dtype=first.parameters.dtype)
         self._mixers, self._scales = np.empty((count, 4, 4)), np.empty((count, 6))
         self._chances: list[Generator | None] = [None] * count
         self._ends, self._rewards = np.zeros(count, dtype=np.int64), np.zeros(count)
-        self.observations = np.zeros((count, kernels.FIXED + 3 * preview), dtype=np.float32)
+        width = kernels.FIXED + 3 * preview + 4 * (history - 1)
+        self.observations = np.zeros((count, width), dtype=np.float32)
         self.flying = np.zeros(count, dtype=np.bool_)
 
     def begin(self, n: int, chance: Generator) -> None:
         """Begin an episode of row `n`, drawn from `chance`."""
         values = {key: each.value(chance) for key, each in self._draws.items()}
-        begun = self._drawn({**self._fixed, **values})
         self._chances[n] = chance
-        self._x[n], self._last[n], self._steps[n] = begun.x, begun.action, 0
-        self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
+        self._begin(n, self._drawn({**self._fixed, **values}))
+        self._older[n] = self._last[n]
+        self._steps[n] = self._passed[n] = 0
         self.flying[n] = True
-        kernels.observe(self._x[n], self._last[n], self.reference, 0, self._stride, self.observations[n])
+        self._observe(n)
+
+    def _begin(self, n: int, begun: "Begun") -> None:
+        self._x[n], self._last[n] = begun.x, begun.action
+        self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
+
+    def _observe(self, n: int) -> None:
+        k, last, older, out = self._steps[n], self._last[n], self._older[n], self.observations[n]
+        kernels.observe(self._seen(n), last, older, self.reference, k, self._stride, out)
+
+    def _seen(self, n: int) -> Array:
+        """Return the state that a row observes, (18,)."""
+        seen: Array = self._x[n]
+        return seen
 
     def step(self, given: Any) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Advance all flying rows; return rewards, terminated, truncated, each (n,)."""
@@ -136,26 +170,7 @@ class Episodes:
             raise GymError(f'action must be numbers, ({self.count}, 4), not "{shown(given)}"') from None
         if actions.shape != self._last.shape:
             raise GymError(f"action must have the shape {self._last.shape}, not {actions.shape}")
-        kernels.advance(
-            self._x,
-            actions,
-            self._last,
-            self._steps,
-            self.flying,
-            self._parameters,
-            self._mixers,
-            self._scales,
-            self.reference,
-            self._stride,
-            self._with_rates,
-            self.interval_s,
-            self._substeps,
-            self._limit_m,
-            self._floor_m,
-            self.observations,
-            self._rewards,
-            self._ends,
-        )
+        self._advance(actions)
         terminated = self._ends != 0
         truncated = self.flying & (self._steps >= self.length) & ~terminated
         rewards = self._rewards.copy()
@@ -170,6 +185,35 @@ class Episodes:
             rewards = np.where(self.flying, own, 0.0)
         self.flying &= ~(terminated | truncated)
         return rewards, terminated, truncated
+
+    def _advance(self, actions: Array) -> None:
+        kernels.advance(
+            self._x,
+            actions,
+            self._last,
+            self._older,
+            self._steps,
+            self._passed,
+            self.flying,
+            self._parameters,
+            self._mixers,
+            self._scales,
+            self.reference,
+            self._stride,
+            self.action == "rates",
+            self.interval_s,
+            self._substeps,
+            self._limit_m,
+            self._floor_m,
+            self._gate_m,
+            self.observations,
+            self._rewards,
+            self._ends,
+        )
+
+    def info(self) -> dict[str, Any]:
+        """Return what is known of the first row beside its observation."""
+        return {"why": ENDS[self._ends[0]]} if self._ends[0] else {}
 
     def why(self, n: int) -> str:
         """Return the reason of a row's termination, or an empty text."""
@@ -197,7 +241,9 @@ class Episodes:
         return (
             self._x,
             self._last,
+            self._older,
             self._steps,
+            self._passed,
             self._parameters,
             self._mixers,
             self._scales,
@@ -216,49 +262,58 @@ class Episodes:
         times_s = np.arange(self.length + 2 + self.preview * self._stride, dtype=np.float64) * self.interval_s
         return np.ascontiguousarray(np.hstack([position(track.track, times_s, order) for order in (0, 1)]))
 
-    def _drawn(self, values: Mapping[str, Any]) -> "_Begun":
-        vehicle, wind = self.vehicle, CALM
+    def _drawn(self, values: Mapping[str, Any]) -> "Begun":
+        vehicle, wind = self.vehicle, Wind(0.0, 0.0)
+        lost = -1
         start: dict[str, float] = {}
         for key, value in values.items():
             if key == "wind":
-                wind = _wind(value)
+                wind = wind_of(value)
+            elif key == "lost":
+                lost = value
             elif key.startswith("vehicle."):
                 vehicle = vehicle.replace(key.removeprefix("vehicle."), value)
             else:
                 start[key.removeprefix("start.")] = value
-        for place, key in enumerate(("x", "y", "z", "vx", "vy", "vz")):
-            start[key] = start.get(key, 0.0) + float(self.reference[0, place])
+        for place, key in enumerate(_COORDINATES):
+            start[key] = start.get(key, 0.0) + float(self._first[place])
         start.setdefault("rotors", vehicle.hover_rpm)
         world = starting_world(Start(**start), vehicle)
         top = vehicle.rotors.max_speed
         thrust_n = float(vehicle.max_wrench()[0])
         share = world.rotor_speeds[0] / top
         level = 2.0 * share - 1.0
-        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self._with_rates else (level, level, level, level)
-        return _Begun(
+        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self.action == "rates" else (level,) * 4
+        parameters = packed(parameters_of(vehicle, wind.velocity_enu_m_s))
+        if not isinstance(lost, int) or not -1 <= lost < len(vehicle.rotors.position_m):
+            most = len(vehicle.rotors.position_m) - 1
+            raise GymError(f'draw: lost must be a rotor, 0 to {most}, or -1, not "{shown(lost)}"')
+        if lost >= 0:
+            for name in ("thrust", "yaw_moment", "power"):
+                parameters[name][0, lost] = 0.0
+        return Begun(
+            vehicle,
+            wind,
+            lost,
             np.array((*world.state, *world.rotor_speeds, 0.0)),
             np.array(action),
-            packed(parameters_of(vehicle, wind)),
+            parameters,
             inverse(vehicle.allocation()),
             np.array((vehicle.rotors.idle_speed, top, thrust_n, *self._max_rates)),
         )
 
 
-class _Begun(NamedTuple):
+class Begun(NamedTuple):
+    """The beginning of an episode as drawn; `lost` is a rotor without thrust, or -1."""
+
+    vehicle: Vehicle
+    wind: Wind
+    lost: int
     x: Array
     action: Array
     parameters: Any
     mixer: Array
     scale: Array
-
-
-def read_options(given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return keywords of `Episodes`; GymError for an unknown one."""
-    known = list(signature(Episodes).parameters)[1:]
-    for name in given:
-        if name not in known:
-            raise GymError(unknown("keyword", name, known))
-    return given
 
 
 def _mapping(draw: Any) -> Mapping[str, Any]:
@@ -269,7 +324,7 @@ def _mapping(draw: Any) -> Mapping[str, Any]:
 
 def _read_draws(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Draw]]:
     """Return fixed values and distributions by key, in alphabetical order."""
-    known = ("wind", "vehicle.body.mass_kg", *(f"start.{key}" for key in Start._fields))
+    known = ("wind", "lost", "vehicle.body.mass_kg", *(f"start.{key}" for key in Start._fields))
     fixed: dict[str, Any] = {}
     draws: dict[str, Draw] = {}
     for key in sorted(map(str, given)):
@@ -290,16 +345,16 @@ def _read_draws(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Dra
     return fixed, draws
 
 
-def _wind(given: Any) -> Vector:
+def wind_of(given: Any) -> Wind:
     try:
         wind = given if isinstance(given, Wind) else read_wind(str(given))
     except ArgumentTypeError as error:
         raise GymError(f"draw: wind: {error}") from None
     if not isinstance(wind, Wind):
         raise GymError(f'draw: wind must be constant, "5@270" say, not a file "{shown(given)}"')
-    return wind.velocity_enu_m_s
+    return wind
 
 
-def _within(name: str, given: Any, least: float, most: float, unit: str) -> None:
+def within(name: str, given: Any, least: float, most: float, unit: str) -> None:
     if not is_number(given) or not least <= given <= most:
         raise GymError(f'{name} must be a number from {least:g} to {most:g} {unit}, not "{shown(given)}"')

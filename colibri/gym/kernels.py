@@ -11,19 +11,22 @@ from colibri.common.types import Array, PerRotor
 from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
 
-FAR, GROUND, NOT_FINITE, BAD_ACTION = 1, 2, 3, 4
+FAR, GROUND, NOT_FINITE, BAD_ACTION, DISARMED, MISSED, FINISHED = 1, 2, 3, 4, 5, 6, 7
 FIXED = 22
 """Values of an observation before its preview."""
 MAX_POSITION_M, MAX_SPEED_M_S, MAX_RATE_RAD_S = 100.0, 100.0, 100.0
 """Observations are clipped to these."""
 IDLE, TOP, THRUST, RATES = 0, 1, 2, 3
 _RATE_GAIN_1_S = 20.0
-_LOST = -10.0
+LOST, PASSED = -10.0, 10.0
+"""Rewards of a lost vehicle, and of a gate."""
 
 
 @compiled
-def observe(x: Array, action: Array, reference: Array, k: int, stride: int, out: NDArray[np.float32]) -> None:
-    """Write one vehicle's observation; `reference` is (m, 6): position and velocity, ENU."""
+def observe(
+    x: Array, action: Array, older: Array, reference: Array, k: int, stride: int, out: NDArray[np.float32]
+) -> None:
+    """Write one vehicle's observation; `reference` begins with position, ENU; `older` actions are (h, 4)."""
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
     for i in range(3):
         velocity = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2]
@@ -34,10 +37,80 @@ def observe(x: Array, action: Array, reference: Array, k: int, stride: int, out:
             out[6 + 3 * i + j] = _clipped(R[i][j], 1.0)
     for i in range(4):
         out[18 + i] = action[i]
-    for ahead in range((out.size - FIXED) // 3):
+    end = out.size - older.size
+    for ahead in range((end - FIXED) // 3):
         for i in range(3):
             there = reference[k + (ahead + 1) * stride, i] - x[6 + i]
             out[FIXED + 3 * ahead + i] = _clipped(there, MAX_POSITION_M)
+    for past in range(older.shape[0]):
+        for i in range(4):
+            out[end + 4 * past + i] = older[past, i]
+
+
+@compiled
+def take(given: Array, last: Array, older: Array) -> float:
+    """Keep an action, clipped, with those before it; return its squared change, negative if it is not finite."""
+    for i in range(4):
+        if not isfinite(given[i]):
+            return -1.0
+    for past in range(older.shape[0] - 1, -1, -1):
+        for i in range(4):
+            older[past, i] = older[past - 1, i] if past else last[i]
+    change = 0.0
+    for i in range(4):
+        action = _clipped(given[i], 1.0)
+        change += (action - last[i]) * (action - last[i])
+        last[i] = action
+    return change
+
+
+@compiled
+def judge(x: Array, change: float, reference: Array, k: int, limit_m: float, floor_m: float) -> tuple[float, int]:
+    """Return reward, and 0 or the reason of the end, of a vehicle that follows `reference`, (m, 6)."""
+    R = rotation_matrix((x[9], x[10], x[11], x[12]))
+    distance, slip, rate = 0.0, 0.0, 0.0
+    for i in range(3):
+        away = x[6 + i] - reference[k, i]
+        wrong = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2] - reference[k, 3 + i]
+        distance += away * away
+        slip += wrong * wrong
+        rate += x[3 + i] * x[3 + i]
+    if x[8] < floor_m:
+        return LOST, GROUND
+    if distance > limit_m * limit_m:
+        return LOST, FAR
+    return 1.0 / (1.0 + 4.0 * distance) - 0.02 * sqrt(slip) - 0.01 * sqrt(rate) - 0.02 * change, 0
+
+
+@compiled
+def judge_race(
+    x: Array, before: FourRotors, change: float, gates: Array, k: int, gate_m: float, limit_m: float, floor_m: float
+) -> tuple[float, int, int]:
+    """Return reward, end and gates passed of a vehicle that was at `before`, ENU; gate k is the next.
+
+    Args:
+        gates: Centre and direction, ENU, and distance from the gate before, m, (m, 7); the last has length 0.
+    """
+    begun, now, ahead, behind, rate = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        was, away = before[i] - gates[k, i], x[6 + i] - gates[k, i]
+        begun, now = begun + was * was, now + away * away
+        behind, ahead = behind + was * gates[k, 3 + i], ahead + away * gates[k, 3 + i]
+        rate += x[3 + i] * x[3 + i]
+    if x[8] < floor_m:
+        return LOST, GROUND, k
+    reward = sqrt(begun) - sqrt(now) - 0.001 * sqrt(rate) - 0.002 * change
+    if behind < 0.0 and ahead >= 0.0:
+        off, share = 0.0, behind / (behind - ahead)
+        for i in range(3):
+            was, away = before[i] - gates[k, i], x[6 + i] - gates[k, i]
+            off += (was + share * (away - was)) ** 2
+        if off > gate_m * gate_m:
+            return LOST, MISSED, k
+        return reward + PASSED, FINISHED if gates[k + 1, 6] == 0.0 else 0, k + 1
+    if sqrt(now) > gates[k, 6] + limit_m:
+        return LOST, FAR, k
+    return reward, 0, k
 
 
 @compiled
@@ -45,7 +118,9 @@ def advance(
     x: Array,
     actions: Array,
     last: Array,
+    older: Array,
     steps: NDArray[np.int64],
+    passed: NDArray[np.int64],
     flying: NDArray[np.bool_],
     parameters: Packed,
     mixers: Array,
@@ -57,6 +132,7 @@ def advance(
     substeps: int,
     limit_m: float,
     floor_m: float,
+    gate_m: float,
     observations: NDArray[np.float32],
     rewards: Array,
     ends: NDArray[np.int64],
@@ -67,32 +143,30 @@ def advance(
         x: States, (n, 18), as in `plant.physics.equations`.
         actions: -1 to 1, (n, 4).
         last: The actions before, (n, 4).
+        older: Those before them, newest first, (n, h, 4).
         steps: Control intervals flown, (n,).
+        passed: Gates passed, (n,).
         mixers: From U1 to U4 to squared rotor speeds, (n, 4, 4).
         scales: Idle and top speed, largest thrust (N), largest p, q, r (rad/s), (n, 6).
-        reference: Position and velocity at each interval, ENU, (m, 6).
+        reference: Position and velocity at each interval, ENU, (m, 6); or gates, as of `judge_race`.
         stride: Intervals between two previewed positions.
+        gate_m: Radius of gates; 0: follow the reference.
         ends: 0, or the reason of the end, (n,).
     """
-    end, action = np.empty(x.shape[1]), np.empty(4)
+    end = np.empty(x.shape[1])
     for n in range(x.shape[0]):
         ends[n], rewards[n] = 0, 0.0
         if not flying[n]:
             continue
-        numbers, change = parameters[n : n + 1], 0.0
-        is_finite = True
-        for i in range(4):
-            is_finite &= isfinite(actions[n, i])
-            action[i] = _clipped(actions[n, i], 1.0)
+        numbers, before = parameters[n : n + 1], (x[n, 6], x[n, 7], x[n, 8], 0.0)
         steps[n] += 1
-        k = steps[n]
-        if not is_finite:
-            ends[n], rewards[n] = BAD_ACTION, _LOST
-            observe(x[n], last[n], reference, k, stride, observations[n])
+        change = take(actions[n], last[n], older[n])
+        if change < 0.0:
+            ends[n], rewards[n] = BAD_ACTION, LOST
+            k = passed[n] if gate_m > 0.0 else steps[n]
+            observe(x[n], last[n], older[n], reference, k, stride, observations[n])
             continue
-        for i in range(4):
-            change += (action[i] - last[n, i]) * (action[i] - last[n, i])
-            last[n, i] = action[i]
+        action = last[n]
         if with_rates:
             for _ in range(substeps):
                 target = _rate_targets(x[n], action, numbers, mixers[n], scales[n])
@@ -109,24 +183,16 @@ def advance(
             runge_kutta_4(x[n], target, numbers, duration_s, substeps, end)
             x[n, :] = end
         if not close_attitude(x[n]):
-            ends[n], rewards[n] = NOT_FINITE, _LOST
+            ends[n], rewards[n] = NOT_FINITE, LOST
             continue
-        observe(x[n], last[n], reference, k, stride, observations[n])
-        R = rotation_matrix((x[n, 9], x[n, 10], x[n, 11], x[n, 12]))
-        distance, slip, rate = 0.0, 0.0, 0.0
-        for i in range(3):
-            away = x[n, 6 + i] - reference[k, i]
-            wrong = R[i][0] * x[n, 0] + R[i][1] * x[n, 1] + R[i][2] * x[n, 2] - reference[k, 3 + i]
-            distance += away * away
-            slip += wrong * wrong
-            rate += x[n, 3 + i] * x[n, 3 + i]
-        rewards[n] = 1.0 / (1.0 + 4.0 * distance) - 0.02 * sqrt(slip) - 0.01 * sqrt(rate) - 0.02 * change
-        if x[n, 8] < floor_m:
-            ends[n] = GROUND
-        elif distance > limit_m * limit_m:
-            ends[n] = FAR
-        if ends[n] != 0:
-            rewards[n] = _LOST
+        if gate_m > 0.0:
+            rewards[n], ends[n], passed[n] = judge_race(
+                x[n], before, change, reference, passed[n], gate_m, limit_m, floor_m
+            )
+            observe(x[n], last[n], older[n], reference, passed[n], 1, observations[n])
+        else:
+            rewards[n], ends[n] = judge(x[n], change, reference, steps[n], limit_m, floor_m)
+            observe(x[n], last[n], older[n], reference, steps[n], stride, observations[n])
 
 
 @compiled

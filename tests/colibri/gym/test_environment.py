@@ -32,14 +32,24 @@ def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
 
 
 @pytest.mark.parametrize(
-    "options", [{"id": "colibri/Hover-v0"}, {"id": "colibri/Track-v0", "action": "rates", "preview": 3}]
+    "options",
+    [
+        {"id": "colibri/Hover-v0", "history": 4},
+        {"id": "colibri/Track-v0", "action": "rates", "preview": 3},
+        {"id": "colibri/Hover-v0", "action": "velocity", "observation": "estimate", "preview": 2, "history": 2},
+        {"id": "colibri/Track-v0", "action": "position", "draw": _DRAW},
+    ],
 )
 def test_checker_of_gymnasium_passes(options: dict[str, Any]) -> None:
     env = gymnasium.make(**options)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped, skip_render_check=True)
-    assert isinstance(gymnasium.make_vec(options["id"], num_envs=2), QuadrotorVectorEnv)
+    envs = gymnasium.make_vec(num_envs=2, **options)
+    assert isinstance(envs, QuadrotorVectorEnv) == (
+        "observation" not in options and options.get("action") != "position"
+    )
+    assert envs.reset(seed=5)[0][1].tobytes() == env.reset(seed=6)[0].tobytes()
 
 
 @pytest.mark.parametrize("options", [{}, {"action": "rates", "draw": _DRAW, "track": "circle:speed=3", "preview": 2}])
@@ -72,6 +82,66 @@ def test_restored_episodes_continue_with_the_same_bits() -> None:
         assert [again.step(actions)[0].tobytes() for _ in range(_STEPS)] == first
     with pytest.raises(Error, match="snapshot must come from"):
         QuadrotorEnv().restore(kept)
+
+
+@pytest.mark.parametrize("observation", ["truth", "estimate"])
+def test_actions_through_the_autopilot_are_exact(observation: str) -> None:
+    env, other = (QuadrotorEnv(action="velocity", observation=observation, draw=_DRAW) for _ in range(2))
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 4)).astype(np.float32)
+    seen = [_episode(each, seed, actions) for each in (env, other) for seed in (3, 4, 3)]
+    assert seen[0] == seen[2] == seen[3] == seen[5]
+    assert seen[1] == seen[4] != seen[0]
+    env.step(actions[0])
+    kept = env.snapshot()
+    first = [env.step(action)[0].tobytes() for action in actions]
+    env.reset(seed=9)
+    env.restore(kept)
+    assert [env.step(action)[0].tobytes() for action in actions] == first
+    with pytest.raises(Error, match="snapshot must come from"):
+        other.restore(kept)
+
+
+def _episode(env: QuadrotorEnv, seed: int, actions: Any) -> list[bytes]:
+    return [env.reset(seed=seed)[0].tobytes(), *(env.step(action)[0].tobytes() for action in actions)]
+
+
+@pytest.mark.parametrize(
+    ("action", "given", "places", "expected"),
+    [
+        ("velocity", (0.2, 0.0, 0.25, 0.0), slice(3, 6), (1.0, 0.0, 0.5)),
+        ("position", (0.5, 0.0, 0.25, 0.0), slice(0, 3), (1.0, 0.0, 0.5)),
+        ("attitude", (0.0, 0.5, 0.0, 0.0), slice(12, 15), (0.0, np.sin(np.radians(17.5)), np.cos(np.radians(17.5)))),
+    ],
+)
+def test_the_autopilot_flies_what_an_action_demands(
+    action: str, given: tuple[float, ...], places: slice, expected: tuple[float, ...]
+) -> None:
+    env = QuadrotorEnv(action=action, draw={"start.x": 0.0, "start.y": 0.0, "start.z": 0.0}, limit_m=20.0)
+    env.reset(seed=1)
+    for _ in range(150 if action == "position" else 40):
+        seen, _, ended, _, info = env.step(np.array(given, dtype=np.float32))
+        assert not ended
+    assert info["mode"] == "offboard"
+    row = seen[places] if action != "attitude" else [seen[8], seen[11], -seen[14]]
+    assert np.abs(np.abs(row) - expected).max() < 0.03
+
+
+def test_estimates_differ_from_the_truth() -> None:
+    env = QuadrotorEnv(action="velocity", observation="estimate")
+    seen, _ = env.reset(seed=1)
+    error = np.linalg.norm(seen[:3] - QuadrotorEnv(action="velocity").reset(seed=1)[0][:3])
+    assert 0.0 < error < 1.0
+
+
+def test_history_and_preview_are_behind_the_state() -> None:
+    env = QuadrotorEnv(track="circle:radius=2,speed=2", preview=2, history=3)
+    env.reset(seed=1)
+    actions = [np.full(4, 0.1 * k, dtype=np.float32) for k in range(4)]
+    for action in actions:
+        seen, *_ = env.step(action)
+    assert seen[18:22].tolist() == actions[3].tolist()
+    assert seen[28:].tolist() == [*actions[2].tolist(), *actions[1].tolist()]
+    assert np.linalg.norm(seen[25:28] - seen[22:25]) == pytest.approx(0.2, abs=1e-3)
 
 
 def test_a_simple_law_hovers_with_rates() -> None:
@@ -135,6 +205,15 @@ def test_reward_can_be_replaced() -> None:
         ({"vehicle": "humingbird"}, "humingbird"),
         ({"track": "sprial"}, "sprial"),
         ({"render_mode": "human"}, "render_mode must be None"),
+        ({"history": 0}, "history must be a whole number from 1"),
+        ({"observation": "estimate"}, 'keyword "observation" requires an action through the autopilot'),
+        ({"action": "velocity", "observation": "truht"}, 'unknown observation "truht" (did you mean "truth"?)'),
+        ({"action": "velocity", "profil": "se3"}, 'unknown keyword "profil" (did you mean "profile"?)'),
+        ({"action": "velocity", "profile": "fligt"}, "fligt"),
+        ({"action": "velocity", "max_velocity": 3}, "max_velocity must be four numbers"),
+        ({"action": "velocity", "rate": 500.0}, "rate must be at most"),
+        ({"action": "velocity", "observation": "estimate", "draw": {"start.p": 1.0}}, "only x, y and z"),
+        ({"draw": {"lost": 4}}, "lost must be a rotor, 0 to 3"),
         ({"draw": [1]}, "draw must be a table"),
         ({"draw": {"start.w": 1}}, 'unknown key of draw "start.w"'),
         ({"draw": {"start.x": {"uniform": [2, 1]}}}, "empty range"),
