@@ -45,8 +45,8 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
         if not episodes.flying[0]:
             raise GymError("reset() is required: no episode is running")
         given = np.asarray(action)
-        if given.shape != (4,):
-            raise GymError(f"action must have the shape (4,), not {given.shape}")
+        if given.shape != self.action_space.shape:
+            raise GymError(f"action must have the shape {self.action_space.shape}, not {given.shape}")
         rewards, terminated, truncated = episodes.step(given[None])
         seen: Values = episodes.observations[0].copy()
         return seen, float(rewards[0]), bool(terminated[0]), bool(truncated[0]), episodes.info()
@@ -172,10 +172,10 @@ def _spaces(episodes: Episodes) -> tuple[Space[Values], Space[Values]]:
             np.full(3, kernels.MAX_SPEED_M_S),
             np.ones(9),
             np.full(3, kernels.MAX_RATE_RAD_S),
-            np.ones(4),
+            np.ones(episodes.size),
             np.full(3 * episodes.preview, kernels.MAX_POSITION_M),
-            np.ones(4 * (episodes.history - 1)),
+            np.ones(episodes.size * (episodes.history - 1)),
         ]
     ).astype(np.float32)
-    spaces: Any = (Box(-most, most, dtype=np.float32), Box(-1.0, 1.0, (4,), dtype=np.float32))
+    spaces: Any = (Box(-most, most, dtype=np.float32), Box(-1.0, 1.0, (episodes.size,), dtype=np.float32))
     return spaces[0], spaces[1]

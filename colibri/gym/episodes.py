@@ -10,6 +10,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.sampling import sampled_track
 from colibri.autopilot.guidance.trajectories.tracks import position
@@ -17,7 +18,6 @@ from colibri.autopilot.spec import Trajectory
 from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
 from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
-from colibri.common.matrices import inverse
 from colibri.common.types import Array
 from colibri.gym import kernels
 from colibri.gym.errors import GymError
@@ -54,8 +54,8 @@ class GymTransition(NamedTuple):
     """One step of n vehicles, for a reward of one's own."""
 
     observations: NDArray[np.float32]  # (n, values), after the step
-    actions: Array  # (n, 4), as given
-    states: Array  # (n, 18), `plant.physics.equations`
+    actions: Array  # (n, a), as given
+    states: Array  # (n, 14 + rotors), `plant.physics.equations`
     references: Array  # (n, 6), position m and velocity m/s, ENU
     rewards: Array  # (n,), the shipped reward
     terminated: NDArray[np.bool_]  # (n,)
@@ -121,6 +121,8 @@ class Episodes:
         self._substeps = max(1, ceil(self.interval_s / RK4_STEP_S - 1e-6))
         self._max_rates = tuple(map(float, max_rates))
         self.vehicle = load_vehicle(vehicle)
+        rotors = self.vehicle.rotors.count
+        self.size = rotors if action == "rotors" else 4
         self._floor_m = -np.inf if self.vehicle.ground is None else 0.0
         self.reference = self._sampled(track, duration)
         self._first = self.reference[0].copy()
@@ -129,13 +131,13 @@ class Episodes:
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
         self._x = np.zeros((count, first.x.size))
-        self._last, self._older = np.zeros((count, 4)), np.zeros((count, history - 1, 4))
+        self._last, self._older = np.zeros((count, self.size)), np.zeros((count, history - 1, self.size))
         self._steps, self._passed = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
         self._parameters = np.empty(count, dtype=first.parameters.dtype)
-        self._mixers, self._scales = np.empty((count, 4, 4)), np.empty((count, 6))
+        self._mixers, self._scales = np.empty((count, rotors, 4)), np.empty((count, 6))
         self._chances: list[Generator | None] = [None] * count
         self._ends, self._rewards = np.zeros(count, dtype=np.int64), np.zeros(count)
-        width = kernels.FIXED + 3 * preview + 4 * (history - 1)
+        width = kernels.FIXED + 3 * preview + self.size * history
         self.observations = np.zeros((count, width), dtype=np.float32)
         self.flying = np.zeros(count, dtype=np.bool_)
 
@@ -158,7 +160,7 @@ class Episodes:
         kernels.observe(self._seen(n), last, older, self.reference, k, self._stride, out)
 
     def _seen(self, n: int) -> Array:
-        """Return the state that a row observes, (18,)."""
+        """Return the state that a row observes."""
         seen: Array = self._x[n]
         return seen
 
@@ -167,7 +169,7 @@ class Episodes:
         try:
             actions = np.ascontiguousarray(given, dtype=np.float64)
         except (TypeError, ValueError):
-            raise GymError(f'action must be numbers, ({self.count}, 4), not "{shown(given)}"') from None
+            raise GymError(f'action must be numbers, ({self.count}, {self.size}), not "{shown(given)}"') from None
         if actions.shape != self._last.shape:
             raise GymError(f"action must have the shape {self._last.shape}, not {actions.shape}")
         self._advance(actions)
@@ -283,10 +285,10 @@ class Episodes:
         thrust_n = float(vehicle.max_wrench()[0])
         share = world.rotor_speeds[0] / top
         level = 2.0 * share - 1.0
-        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self.action == "rates" else (level,) * 4
+        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self.action == "rates" else (level,) * self.size
         parameters = packed(parameters_of(vehicle, wind.velocity_enu_m_s))
-        if not isinstance(lost, int) or not -1 <= lost < len(vehicle.rotors.position_m):
-            most = len(vehicle.rotors.position_m) - 1
+        if not isinstance(lost, int) or not -1 <= lost < vehicle.rotors.count:
+            most = vehicle.rotors.count - 1
             raise GymError(f'draw: lost must be a rotor, 0 to {most}, or -1, not "{shown(lost)}"')
         if lost >= 0:
             for name in ("thrust", "yaw_moment", "power"):
@@ -298,7 +300,7 @@ class Episodes:
             np.array((*world.state, *world.rotor_speeds, 0.0)),
             np.array(action),
             parameters,
-            inverse(vehicle.allocation()),
+            exact_inverse(vehicle.allocation()),
             np.array((vehicle.rotors.idle_speed, top, thrust_n, *self._max_rates)),
         )
 

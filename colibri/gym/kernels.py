@@ -1,19 +1,20 @@
 """One control interval of many vehicles, compiled: rotor commands, motion, observation, reward and end."""
 
 from math import isfinite, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
-from colibri.common.types import Array, PerRotor
+from colibri.common.types import Array, Vector
 from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
 
 FAR, GROUND, NOT_FINITE, BAD_ACTION, DISARMED, MISSED, FINISHED = 1, 2, 3, 4, 5, 6, 7
-FIXED = 22
-"""Values of an observation before its preview."""
+FIXED = 18
+"""Values of an observation before the last action."""
 MAX_POSITION_M, MAX_SPEED_M_S, MAX_RATE_RAD_S = 100.0, 100.0, 100.0
 """Observations are clipped to these."""
 IDLE, TOP, THRUST, RATES = 0, 1, 2, 3
@@ -26,7 +27,7 @@ LOST, PASSED = -10.0, 10.0
 def observe(
     x: Array, action: Array, older: Array, reference: Array, k: int, stride: int, out: NDArray[np.float32]
 ) -> None:
-    """Write one vehicle's observation; `reference` begins with position, ENU; `older` actions are (h, 4)."""
+    """Write one vehicle's observation; `reference` begins with position, ENU; `older` actions are (h, a)."""
     R = rotation_matrix((x[9], x[10], x[11], x[12]))
     for i in range(3):
         velocity = R[i][0] * x[0] + R[i][1] * x[1] + R[i][2] * x[2]
@@ -35,29 +36,29 @@ def observe(
         out[15 + i] = _clipped(x[3 + i], MAX_RATE_RAD_S)
         for j in range(3):
             out[6 + 3 * i + j] = _clipped(R[i][j], 1.0)
-    for i in range(4):
-        out[18 + i] = action[i]
-    end = out.size - older.size
-    for ahead in range((end - FIXED) // 3):
+    size, end = action.size, out.size - older.size
+    for i in range(size):
+        out[FIXED + i] = action[i]
+    for ahead in range((end - FIXED - size) // 3):
         for i in range(3):
             there = reference[k + (ahead + 1) * stride, i] - x[6 + i]
-            out[FIXED + 3 * ahead + i] = _clipped(there, MAX_POSITION_M)
+            out[FIXED + size + 3 * ahead + i] = _clipped(there, MAX_POSITION_M)
     for past in range(older.shape[0]):
-        for i in range(4):
-            out[end + 4 * past + i] = older[past, i]
+        for i in range(size):
+            out[end + size * past + i] = older[past, i]
 
 
 @compiled
 def take(given: Array, last: Array, older: Array) -> float:
     """Keep an action, clipped, with those before it; return its squared change, negative if it is not finite."""
-    for i in range(4):
+    for i in range(given.size):
         if not isfinite(given[i]):
             return -1.0
     for past in range(older.shape[0] - 1, -1, -1):
-        for i in range(4):
+        for i in range(given.size):
             older[past, i] = older[past - 1, i] if past else last[i]
     change = 0.0
-    for i in range(4):
+    for i in range(given.size):
         action = _clipped(given[i], 1.0)
         change += (action - last[i]) * (action - last[i])
         last[i] = action
@@ -84,7 +85,7 @@ def judge(x: Array, change: float, reference: Array, k: int, limit_m: float, flo
 
 @compiled
 def judge_race(
-    x: Array, before: FourRotors, change: float, gates: Array, k: int, gate_m: float, limit_m: float, floor_m: float
+    x: Array, before: Vector, change: float, gates: Array, k: int, gate_m: float, limit_m: float, floor_m: float
 ) -> tuple[float, int, int]:
     """Return reward, end and gates passed of a vehicle that was at `before`, ENU; gate k is the next.
 
@@ -141,12 +142,12 @@ def advance(
 
     Args:
         x: States, (n, 18), as in `plant.physics.equations`.
-        actions: -1 to 1, (n, 4).
-        last: The actions before, (n, 4).
-        older: Those before them, newest first, (n, h, 4).
+        actions: -1 to 1, (n, a): a number for each rotor, or four.
+        last: The actions before, (n, a).
+        older: Those before them, newest first, (n, h, a).
         steps: Control intervals flown, (n,).
         passed: Gates passed, (n,).
-        mixers: From U1 to U4 to squared rotor speeds, (n, 4, 4).
+        mixers: From U1 to U4 to squared rotor speeds, (n, N, 4).
         scales: Idle and top speed, largest thrust (N), largest p, q, r (rad/s), (n, 6).
         reference: Position and velocity at each interval, ENU, (m, 6); or gates, as of `judge_race`.
         stride: Intervals between two previewed positions.
@@ -154,11 +155,12 @@ def advance(
         ends: 0, or the reason of the end, (n,).
     """
     end = np.empty(x.shape[1])
+    target: Any = np.empty(mixers.shape[1])
     for n in range(x.shape[0]):
         ends[n], rewards[n] = 0, 0.0
         if not flying[n]:
             continue
-        numbers, before = parameters[n : n + 1], (x[n, 6], x[n, 7], x[n, 8], 0.0)
+        numbers, before = parameters[n : n + 1], (x[n, 6], x[n, 7], x[n, 8])
         steps[n] += 1
         change = take(actions[n], last[n], older[n])
         if change < 0.0:
@@ -169,17 +171,13 @@ def advance(
         action = last[n]
         if with_rates:
             for _ in range(substeps):
-                target = _rate_targets(x[n], action, numbers, mixers[n], scales[n])
+                _aim(x[n], action, numbers, mixers[n], scales[n], target)
                 runge_kutta_4(x[n], target, numbers, duration_s / substeps, 1, end)
                 x[n, :] = end
         else:
             idle, top = scales[n, IDLE], scales[n, TOP]
-            target = (
-                max(idle, 0.5 * (action[0] + 1.0) * top),
-                max(idle, 0.5 * (action[1] + 1.0) * top),
-                max(idle, 0.5 * (action[2] + 1.0) * top),
-                max(idle, 0.5 * (action[3] + 1.0) * top),
-            )
+            for i in range(target.size):
+                target[i] = max(idle, 0.5 * (action[i] + 1.0) * top)
             runge_kutta_4(x[n], target, numbers, duration_s, substeps, end)
             x[n, :] = end
         if not close_attitude(x[n]):
@@ -196,8 +194,8 @@ def advance(
 
 
 @compiled
-def _rate_targets(x: Array, action: Array, parameters: Packed, mixer: Array, scale: Array) -> PerRotor:
-    """Return rotor speeds for thrust and body rates: proportional, with the gyroscopic moment compensated."""
+def _aim(x: Array, action: Array, parameters: Packed, mixer: Array, scale: Array, out: Array) -> None:
+    """Write rotor speeds for thrust and body rates: proportional, with the gyroscopic moment compensated."""
     p, q, r = x[3], x[4], x[5]
     inertia = parameters[0].inertia_kg_m2
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
@@ -205,19 +203,9 @@ def _rate_targets(x: Array, action: Array, parameters: Packed, mixer: Array, sca
     u2 = ix * _RATE_GAIN_1_S * (action[1] * scale[RATES] - p) + q * r * (iz - iy)
     u3 = iy * _RATE_GAIN_1_S * (action[2] * scale[RATES + 1] - q) + p * r * (ix - iz)
     u4 = iz * _RATE_GAIN_1_S * (action[3] * scale[RATES + 2] - r) + p * q * (iy - ix)
-    return (
-        _speed(mixer[0], u1, u2, u3, u4, scale),
-        _speed(mixer[1], u1, u2, u3, u4, scale),
-        _speed(mixer[2], u1, u2, u3, u4, scale),
-        _speed(mixer[3], u1, u2, u3, u4, scale),
-    )
-
-
-@compiled
-def _speed(row: Array, u1: float, u2: float, u3: float, u4: float, scale: Array) -> float:
-    squared: float = row[0] * u1 + row[1] * u2 + row[2] * u3 + row[3] * u4
-    speed: float = min(max(sqrt(max(squared, 0.0)), scale[IDLE]), scale[TOP])
-    return speed
+    for i in range(out.size):
+        squared = mixer[i, 0] * u1 + mixer[i, 1] * u2 + mixer[i, 2] * u3 + mixer[i, 3] * u4
+        out[i] = min(max(sqrt(max(squared, 0.0)), scale[IDLE]), scale[TOP])
 
 
 @compiled

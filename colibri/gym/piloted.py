@@ -11,7 +11,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.campaigns.values import is_number
+from colibri.campaigns.factors import is_number
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.errors import shown, unknown
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
@@ -157,7 +157,7 @@ class PilotedEpisodes(Episodes):
     def _look(self) -> None:
         """Take in the true state."""
         world, x = self._flight.plant.world, self._x[0]
-        x[:13], x[13:17], x[17] = world.state, world.rotor_speeds, world.charge_used_ah
+        x[:13], x[13:-1], x[-1] = world.state, world.rotor_speeds, world.charge_used_ah
 
     def _begin(self, n: int, begun: Begun) -> None:
         self._settled.restore()
