@@ -20,7 +20,7 @@ from colibri.common.kernels import atan2, cos, sin
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
-HEADING_ABOVE = 0.3  # least vertical part of body z at which the yaw has a meaning
+HEADING_ABOVE = 0.15  # least vertical part of body z at which the yaw has a meaning
 _TWIST_RAD_S = 4.0  # of the return to it
 _JUMP_M_S = 0.02  # least velocity jump between references, beyond their accelerations
 
