@@ -54,7 +54,7 @@ def _references(prefix: str) -> list[Number]:
             "deg",
             5.0,
             180.0,
-            "Maximum tilt; above 90: none",
+            "Maximum tilt; from 90 on: none",
             decimals=1,
         ),
     ]

@@ -52,7 +52,8 @@ class Problem(NamedTuple):
     terminal: Array  # S on the error at the end: position, velocity, rotation, rates, body axes; squared speeds; zeros
     allocation: Array  # thrust of each rotor at its largest speed, N, (m,)
     levels: Array  # squared speed at each step by a unit correction of each block, (b, N + 1)
-    min_cos_tilt: float  # of the soft limit; below -1: none, and attitude errors beyond 90° count whole
+    upright: bool  # False: attitude errors beyond 90° count whole, and yaw only where it has a meaning
+    min_cos_tilt: float  # of the soft limit
     max_rate: Array  # of |p|, |q|, |r|, rad/s, (3,)
 
 
@@ -132,7 +133,7 @@ def _add_motion(
     cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
     s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
     heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
-    if problem.min_cos_tilt < -1.0:
+    if not problem.upright:
         on_heading *= min(max(R[2][2] / HEADING_ABOVE, 0.0), 1.0)  # beyond, yaw has no meaning
     for k in range(used):
         row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
@@ -187,7 +188,7 @@ def _nearest(angle: float) -> float:
 def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...], problem: Problem) -> Array:
     error = np.empty(3)
     rate_between(wanted, np.array(R), 1.0, error)
-    if problem.min_cos_tilt >= -1.0:
+    if problem.upright:
         return error
     c = -0.5
     for i in range(3):

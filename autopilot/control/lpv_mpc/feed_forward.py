@@ -93,7 +93,7 @@ def ask(
             out.forces[n, i] = airframe.mass_kg * (acceleration[n, i] - disturbance.acceleration[i])
         out.forces[n, 2] += airframe.mass_kg * airframe.gravity_m_s2
     overcome_drag(velocity, airframe, limits, out.forces)
-    if limits.tilt_tangent < 0.0:
+    if not limits.upright:
         stand_along(rigid, yaw_rad, limits, model.interval_s, out)
     else:
         for n in range(yaw_rad.shape[0]):

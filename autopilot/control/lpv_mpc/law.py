@@ -106,7 +106,9 @@ class LpvMpc(TrackingLaw[LawMemory]):
         settings = read_settings(scaled("lpv-mpc", table, vehicle), LpvMpcSettings)
         super().__init__(settings, settings.fallback, vehicle)
         h = self._interval_s
-        self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock)
+        max_tilt_deg = settings.guidance.max_tilt_deg
+        upright = max_tilt_deg < 90.0
+        self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock, upright=upright)
         self.min_path_speed = settings.path.min_speed
         samples = self._mpc.horizon + 2
         self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
@@ -128,14 +130,11 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self._min_squared = square(self.tracker.lag.min_speed)
         min_n = self._span_n * self._min_squared
         min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
-        max_tilt_deg = settings.guidance.max_tilt_deg
-        tilt_tangent = tan(radians(max_tilt_deg)) if max_tilt_deg < 90.0 else -1.0
-        self._force = ForceLimits(tilt_tangent, min_n, min_n, min_up_n)
+        self._force = ForceLimits(upright, tan(radians(max_tilt_deg)), min_n, min_n, min_up_n)
         limits = np.empty((self._mpc.horizon, 2))
         self._now = packed(Now(np.empty(RIGID), np.empty(vehicle.rotors.count), _NO_DISTURBANCE, limits, self._force))
         arrays = opened(self._now, Now)
         self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
-        self._agile = max_tilt_deg > 90.0
         self._model_kg = self._mpc.model["airframe"]["mass_kg"]
 
     def warm_up(self) -> None:
@@ -229,7 +228,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
-        if not (self._agile and inputs.airborne):
+        if self._force.upright or not inputs.airborne:
             most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
             planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None

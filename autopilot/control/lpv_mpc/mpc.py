@@ -93,6 +93,8 @@ class Mpc:
         solver: QpSolver,
         interval_s: float,
         clock: Clock,
+        *,
+        upright: bool = True,
     ) -> None:
         self.horizon, rotors = sum(settings.blocks), vehicle.rotors.count
         n = self.horizon
@@ -135,7 +137,8 @@ class Mpc:
                         self._terminal(each, settings.count_every, thrust_n),
                         numbers.allocation[0].copy(),
                         levels,
-                        cos(radians(settings.max_tilt_deg)) if settings.max_tilt_deg < 180.0 else -9.0,
+                        upright,
+                        cos(radians(settings.max_tilt_deg)) if settings.max_tilt_deg < 180.0 else -inf,
                         np.array(settings.max_rate_rad_s) * ((1.0, 1.0, 1.0) if self.turns else (1.0, 1.0, inf)),
                     ),
                     shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),

@@ -17,7 +17,8 @@ _DRAG_PASSES = 2  # drag depends on the direction of the force against it
 class ForceLimits(NamedTuple):
     """Limits of the demanded force."""
 
-    tilt_tangent: float  # of the largest tilt; negative without a limit
+    upright: bool  # False: thrust may point anywhere
+    tilt_tangent: float  # of the largest tilt, if upright
     min_n: float
     max_n: float
     min_up_n: float  # of references: a smaller vertical force has no useful direction
@@ -26,7 +27,7 @@ class ForceLimits(NamedTuple):
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
     """Limit a force in place: height before position; without a tilt limit its direction stays."""
-    if limits.tilt_tangent < 0.0:
+    if not limits.upright:
         total = norm(force)
         if total > limits.max_n:
             for i in range(3):

@@ -9,7 +9,7 @@ from hypothesis import given
 from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force
 from tests.support.strategies import vectors
 
-LIMITS = ForceLimits(tan(1.0), 1.0, 18.0, 1.0)
+LIMITS = ForceLimits(True, tan(1.0), 1.0, 18.0, 1.0)
 
 
 @given(vectors(100.0))
