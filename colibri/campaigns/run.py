@@ -83,8 +83,9 @@ def fly_campaign(
     parquet: bool = False,
     progress: Callable[[FlightResult], object] = lambda _flown: None,
     begun: Callable[[int], object] = lambda _kept: None,
+    kind: type[CampaignResults] = CampaignResults,
 ) -> CampaignResults:
-    """Fly the flights missing in `out`, and write the tables, also if interrupted."""
+    """Fly the flights missing in `out`, and write the tables, also if interrupted; results are of a `kind`."""
     if planned.flights > MAX_UNASKED and not yes:
         raise CampaignError(f"{planned.flights} flights: confirm with --yes")
     if parquet:
@@ -92,7 +93,7 @@ def fly_campaign(
     common = common_of(planned, remote=engine.is_remote)
     notes = check(planned.samples(), common, ignored=("seed",) if planned.draw else ())
     if out is None:
-        return _fly(planned, common, engine, None, progress, notes)
+        return _fly(planned, common, engine, None, progress, notes, kind)
     try:
         lock = FolderLock(out, "--out")
     except OSError as error:
@@ -100,10 +101,10 @@ def fly_campaign(
     with closing(lock), open_journal(out, planned, common, resume=resume) as journal:
         begun(len(journal.kept))
         try:
-            return _fly(planned, common, engine, journal, progress, notes)
+            return _fly(planned, common, engine, journal, progress, notes, kind)
         finally:
             kept = {each.flight: each for each in read_journal(out / JOURNAL)}
-            CampaignResults(planned, kept).save(out, parquet=parquet)
+            kind(planned, kept).save(out, parquet=parquet)
 
 
 def _fly(
@@ -113,6 +114,7 @@ def _fly(
     journal: Journal | None,
     progress: Callable[[FlightResult], object],
     notes: Sequence[str],
+    kind: type[CampaignResults],
 ) -> CampaignResults:
     flown: dict[int, FlightResult] = {} if journal is None else journal.kept
     done = frozenset(flown)
@@ -124,7 +126,7 @@ def _fly(
             else:
                 journal.add(each)
             progress(each)
-    results = CampaignResults(planned, flown, notes)
+    results = kind(planned, flown, notes)
     if factors := results.without_effect():
         results.notes.append(f"no effect: {' and '.join(factors)} (flights that differ only in these are identical)")
     return results

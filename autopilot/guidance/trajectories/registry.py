@@ -18,7 +18,6 @@ from colibri.autopilot.guidance.trajectories.tracks import (
     FileOptions,
     Track,
     TrackOptions,
-    YawChoice,
 )
 from colibri.common.errors import Error, checked, unknown
 
@@ -124,5 +123,5 @@ def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given:
     kinds = (fields[key].type, *get_args(fields[key].type))
     words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
     if what.startswith("Invalid enum value"):
-        what = f"choose {', '.join(words)}{'' if fields[key].type == YawChoice else ', or a number'}"
+        what = f"choose {', '.join(words)}{'' if get_origin(fields[key].type) is Literal else ', or a number'}"
     return f"{key}={given[key]}: {what}"

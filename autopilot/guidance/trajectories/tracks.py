@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.autopilot.guidance.trajectories.ramped import SHAPES, Curve, arc, duration_s
 from colibri.autopilot.guidance.trajectories.samples_file import SampledTrack, read_samples
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
@@ -179,6 +180,36 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
         return self.speed / self.radius * t
 
 
+class Ramped(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Follow a closed curve at a speed that grows from rest and falls back; the vehicle looks along `heading`."""
+
+    curve: Curve = "circle"
+    speed: Speed = 5.0
+    acceleration: Annotated[float, msgspec.Meta(ge=0.01, le=10.0)] = 0.25
+    radius: Length | None = None
+    turn: Literal["left", "right"] = "left"
+    heading: Angle = 0.0
+
+    def __post_init__(self) -> None:
+        if self.speed < 2.0 * self.acceleration:
+            raise ValueError(
+                f"speed={self.speed:g}: must be at least {2.0 * self.acceleration:g}, acceleration times 2 s"
+            )
+
+    def track(self) -> Track:
+        return Track(
+            self._position, lambda t: held(t, radians(self.heading)), duration_s(self.speed, self.acceleration)
+        )
+
+    def _position(self, t: TaylorSeries) -> Place:
+        shape, heading = SHAPES[self.curve], held(t, radians(self.heading))
+        radius = self.radius or shape.radius_m
+        angle = (1.0 if self.turn == "right" else -1.0) / radius * arc(t, self.speed, self.acceleration)
+        x, y = (radius * each for each in shape.across(angle))
+        east, north = cos(heading), sin(heading)
+        return x * east - y * north, x * north + y * east, shape.height(angle)
+
+
 class FileOptions(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Options of a track from a file."""
 
@@ -215,6 +246,7 @@ OPTIONS: dict[str, type[TrackOptions]] = {
     "hover": Hover,
     "lemniscate": Lemniscate,
     "circle": Circle,
+    "ramped": Ramped,
     "waypoints": WaypointFile,
     "samples": SamplesFile,
 }

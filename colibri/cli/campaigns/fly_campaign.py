@@ -6,9 +6,9 @@ from contextlib import closing
 from typing import Any
 
 from colibri.analysis.tables import print_table
+from colibri.campaigns.bar import FlightBar
 from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.factors import CampaignError, first_twice
-from colibri.campaigns.flights import FlightResult
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
@@ -31,7 +31,7 @@ def fly(args: Namespace) -> int:
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
         planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
         engine = engine_of(args.workers, args.dask)
-        with closing(_Bar(planned.name, planned.flights, quiet=args.quiet)) as bar:
+        with closing(FlightBar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
             results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
     except KeyboardInterrupt as ended:
@@ -105,42 +105,3 @@ def _short(cell: str) -> str:
         return f"{float(cell):.4g}"
     except ValueError:
         return cell
-
-
-class _Bar:
-    """Shows progress, rate, share lost and time left."""
-
-    def __init__(self, title: str, flights: int, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.markup import escape
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        console = Console(stderr=True)
-        columns: Sequence[Any] = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TextColumn("{task.fields[lost]}"),
-            TimeRemainingColumn(),
-        )
-        hidden = quiet or not console.is_terminal
-        self._bar = Progress(*columns, console=console, disable=hidden, speed_estimate_period=300.0)
-        self._task = self._bar.add_task(escape(title), total=flights, rate="", lost="", start=False)
-        self._flown = self._lost = 0
-
-    def begun(self, kept: int) -> None:
-        """Start with `kept` flights done."""
-        self._bar.start()
-        self._bar.start_task(self._task)
-        self._bar.update(self._task, completed=kept)
-
-    def ended(self, flown: FlightResult) -> None:
-        self._flown += 1
-        self._lost += flown.verdict.is_lost
-        elapsed_s = self._bar.tasks[self._task].elapsed or 0.0
-        rate = f"{self._flown / elapsed_s:.1f} flights/s" if elapsed_s else ""
-        self._bar.update(self._task, advance=1, rate=rate, lost=f"{100.0 * self._lost / self._flown:.1f} % lost")
-
-    def close(self) -> None:
-        self._bar.stop()

@@ -88,6 +88,14 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             colibri compare --track circle --seeds 1-20 --turbulence light
             """,
         ),
+        "arena": CommandEntry(
+            "fly control laws on the tracks and disturbances of a set, beside published values",
+            "campaigns",
+            """
+            colibri arena race --law agile --law my_law.py:Law    # 25 cells, not told and told
+            colibri arena policy --starts 1
+            """,
+        ),
         "study": CommandEntry(
             "fly the studies of profile flight, and draw them",
             "campaigns",

@@ -29,6 +29,8 @@ def test_the_five_of_the_thesis() -> None:
         ("hover:x=1,x=2", "track hover: x is given twice"),
         ("hover:z=1", 'track hover: unknown option "z" (choose x, y, height, yaw)'),
         ("circle:radius=0", "track circle: radius=0: Expected `float` >= 0.01"),
+        ("ramped:speed=0.3", "track ramped: speed=0.3: must be at least 0.5, acceleration times 2 s"),
+        ("ramped:turn=up", "track ramped: turn=up: choose left, right"),
         ("circle:speed=fast", "track circle: speed=fast: Expected `float`, got `str`"),
         ("hover:height=nan", "track hover: height=nan: Expected `float` >= -1000.0"),
         ("lemniscate:yaw=90", "track lemniscate: yaw=90: choose path, fixed"),
@@ -89,3 +91,22 @@ def test_the_help_names_every_track_and_option() -> None:
     for name, kind in OPTIONS.items():
         (usage,) = [part for part in TRACK_HELP.replace("; ", " ").split(" ") if part.startswith(name)]
         assert all(option in usage.lower() for option in kind.__struct_fields__)
+
+
+@pytest.mark.parametrize(
+    ("options", "radius", "sign"), [("speed=5", 5.0, -1.0), ("radius=2,turn=right,acceleration=2", 2.0, 1.0)]
+)
+def test_ramped_follows_its_speed(options: str, radius: float, sign: float) -> None:
+    flown, steps = track(f"ramped:{options}"), 20_000
+    t = np.linspace(0.0, flown.duration_s, steps)
+    acceleration = 0.25 if "acceleration" not in options else 2.0
+    steady = 5.0 / acceleration - 2.0
+    ends = np.cumsum([2.0, steady, 4.0, steady])
+    edge = np.sin(0.25 * pi * np.where(t < 2.0, t, t - ends[3])) ** 2
+    turn = np.cos(0.25 * pi * (t - ends[1]))
+    shape = np.select([t < ends[0], t < ends[1], t < ends[2], t < ends[3]], [edge, 1.0, turn, -1.0], edge - 1.0)
+    speed = np.concatenate([[0.0], np.cumsum(acceleration * 0.5 * (shape[1:] + shape[:-1]) * t[1])])
+    angle = sign * np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * t[1])]) / radius
+    wanted = np.stack([radius * np.sin(angle), radius * np.cos(angle), np.full(steps, 2.5)], axis=1)
+    assert np.abs(position(flown, t) - wanted).max() < 1e-4
+    assert np.abs(np.linalg.norm(position(flown, t, 1), axis=1) - speed).max() < 1e-4

@@ -1,0 +1,212 @@
+"""Table and figure of an arena: the worst of all starts, and published values beside."""
+
+import json
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from math import isnan
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, write_figure
+from colibri.analysis.lost import LOST_M
+from colibri.analysis.tables import Row as Cells
+from colibri.analysis.tables import comma_separated, markdown
+from colibri.arena.sets import SETS, ArenaSet, Published, Row
+from colibri.autopilot.control.loop import build_controller
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.spec import LawSpec
+from colibri.campaigns.flights import Verdict
+from colibri.campaigns.metrics import Metric
+from colibri.campaigns.results import CampaignResults
+
+CAP_M = LOST_M
+"""Errors of a lost flight."""
+METRICS = tuple(map(Metric, ("mean_error_m", "rmse_m", "max_error_m", "control_step_us.p50", "max_tilt_deg")))
+_MM = 1e3
+_COLUMNS = (
+    *("law", "track", "speed_m_s", "disturbance", "thrust", "flights", "lost"),
+    *("mean_mm", "rms_mm", "largest_mm", "step_us", "tilt_deg"),
+)
+_MAX_COLUMNS = 3
+_LEAST_MM = 0.1
+"""Smallest error of the figure."""
+_PUBLISHED = ("#777777", "#BBBBBB")
+_COLORS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
+
+
+class Cell(NamedTuple):
+    """A law in a row: the worst of its flights; errors in mm, a lost flight's at the cap."""
+
+    flights: int
+    lost: int
+    mean_mm: float
+    rms_mm: float
+    largest_mm: float
+    step_us: float
+    tilt_deg: float
+
+    def __str__(self) -> str:
+        mean = format(self.mean_mm, ".2f" if self.mean_mm < 1.0 else ".1f" if self.mean_mm < 100.0 else ".0f")
+        return f"lost {self.lost} of {self.flights}" if self.lost else mean
+
+
+class ArenaResults(CampaignResults):
+    """The results of an arena; its campaign has the name of the set, and factors `law` and `case`."""
+
+    @cached_property
+    def arena(self) -> ArenaSet:
+        return SETS[self.campaign.name]()
+
+    @cached_property
+    def cells(self) -> dict[tuple[str, Row], Cell]:
+        """The cells by law and row, in the order of the set."""
+        values = np.column_stack([self.metric(metric.name) for metric in METRICS])
+        found: dict[tuple[str, str], list[int]] = {}
+        for (law, case), places in self.groups().items():
+            found.setdefault((law, case.rpartition(", start ")[0]), []).extend(places)
+        laws = dict.fromkeys(law for law, _ in found)
+        every = ((law, row) for law in laws for row in self.arena.rows())
+        return {(law, row): self._cell(found[law, str(row)], values) for law, row in every if (law, str(row)) in found}
+
+    def _cell(self, places: list[int], values: Any) -> Cell:
+        away = np.array([self.flown[place].verdict is not Verdict.FLOWN for place in places])
+        of_flights = values[places]
+        of_flights[away, :3] = CAP_M
+        worst = np.nanmax(of_flights, axis=0, initial=0.0) * (_MM, _MM, _MM, 1.0, 1.0)
+        return Cell(len(places), int(away.sum()), *map(float, worst))
+
+    def rows_by_law(self) -> list[dict[str, Any]]:
+        """Return a row for each law, track, speed and disturbance, as plain data; thrust in parts of the rotors'."""
+        figures = {key: (_plain(value) for value in cell[2:]) for key, cell in self.cells.items()}
+        rows = [
+            (law, *row, self._thrust[row], *cell[:2], *figures[law, row]) for (law, row), cell in self.cells.items()
+        ]
+        return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
+
+    def table(self) -> tuple[Cells, list[Cells]]:
+        """Return mean errors, mm: a row for each track, speed and disturbance, a column for each law."""
+        published = {(each.law, row): value for each in self.arena.published for row, value in self._published(each)}
+        laws, others = (list(dict.fromkeys(law for law, _ in found)) for found in (self.cells, published))
+        lines: list[Cells] = []
+        for row, thrust in self._thrust.items():
+            speed = f"{row.speed:g}" if row.speed else ""
+            flown = (str(self.cells.get((law, row), "")) for law in laws)
+            said = (f"{published[law, row]:g}" if (law, row) in published else "" for law in others)
+            lines.append((row.track, speed, row.world, f"{thrust:.2f}", *flown, *said))
+        return ("track", "m/s", "disturbance", "thrust", *laws, *others), lines
+
+    def law_table(self) -> tuple[Cells, list[Cells]]:
+        """Return for each law its rate and preview, lost flights, and figures over all rows."""
+        lines: list[Cells] = []
+        for level in self.campaign.grid["law"]:
+            law = build_law(level.settings, self.arena)
+            cells = [cell for (name, _), cell in self.cells.items() if name == level.name]
+            ahead_s = 1e-6 * law.preview.interval_us * (law.preview.samples - 1)
+            counts = [sum(column) for column in list(zip(*cells, strict=True))[:2]]
+            lost = f"{counts[1]} of {counts[0]}"
+            mean, most = np.mean([cell.mean_mm for cell in cells]), max(cell.largest_mm for cell in cells)
+            step = np.median([cell.step_us for cell in cells])
+            figures = (f"{mean:.1f}", f"{most:.0f}", f"{step:.0f}")
+            lines.append((level.name, f"{law.control_interval_us / 1e3:g}", f"{ahead_s:g}", lost, *figures))
+        headings = (
+            "law",
+            "every (ms)",
+            "preview (s)",
+            "lost",
+            "mean of all rows (mm)",
+            "largest (mm)",
+            "step, p50 (µs)",
+        )
+        return headings, lines
+
+    @cached_property
+    def _thrust(self) -> dict[Row, float]:
+        return {row: round(self.arena.thrust(row), 3) for row in self.arena.rows()}
+
+    def _published(self, each: Published) -> Iterator[tuple[Row, float]]:
+        for track, values in each.mean_mm.items():
+            for speed, value in zip(self.arena.speeds[track], values, strict=True):
+                yield Row(track, speed, each.world), value
+
+    def save(self, folder: str | Path, *, parquet: bool = False) -> Path:
+        """Write `arena.md`, `arena.csv`, `arena.json`, `arena.png` and `flights.csv`; return the folder."""
+        del parquet
+        path = Path(folder)
+        (path / "flights.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
+        if not self.flown:
+            return path
+        rows = self.rows_by_law()
+        sources = "".join(f"\n{each.law}: {each.source}.\n" for each in self.arena.published)
+        text = f"{markdown(*self.table(), names=3)}\n{markdown(*self.law_table(), names=1)}{sources}"
+        (path / "arena.md").write_text(text, encoding="utf-8")
+        lines = [tuple("" if cell is None else str(cell) for cell in row.values()) for row in rows]
+        (path / "arena.csv").write_text(comma_separated(_COLUMNS, lines), encoding="utf-8")
+        facts = {"set": self.campaign.name, "cap_m": CAP_M, "rows": rows}
+        (path / "arena.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+        write_figure(self.plot(), path / "arena")
+        return path
+
+    def plot(self, metric: str | None = None) -> Figure:
+        """Return mean errors over speed, or over disturbances where tracks have one speed, a panel for each track."""
+        del metric
+        by_speed = any(len(speeds) > 1 for speeds in self.arena.speeds.values())
+        tracks, worlds = list(self.arena.tracks), list(self.arena.worlds)
+        columns = min(_MAX_COLUMNS, len(tracks))
+        figure, grid = axes_grid(-(-len(tracks) // columns), columns, TOP_IN + 0.3, row_in=2.6, share=False)
+        figure.subplots_adjust(hspace=0.42)
+        panels = [axes for line in grid for axes in line]
+        for axes, name in zip(panels, tracks, strict=False):
+            rows = [row for row in self._thrust if row.track == name]
+            for number, law in enumerate(dict.fromkeys(law for law, _ in self.cells)):
+                for world in worlds if by_speed else [""]:
+                    shown = [row for row in rows if not by_speed or row.world == world]
+                    along = [row.speed if by_speed else worlds.index(row.world) for row in shown]
+                    style: dict[str, Any] = {
+                        "color": _COLORS[number % len(_COLORS)],
+                        "marker": "o",
+                        "markersize": 3,
+                        "linewidth": 1.2,
+                    }
+                    style |= {"linestyle": "-" if world == worlds[0] else "--" if by_speed else "none"}
+                    label = f"{law}, {world}" if by_speed and len(worlds) > 1 else law
+                    axes.plot(along, [self.cells[law, row].mean_mm for row in shown], label=label, **style)
+            for number, each in enumerate(self.arena.published):
+                values = [value for row, value in self._published(each) if row.track == name]
+                style = {"color": _PUBLISHED[number % len(_PUBLISHED)], "linestyle": ":", "marker": "x"}
+                axes.plot(self.arena.speeds[name], values, label=f"{each.law}, published", **style)
+            self._dress(axes, name, by_speed=by_speed)
+        for axes in panels[len(tracks) :]:
+            axes.set_visible(False)
+        put_head(figure, f"Arena {self.campaign.name}: worst mean position error", columns=4)
+        return figure
+
+    def _dress(self, axes: Axes, name: str, *, by_speed: bool) -> None:
+        axes.set_yscale("log")
+        axes.set_ylim(_LEAST_MM, 2.0 * _MM * CAP_M)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.grid(**GRID)
+        axes.set_title(name, fontsize="medium")
+        axes.set_ylabel("mean error (mm)")
+        worlds = list(self.arena.worlds)
+        if not by_speed:
+            axes.set_xticks(range(len(worlds)), worlds, rotation=20, ha="right", fontsize="small")
+            return
+        axes.set_xlabel("top speed (m/s)")
+        for row, thrust in self._thrust.items():
+            if row.track == name and row.world == worlds[0] and thrust > 1.0:
+                axes.axvspan(row.speed - 0.5, row.speed + 0.5, color="#D55E00", alpha=0.12, linewidth=0)
+
+
+def build_law(settings: Mapping[str, Any], arena: ArenaSet) -> Any:
+    spec = LawSpec(**settings)
+    return build_controller(spec.chosen(load_profile(spec.profile)), arena.vehicle, perf_counter, spec.law)
+
+
+def _plain(value: float) -> float | None:
+    return None if isnan(value) else round(value, 3)

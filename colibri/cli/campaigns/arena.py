@@ -1,0 +1,43 @@
+"""`colibri arena`."""
+
+from argparse import Namespace
+
+from colibri.cli.shared.options import add_engine, add_gate, add_junit, add_out
+from colibri.common.process.arguments import ArgumentParser
+
+
+def add_options(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("sets", nargs="+", metavar="SET", help="race or policy")
+    add(
+        "--law",
+        action="append",
+        metavar="LAW",
+        help="a profile, or another controller with it, PROFILE:CONTROLLER; a controller; or FILE.py[:CLASS]; may be "
+        "repeated (default: agile, flight, se3)",
+    )
+    add(
+        "--starts",
+        type=int,
+        default=5,
+        metavar="N",
+        help="starts a millimetre apart, 1 to 7, of which the worst counts (default %(default)s)",
+    )
+    add_engine(add)
+    add("--resume", action="store_true", help="continue the sets in --out")
+    add_gate(add, None)
+    add_junit(add)
+    add_out(add, "out/arena", "a folder for each set: tables and figure")
+
+
+def run(args: Namespace) -> int:
+    from colibri.arena.run import arena
+    from colibri.common.errors import Error
+    from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted
+
+    try:
+        return arena(args)
+    except KeyboardInterrupt as ended:
+        fail_interrupted(ended, f"; finished flights are in {args.out}: continue with --resume")
+    except Error as error:
+        fail(str(error), EXIT_BAD_INPUT)
