@@ -13,9 +13,9 @@ from colibri.autopilot.control.profile import profile_names
 from colibri.autopilot.control.registry import controller_names
 from colibri.campaigns.bar import FlightBar
 from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
+from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.run import engine_of, fly_campaign
-from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.common.errors import unknown
 from colibri.conformance.subject import profile_for
 from colibri.studies.comparison import contenders_of
