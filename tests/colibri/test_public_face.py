@@ -21,6 +21,7 @@ FACES = (
 )
 PACKAGES = (
     *FACES,
+    "colibri.arena",
     "colibri.bench",
     "colibri.certification",
     "colibri.cli",
