@@ -45,5 +45,5 @@ def run(args: Namespace) -> int:
     except OSError as error:
         fail(f"cannot write {error.filename or args.log}: {error.strerror}")
     if not args.quiet:
-        print(*dict.fromkeys(written), sep="\n")  # noqa: T201
+        print(*dict.fromkeys(written), sep="\n")
     return 0

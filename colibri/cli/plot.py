@@ -31,5 +31,5 @@ def run(args: Namespace) -> int:
     except OSError as error:
         fail(f"{error.filename or args.folder}: {error.strerror}")
     if not args.quiet:
-        print(*paths, sep="\n")  # noqa: T201
+        print(*paths, sep="\n")
     return 0

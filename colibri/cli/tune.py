@@ -117,7 +117,7 @@ def _print(results: "TuningResults", out: Path) -> None:
     rows += [(name, str(first.params[name]), str(best.params[name])) for name in results.tuning.space]
     print_table(title, ("", "as it is", f"trial {best.number}"), rows, names=1)
     if not best.number:
-        print("no trial was better than the profile as it is")  # noqa: T201
+        print("no trial was better than the profile as it is")
     if results.verdict:
         shown = [
             (*each.row[:2], f"{each.before:.4g}", f"{each.after:.4g}", *each.changes)

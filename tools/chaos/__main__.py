@@ -36,13 +36,12 @@ def main() -> int:
     for case in _side_by_side(places, args.instants):
         cases.append(case)
         if case["bad"]:
-            sys.stdout.write(f"FAILED: {case}\n")
-            sys.stdout.flush()
+            print(f"FAILED: {case}", flush=True)
     lines = table(cases)
     flown = sum(case["outcome"] != "not reached" for case in cases)
     failed = sum(case["bad"] for case in cases)
     lines += ["", f"{flown} flights with exceptions thrown, {failed} failed; {perf_counter() - started_s:.0f} s"]
-    sys.stdout.write("\n".join(lines) + "\n")
+    print(*lines, sep="\n")
     if args.table:
         args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return 1 if failed or not flown else 0

@@ -17,16 +17,11 @@ def main() -> int:
     args = parser.parse_args()
     jobs = [Job(seed, args.datagrams, 0) for seed in args.seeds[: args.lockstep]]
     jobs += [Job(seed, 0, args.messages) for seed in args.seeds]
-    _print([HEADER])
-    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda result: _print(result.lines))
+    print(HEADER, flush=True)
+    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda each: print(*each.lines, sep="\n", flush=True))
     failures = [failure for result in results for failure in result.failures]
-    _print([f"FAILED: {failure}" for failure in failures] or [f"{len(jobs)} campaigns, and nothing failed"])
+    print(*[f"FAILED: {failure}" for failure in failures] or [f"{len(jobs)} campaigns, and nothing failed"], sep="\n")
     return 1 if failures else 0
-
-
-def _print(lines: list[str]) -> None:
-    sys.stdout.write("\n".join(lines) + "\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -46,20 +46,21 @@ def _fly_all(chosen: Sequence[Variation], args: argparse.Namespace) -> int:
     for variation in chosen:
         obstacle = variation.obstacle()
         if obstacle:
-            _say(f"{variation.name}: not flown: {obstacle}")
+            print(f"{variation.name}: not flown: {obstacle}", flush=True)
             continue
         with TemporaryDirectory(prefix="golden-") as out:
             try:
                 flown[variation.name] = done = fly(variation, Path(out), args.link, args.only)
             except VariationError as error:
-                _say(f"FAILED: {error}")
+                print(f"FAILED: {error}", flush=True)
                 failed = True
                 continue
         differing = done.differing()
         failed |= bool(differing)
-        _say(f"{variation.name}: {len(done.hashes)} flights in {done.took_s:.0f} s, {len(differing)} differ")
+        print(f"{variation.name}: {len(done.hashes)} flights in {done.took_s:.0f} s, {len(differing)} differ")
         for flight, (expected, found) in differing.items():
-            _say(f"  {flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}")
+            print(f"  {flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}")
+        sys.stdout.flush()
     if args.table:
         args.table.write_text(table(flown), encoding="utf-8")
     return EXIT_FAILED if failed else 0
@@ -77,17 +78,12 @@ def _chosen(args: argparse.Namespace) -> list[Variation]:
 
 def _set_up_pythons() -> None:
     for version, python in other_pythons().items():
-        _say(f"Python {version}: {python}, in .venv-{version} from requirements.lock")
+        print(f"Python {version}: {python}, in .venv-{version} from requirements.lock", flush=True)
         try:
             set_up(ROOT, version, python)
         except subprocess.CalledProcessError as error:
             words = (error.stderr or "").strip().splitlines()
             fail(f"cannot set up .venv-{version}: {words[-1] if words else error}", EXIT_FAILED)
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:

@@ -35,7 +35,7 @@ def main() -> int:
     seconds = perf_counter() - started_s
     verdict = [f"FAILED: {failure}" for failure in failures] or ["every flight went on"]
     lines.append(f"{seconds:.0f} s, {args.of}, {args.feedback}, seed {args.seed}")
-    sys.stdout.write("\n".join([*lines, *verdict]) + "\n")
+    print(*lines, *verdict, sep="\n")
     return 1 if failures else 0
 
 
@@ -112,7 +112,7 @@ def _killed(
             break
         done += killed
         failures += found
-        print(f"{what} {flights}: {len(killed)} kills, {len(done)} in all", file=sys.stderr, flush=True)  # noqa: T201
+        print(f"{what} {flights}: {len(killed)} kills, {len(done)} in all", file=sys.stderr, flush=True)
     return done, failures, flights
 
 

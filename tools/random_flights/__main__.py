@@ -5,11 +5,11 @@ at most 20 ms of work for a frame. With at most one failed sensor it must not fa
 """
 
 import argparse
-import gc
 import sys
 from time import perf_counter
 
 from colibri.common.process.lifecycle import use_one_thread
+from tools.harness.frame_times import gc_off
 from tools.random_flights.flights import RandomFlight, RandomFlightOutcome, case_of, fly
 
 MAX_FRAME_MS = 20.0
@@ -28,31 +28,23 @@ def main() -> int:
         flown_s, worst_ms = flown_s + verdict.flown_s, max(worst_ms, frame_ms)
         violated = verdict.violated or (f"a frame of {frame_ms:.1f} ms" if frame_ms > MAX_FRAME_MS else "")
         if args.verbose:
-            _print(f"seed {seed}: {case}", *verdict.texts)
+            print(f"seed {seed}: {case}", *verdict.texts, sep="\n", flush=True)
         if violated:
             failed += 1
-            _print(f"FAILED: {violated}; repeat: python -m tools.random_flights --verbose --seeds {seed}")
+            print(f"FAILED: {violated}; repeat: python -m tools.random_flights --verbose --seeds {seed}", flush=True)
     flights = f"{len(args.seeds)} flights, {failed} failed; {flown_s:.0f} s flown in {perf_counter() - began_s:.0f} s"
-    _print(f"{flights}; longest frame {worst_ms:.1f} ms of work")
+    print(f"{flights}; longest frame {worst_ms:.1f} ms of work")
     return 1 if failed else 0
 
 
 def _flown(case: RandomFlight) -> tuple[RandomFlightOutcome, float]:
     """Return a flight and its longest frame, ms; one that seems too long counts only if it is so again."""
-    verdict = _fly(case)
-    frames_s = verdict.frames_s
-    if max(frames_s, default=0.0) * 1e3 > MAX_FRAME_MS:
-        frames_s = list(map(min, frames_s, _fly(case).frames_s))
+    with gc_off():
+        verdict = fly(case)
+        frames_s = verdict.frames_s
+        if max(frames_s, default=0.0) * 1e3 > MAX_FRAME_MS:
+            frames_s = list(map(min, frames_s, fly(case).frames_s))
     return verdict, max(frames_s, default=0.0) * 1e3
-
-
-def _fly(case: RandomFlight) -> RandomFlightOutcome:
-    gc.collect()
-    gc.disable()
-    try:
-        return fly(case)
-    finally:
-        gc.enable()
 
 
 def _seeds(text: str) -> range:
@@ -60,11 +52,6 @@ def _seeds(text: str) -> range:
     if not first.isdigit() or not (last.isdigit() if dash else not last) or int(last or first) < int(first):
         raise argparse.ArgumentTypeError(f'seeds "{text}" are invalid: A, or A-B with A up to B')
     return range(int(first), int(last or first) + 1)
-
-
-def _print(*lines: str) -> None:
-    sys.stdout.write("\n".join(lines) + "\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -4,9 +4,8 @@ import random
 from collections.abc import Callable
 from math import hypot, inf
 from pathlib import Path
-from time import thread_time
 from traceback import extract_tb
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.control.profile import load_profile
@@ -21,6 +20,7 @@ from colibri.sitl.ground_station import RefusedError
 from colibri.sitl.session import Flights
 from colibri.sitl.stepping import NotInTimeError
 from colibri.sitl.vehicle import Sitl
+from tools.harness.frame_times import FrameTimes
 
 VEHICLES = ("hummingbird", "hummingbird-rangefinder", "iris", "jmavsim")
 MODES = (Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.MISSION, Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
@@ -152,7 +152,7 @@ def fly(case: RandomFlight) -> RandomFlightOutcome:
 class _Flown:
     def __init__(self, flight: Sitl, case: RandomFlight) -> None:
         self.flight, self._case = flight, case
-        self.frames_s = _timed(flight)
+        self.frames_s = FrameTimes(flight.inside.autopilot)
         self._feed: Callable[[], object] = _nothing
         self._frames = 0
         self._impact = self._breach = ""
@@ -269,27 +269,6 @@ class _Flown:
             self._limit_m = away_m + braking_m + flight.near_m + 1.0
         elif away_m > self._limit_m:
             self._breach = f"{away_m:.1f} m from home, beyond a fence of {self._case.radius_m:g} m and its braking"
-
-
-def _timed(flight: Sitl) -> list[float]:
-    """Time what the autopilot does in each frame, for the flight and for ground stations."""
-    autopilot, took_s = flight.inside.autopilot, list[float]()
-    step, serve = autopilot.step, autopilot.serve
-
-    def timed_step(*args: Any) -> Any:
-        began_s = thread_time()
-        answer = step(*args)
-        took_s.append(thread_time() - began_s)
-        return answer
-
-    def timed_serve(*args: Any) -> Any:
-        began_s = thread_time()
-        outbox = serve(*args)
-        took_s[-1:] = [took_s[-1] + thread_time() - began_s] if took_s else []
-        return outbox
-
-    autopilot.step, autopilot.serve = timed_step, timed_serve  # type: ignore[assignment,method-assign]
-    return took_s
 
 
 def _try(act: Callable[[], object]) -> bool:

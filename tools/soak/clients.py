@@ -118,7 +118,7 @@ def main() -> int:
     if args.out:
         args.out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
     figures.pop("looks")
-    sys.stdout.write("\n".join([json.dumps(figures, indent=1), *wrong, ""]))
+    print(json.dumps(figures, indent=1), *wrong, sep="\n")
     return 1 if wrong else 0
 
 

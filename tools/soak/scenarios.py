@@ -31,16 +31,16 @@ def main(argv: Sequence[str] | None = None) -> int:
                 began_s = perf_counter()
                 summary = _run(link, kept, args.only)
                 took_s = perf_counter() - began_s
-                print(f"{number} of {args.runs}, {link}, {took_s:.0f} s: {summary}", flush=True)  # noqa: T201
+                print(f"{number} of {args.runs}, {link}, {took_s:.0f} s: {summary}", flush=True)
             lines = read(kept)
             first = first or lines
             try:
                 compare(first, lines)
             except DiffersError as error:
-                print(f"run {number}, over {link}: {error}")  # noqa: T201
+                print(f"run {number}, over {link}: {error}")
                 return 1
     failed = sorted(test for test, outcome in first.items() if not outcome.startswith("passed"))
-    print(f"{args.runs} runs of {len(first)} tests: no verdict and no hash differs, {len(failed)} failed")  # noqa: T201
+    print(f"{args.runs} runs of {len(first)} tests: no verdict and no hash differs, {len(failed)} failed")
     return 1 if failed else 0
 
 

@@ -156,8 +156,7 @@ def main() -> int:
 
 
 def _write(*cells: str) -> None:
-    sys.stdout.write(f"| {' | '.join(cells)} |\n")
-    sys.stdout.flush()
+    print(f"| {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -89,15 +89,15 @@ def _print(results: CampaignResults, args: Namespace) -> None:
     cells = [tuple(_short(row[headings.index(name)]) for name in shown) for row in rows]
     title = f"{results.campaign.name}: {counts}; written to {args.out}"
     print_table(title, tuple(shown), cells, names=len(results.campaign.grid))
-    print(*results.notes, sep="\n", end="\n" if results.notes else "")  # noqa: T201
+    print(*results.notes, sep="\n", end="\n" if results.notes else "")
     said: dict[str, int] = {}
     for each in results.flown:
         if each.why:
             said[each.why] = said.get(each.why, 0) + 1
     for why, times in list(said.items())[:_SHOWN]:
-        print(f"{times} ×: {why}")  # noqa: T201
+        print(f"{times} ×: {why}")
     if len(said) > _SHOWN:
-        print(f"and {len(said) - _SHOWN} other reasons: see flights.csv")  # noqa: T201
+        print(f"and {len(said) - _SHOWN} other reasons: see flights.csv")
 
 
 def _short(cell: str) -> str:

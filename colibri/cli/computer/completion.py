@@ -16,7 +16,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from shtab import complete
 
-    print(complete(completed_parser(), args.shell))  # noqa: T201
+    print(complete(completed_parser(), args.shell))
     return 0
 
 

@@ -26,7 +26,7 @@ def loading_viser() -> Iterator[None]:
 
 
 def say(line: str) -> None:
-    print(line, flush=True)  # noqa: T201
+    print(line, flush=True)
 
 
 @contextmanager

@@ -28,7 +28,7 @@ class Version(Action):
     def __call__(self, *_: object) -> NoReturn:
         from importlib.metadata import version
 
-        print(f"colibri {version('colibri-sitl')}")  # noqa: T201
+        print(f"colibri {version('colibri-sitl')}")
         raise SystemExit(0)
 
 

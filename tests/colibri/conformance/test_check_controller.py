@@ -89,7 +89,7 @@ def test_each_bad_law_is_caught_by_its_check(law: type[laws.Good]) -> None:
 @pytest.mark.parametrize(
     ("law", "said"),
     [
-        (laws.Listed, "rotor_speeds is not an array of four floats: ["),
+        (laws.Listed, "rotor_speeds is not an array of 4 floats: ["),
         (laws.NoAngles, "attitude_reference is not three finite angles: None"),
         (laws.NoDiagnostics, "AttributeError: 'NoneType' object has no attribute 'predicted'"),
     ],
