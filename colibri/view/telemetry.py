@@ -1,8 +1,8 @@
 """The state of a live vehicle from its messages."""
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from math import isfinite, isnan, nan, pi
 from typing import Any
 
@@ -52,31 +52,55 @@ class Telemetry:
         self._values: dict[str, tuple[float, Any]] = {}
         self._rows: deque[tuple[float, ...]] = deque(maxlen=round(CHART_S / _ROW_S))
         self._began_s = self._moved_s = nan
-        self._handlers: dict[str, Callable[[Any, float], None]] = {
-            "HEARTBEAT": self._heartbeat,
-            "LOCAL_POSITION_NED": self._local_position,
-            "GLOBAL_POSITION_INT": self._global_position,
-            "GPS_GLOBAL_ORIGIN": self._origin,
-            "HOME_POSITION": self._home,
-            "ATTITUDE_QUATERNION": self._attitude_quaternion,
-            "ATTITUDE": self._attitude,
-            "POSITION_TARGET_LOCAL_NED": self._target,
-            "SERVO_OUTPUT_RAW": self._servos,
-            "ACTUATOR_OUTPUT_STATUS": self._outputs,
-            "TRAJECTORY_REPRESENTATION_WAYPOINTS": self._horizon,
-            "DEBUG_FLOAT_ARRAY": self._solver,
-            "ESTIMATOR_STATUS": self._accuracy,
-            "BATTERY_STATUS": self._battery_status,
-            "WIND_COV": self._wind,
-            "STATUSTEXT": self._text,
-        }
 
     def receive(self, message: Message, now_s: float) -> None:
         if isnan(self._began_s):
             self._began_s = now_s
-        handler = self._handlers.get(message.name)
-        if handler is not None:
-            handler(message.fields, now_s)
+        fields = message.fields
+        match message.name:
+            case "HEARTBEAT":
+                self.autopilot = int(fields.autopilot)
+                self._set("armed", now_s, bool(fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED))
+                self._set("mode", now_s, mode_name(self.autopilot, fields.custom_mode))
+            case "LOCAL_POSITION_NED":
+                self._has_local = True
+                place, velocity = (fields.x, fields.y, fields.z), (fields.vx, fields.vy, fields.vz)
+                self._moved(ned_from_enu(place), ned_from_enu(velocity), now_s)
+            case "GLOBAL_POSITION_INT":
+                self._global_position(fields, now_s)
+            case "GPS_GLOBAL_ORIGIN":
+                self.origin = _geodetic(fields)
+            case "HOME_POSITION" if self.origin is not None:
+                self.home_enu_m = enu_of(_geodetic(fields), self.origin)
+            case "ATTITUDE_QUATERNION":
+                attitude: Quaternion = ned_frd_from_enu_flu((fields.q1, fields.q2, fields.q3, fields.q4))
+                self._now = replace(self._now, attitude=attitude)
+            case "ATTITUDE":
+                attitude = quaternion_from_euler(fields.roll, -fields.pitch, pi / 2.0 - fields.yaw)
+                self._now = replace(self._now, attitude=attitude)
+            case "POSITION_TARGET_LOCAL_NED":
+                self._target(fields, now_s)
+            case "SERVO_OUTPUT_RAW":
+                pulses = (fields.servo1_raw, fields.servo2_raw, fields.servo3_raw, fields.servo4_raw)
+                self._pulses(pulses, now_s)
+            case "ACTUATOR_OUTPUT_STATUS":
+                self._pulses(tuple(fields.actuator[:4]), now_s)
+            case "TRAJECTORY_REPRESENTATION_WAYPOINTS":
+                rows = zip(fields.pos_x, fields.pos_y, fields.pos_z, strict=True)
+                points = [ned_from_enu(row) for row in islice(rows, min(fields.valid_points, 5))]
+                self._set("horizon", now_s, np.array([self._now.position_enu_m, *points]))
+            case "DEBUG_FLOAT_ARRAY" if fields.name == "lpv_mpc":
+                self._set("solver", now_s, (fields.data[3] / 1e3, *fields.data[7:11]))
+            case "ESTIMATOR_STATUS":
+                self._set("accuracy", now_s, (fields.pos_horiz_accuracy, fields.pos_vert_accuracy))
+            case "BATTERY_STATUS":
+                cells = [cell for cell in fields.voltages if cell not in (0, 0xFFFF)]
+                if cells:
+                    self._set("volts", now_s, sum(cells) / 1e3)
+            case "WIND_COV":
+                self._set("wind", now_s, (fields.wind_y, fields.wind_x, -fields.wind_z))
+            case "STATUSTEXT":
+                self.say(fields.text)
 
     def say(self, text: str) -> None:
         self._texts.appendleft(text)
@@ -159,19 +183,6 @@ class Telemetry:
         tilt = tilt_deg(self._now.attitude)
         return (now_s, error, tilt, *rotors, *solver[1:], solver[0], *accuracy, self._fresh("volts", now_s, nan))
 
-    # What each message says.
-
-    def _heartbeat(self, fields: Any, now_s: float) -> None:
-        self.autopilot = int(fields.autopilot)
-        armed = bool(fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
-        self._set("armed", now_s, armed)
-        self._set("mode", now_s, mode_name(self.autopilot, fields.custom_mode))
-
-    def _local_position(self, fields: Any, now_s: float) -> None:
-        self._has_local = True
-        place = ned_from_enu((fields.x, fields.y, fields.z))
-        self._moved(place, ned_from_enu((fields.vx, fields.vy, fields.vz)), now_s)
-
     def _global_position(self, fields: Any, now_s: float) -> None:
         place = Geodetic(fields.lat / _E7, fields.lon / _E7, fields.alt / 1e3)
         if self.origin is None and (fields.lat or fields.lon):
@@ -182,34 +193,11 @@ class Telemetry:
             velocity = (fields.vy / 100.0, fields.vx / 100.0, -fields.vz / 100.0)
             self._moved(enu_of(place, self.origin), velocity, now_s)
 
-    def _origin(self, fields: Any, _now_s: float) -> None:
-        self.origin = Geodetic(fields.latitude / _E7, fields.longitude / _E7, fields.altitude / 1e3)
-
-    def _home(self, fields: Any, _now_s: float) -> None:
-        if self.origin is not None:
-            home = Geodetic(fields.latitude / _E7, fields.longitude / _E7, fields.altitude / 1e3)
-            self.home_enu_m = enu_of(home, self.origin)
-
-    def _attitude_quaternion(self, fields: Any, _now_s: float) -> None:
-        attitude: Quaternion = ned_frd_from_enu_flu((fields.q1, fields.q2, fields.q3, fields.q4))
-        self._now = replace(self._now, attitude=attitude)
-
-    def _attitude(self, fields: Any, _now_s: float) -> None:
-        attitude = quaternion_from_euler(fields.roll, -fields.pitch, pi / 2.0 - fields.yaw)
-        self._now = replace(self._now, attitude=attitude)
-
     def _target(self, fields: Any, now_s: float) -> None:
         if all(map(isfinite, (fields.x, fields.y, fields.z))) and not fields.type_mask & 0b111:
             moves = not fields.type_mask & 0b111000 and all(map(isfinite, (fields.vx, fields.vy, fields.vz)))
             velocity = ned_from_enu((fields.vx, fields.vy, fields.vz)) if moves else (0.0, 0.0, 0.0)
             self._set("reference", now_s, (ned_from_enu((fields.x, fields.y, fields.z)), velocity))
-
-    def _servos(self, fields: Any, now_s: float) -> None:
-        pulses = (fields.servo1_raw, fields.servo2_raw, fields.servo3_raw, fields.servo4_raw)
-        self._pulses(pulses, now_s)
-
-    def _outputs(self, fields: Any, now_s: float) -> None:
-        self._pulses(tuple(fields.actuator[:4]), now_s)
 
     def _pulses(self, pulses: PerRotor, now_s: float) -> None:
         low, high = _PULSE_US
@@ -217,30 +205,9 @@ class Telemetry:
             parts = tuple(min(max((pulse - low) / (high - low), 0.0), 1.0) for pulse in pulses)
             self._set("rotors", now_s, parts)
 
-    def _horizon(self, fields: Any, now_s: float) -> None:
-        points = [
-            ned_from_enu((fields.pos_x[k], fields.pos_y[k], fields.pos_z[k]))
-            for k in range(min(fields.valid_points, 5))
-        ]
-        self._set("horizon", now_s, np.array([self._now.position_enu_m, *points]))
 
-    def _solver(self, fields: Any, now_s: float) -> None:
-        if fields.name == "lpv_mpc":
-            self._set("solver", now_s, (fields.data[3] / 1e3, *fields.data[7:11]))
-
-    def _accuracy(self, fields: Any, now_s: float) -> None:
-        self._set("accuracy", now_s, (fields.pos_horiz_accuracy, fields.pos_vert_accuracy))
-
-    def _battery_status(self, fields: Any, now_s: float) -> None:
-        cells = [cell for cell in fields.voltages if cell not in (0, 0xFFFF)]
-        if cells:
-            self._set("volts", now_s, sum(cells) / 1e3)
-
-    def _wind(self, fields: Any, now_s: float) -> None:
-        self._set("wind", now_s, (fields.wind_y, fields.wind_x, -fields.wind_z))
-
-    def _text(self, fields: Any, _now_s: float) -> None:
-        self.say(fields.text)
+def _geodetic(fields: Any) -> Geodetic:
+    return Geodetic(fields.latitude / _E7, fields.longitude / _E7, fields.altitude / 1e3)
 
 
 INTERVALS_US: dict[str, int] = {

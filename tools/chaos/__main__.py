@@ -69,7 +69,8 @@ def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:
         pid = os.fork()
         if pid == 0:
             os.close(reading)
-            _fly_all(feedback, places, instants, writing)
+            with airborne(feedback) as flight:
+                _fly_situations(flight, feedback, places, instants, writing)
             os._exit(0)
         children.append(pid)
     os.close(writing)
@@ -79,11 +80,6 @@ def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:
     for pid in children:
         if os.waitpid(pid, 0)[1] != 0:
             raise RuntimeError("a process of the campaign has died")
-
-
-def _fly_all(feedback: Feedback, places: list[str], instants: int, out: int) -> None:
-    with airborne(feedback) as flight:
-        _fly_situations(flight, feedback, places, instants, out)
 
 
 def _fly_situations(flight: Sitl, feedback: Feedback, places: list[str], instants: int, out: int) -> None:
@@ -96,7 +92,8 @@ def _fly_situations(flight: Sitl, feedback: Feedback, places: list[str], instant
                     _fly(
                         flight, place, TIMES[instant % len(TIMES)], {"feedback": feedback, "situation": situation}, out
                     )
-                _go_on(flight, situation, SPAN_S / instants)
+                steer = (lambda: flight.setpoint(velocity=(3.0, 1.0, 0.0))) if situation == "offboard" else None
+                flight.run(SPAN_S / instants, steer)
                 if not flight.armed:
                     break
             os._exit(0)
@@ -106,11 +103,6 @@ def _fly_situations(flight: Sitl, feedback: Feedback, places: list[str], instant
 def _wait(pid: int) -> None:
     if os.waitpid(pid, 0)[1] != 0:
         os._exit(1)
-
-
-def _go_on(flight: Sitl, situation: str, seconds: float) -> None:
-    steers = situation == "offboard"
-    flight.run(seconds, (lambda: flight.setpoint(velocity=(3.0, 1.0, 0.0))) if steers else None)
 
 
 def _fly(flight: Sitl, place: str, times: float, case: dict[str, Any], out: int) -> None:

@@ -108,7 +108,8 @@ class ChaosFlight:
             if trouble:
                 return trouble
             if not flight.rotors.armed:
-                return self._down()
+                height_m = flight.position[2]
+                return "landed" if height_m < _NEAR_GROUND_M else f"rotors stopped at {height_m:.1f} m"
             if flight.time_s > begun_s + _WATCH_S and not self._lands():
                 return "flown on"
         return "never landed"
@@ -137,7 +138,3 @@ class ChaosFlight:
         pilot, actuation = self._flight.inside.copter.pilot, self._flight.inside.copter.parts.actuation
         lands = pilot.state.mode is Mode.LAND or pilot.saving in (Action.LAND, Action.DESCEND)
         return lands or actuation.descent is not None
-
-    def _down(self) -> str:
-        height_m = self._flight.position[2]
-        return "landed" if height_m < _NEAR_GROUND_M else f"rotors stopped at {height_m:.1f} m"

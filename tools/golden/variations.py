@@ -125,7 +125,10 @@ class GoldenHashes(NamedTuple):
 def variations() -> list[Variation]:
     return [
         Variation(name="as-it-is"),
-        *(_openblas(core, needs) for core, needs in _OPENBLAS_CORES.items()),
+        *(
+            Variation(name=f"openblas-{core.lower()}", environment={"OPENBLAS_CORETYPE": core}, needs=needs)
+            for core, needs in _OPENBLAS_CORES.items()
+        ),
         _numpy_without_simd(),
         *(_numba(cpu, needs) for cpu, needs in _NUMBA_CPUS.items()),
         Variation(
@@ -135,16 +138,16 @@ def variations() -> list[Variation]:
             lacks="" if platform.libc_ver()[0] == "glibc" else "the C library is not glibc",
         ),
         Variation(name="two-threads", environment=dict.fromkeys(ONE_THREAD, "2")),
-        *(_python(version, python) for version, python in environments(ROOT).items()),
+        *(
+            Variation(name=f"python-{version}", python=python, lacks=_STALE.format(version) * is_stale(ROOT, version))
+            for version, python in environments(ROOT).items()
+        ),
     ]
 
 
 _OPENBLAS_CORES = {"Nehalem": ("sse4_2",), "Haswell": _AVX2, "SkylakeX": _AVX512, "Zen": _AVX2}
+_STALE = ".venv-{} is older than the lock or the package: make verify-pythons"
 _NUMBA_CPUS = {"generic": (), "haswell": _AVX2, "skylake-avx512": _AVX512}
-
-
-def _openblas(core: str, needs: Sequence[str]) -> Variation:
-    return Variation(name=f"openblas-{core.lower()}", environment={"OPENBLAS_CORETYPE": core}, needs=needs)
 
 
 def _numpy_without_simd() -> Variation:
@@ -163,13 +166,6 @@ def _numba(cpu: str, needs: Sequence[str]) -> Variation:
     environment = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kept)}
     lacks = "" if platform.machine() in ("x86_64", "AMD64") else "not an x86 CPU"
     return Variation(name=f"numba-{cpu}", environment=environment, needs=needs, lacks=lacks)
-
-
-def _python(version: str, python: Path) -> Variation:
-    lacks = (
-        f".venv-{version} is older than the lock or the package: make verify-pythons" if is_stale(ROOT, version) else ""
-    )
-    return Variation(name=f"python-{version}", python=python, lacks=lacks)
 
 
 @cache

@@ -54,7 +54,8 @@ class HarnessStation:
         self.time_s = 0.0
         self.position_ned_m = (0.0, 0.0, 0.0)
         self._every = every
-        self._wishes = chain(self._orders(orders), cycle(self._wish()))
+        first = [partial(self._command, int(command), *values) for command, *values in orders]
+        self._wishes: Iterator[Callable[[], None]] = chain(first, cycle(self._wish()))
         self._client = Client(*self.identity, only=VEHICLE[0])
         self._datagrams = 0
         self._heartbeat_s: float | None = None
@@ -86,10 +87,6 @@ class HarnessStation:
 
     def _told(self) -> None:
         """Act on any datagram."""
-
-    def _orders(self, orders: Sequence[tuple[float, ...]]) -> Iterator[Callable[[], None]]:
-        for command, *parameters in orders:
-            yield partial(self._command, int(command), *parameters)
 
     def _wish(self) -> Iterator[Callable[[], None]]:
         for name, interval_us in _STREAMED_US.items():

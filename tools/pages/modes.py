@@ -1,6 +1,5 @@
 """Tables of `modes.md`, and `modes.png`, from the autopilot's own tables."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -72,9 +71,11 @@ def draw(path: Path) -> None:
     axes.text(9.2, -0.95, "* has needs, see the table", fontsize=10, color="#445566", ha="right")
     arrow = {"arrowstyle": "-|>", "color": "#225588", "shrinkA": 22, "shrinkB": 24, "linewidth": 1.2}
     for row in TRANSITIONS:
-        for source, target in _edges(row):
-            (x0, y0), (x1, y1) = source, target
-            axes.annotate("", xy=target, xytext=source, arrowprops=arrow, zorder=1)
+        for x0, y0 in [PLACES[mode] for mode in row.sources] or [_ANY]:
+            if row.target is None or row.disarms:
+                continue
+            x1, y1 = PLACES[row.target]
+            axes.annotate("", xy=(x1, y1), xytext=(x0, y0), arrowprops=arrow, zorder=1)
             axes.text(
                 0.55 * x0 + 0.45 * x1,
                 0.55 * y0 + 0.45 * y1,
@@ -95,13 +96,6 @@ def draw(path: Path) -> None:
     )
     axes.text(10.3, 1.15, "armed, in the\nsame mode", fontsize=8.5, color="#225588", ha="center", va="top")
     figure.savefig(path, dpi=110, bbox_inches="tight")
-
-
-def _edges(row: Transition) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
-    if row.target is None or row.disarms:
-        return
-    for source in [PLACES[mode] for mode in row.sources] or [_ANY]:
-        yield source, PLACES[row.target]
 
 
 def write(folder: Path) -> None:

@@ -20,7 +20,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import Intensity, Wind
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import state_frame
-from colibri.plant.simulation.plant import Plant, PlantBuilder
+from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.spec import WorldSpec
 from colibri.plant.vehicle.description import load_vehicle
 
@@ -60,7 +60,8 @@ class RotorLossFlight(NamedTuple):
     @property
     def lost(self) -> Array:
         after = self.path[self.path[:, _T] > 0.0]
-        touched = np.flatnonzero(np.diff(after[:, _VZ]) > _knock(after))
+        # A larger change of the vertical speed between rows is the ground's.
+        touched = np.flatnonzero(np.diff(after[:, _VZ]) > 9.81 * (after[1, _T] - after[0, _T]))
         low = [row for row in touched.tolist() if after[row, _Z] < _LOW_M]
         return after[: low[0] + 1] if low else after
 
@@ -103,11 +104,6 @@ class RotorLossFlight(NamedTuple):
         return self.rights and upright and self.landed_m <= NEAR_M and self.touched_m_s <= SOFT_M_S
 
 
-def _knock(path: Array) -> float:
-    """Return the change of vertical speed between rows, m/s, that only the ground causes."""
-    return float(9.81 * (path[1, _T] - path[0, _T]))
-
-
 def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
     profile = load_profile("flight")
     vehicle = load_vehicle(profile.simulation.vehicle)
@@ -120,19 +116,15 @@ def fly(case: RotorLossCase, seed: int) -> RotorLossFlight:
     plant = PlantBuilder(world, vehicle, starts).build(case.feedback, autopilot.frame_interval_us)
     flight = SteppedFlight(plant, autopilot, Direct())
     _take_off(flight)
-    return _lose(flight, seed, _fault(case, seed % 4))
+    rotor = seed % 4 + 1
+    blades_gone = Fault(MOTOR, WRONG, rotor, (_BLADES_LEFT, 0.0, 0.0, 0.0))
+    return _lose(flight, seed, Fault(MOTOR, OFF, rotor) if case.runs_down else blades_gone)
 
 
 def fly_all(cases: Iterable[RotorLossCase], seeds: Iterable[int]) -> dict[RotorLossCase, list[RotorLossFlight]]:
     numbers = list(seeds)
     with ProcessPoolExecutor(_WORKERS) as pool:
         return {case: list(pool.map(fly, [case] * len(numbers), numbers)) for case in cases}
-
-
-def _fault(case: RotorLossCase, rotor: int) -> Fault:
-    if case.runs_down:
-        return Fault(MOTOR, OFF, rotor + 1)
-    return Fault(MOTOR, WRONG, rotor + 1, (_BLADES_LEFT, 0.0, 0.0, 0.0))
 
 
 def _take_off(flight: SteppedFlight[Copter]) -> None:
@@ -158,7 +150,9 @@ def _lose(flight: SteppedFlight[Copter], seed: int, fault: Fault) -> RotorLossFl
             plant.inject([fault])
         controls = flight.step().command.controls
         after_s = (plant.world.time_us - lost_us) * 1e-6
-        rows.append((after_s, *_seen(plant), *controls))
+        frame = state_frame(plant.world)
+        tilt_spin = (tilt_deg(frame.attitude), frame.rate_flu_rad_s[2])
+        rows.append((after_s, *frame.position_enu_m, frame.velocity_enu_m_s[2], *tilt_spin, *controls))
         if copter.parts.rotor_loss.lost is not None and np.isnan(noticed_s):
             noticed_s = after_s - plant.interval_us * 1e-6
         if not copter.pilot.state.armed:
@@ -167,8 +161,3 @@ def _lose(flight: SteppedFlight[Copter], seed: int, fault: Fault) -> RotorLossFl
     at_loss = int(np.argmin(np.abs(path[:, _T])))
     path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
     return RotorLossFlight(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
-
-
-def _seen(plant: Plant) -> tuple[float, ...]:
-    frame = state_frame(plant.world)
-    return (*frame.position_enu_m, frame.velocity_enu_m_s[2], tilt_deg(frame.attitude), frame.rate_flu_rad_s[2])

@@ -30,7 +30,7 @@ def draw(path: Path, *, frames_a_second: int = FRAMES_A_SECOND, width_in: float 
     figure = Figure(figsize=(width_in, 0.56 * width_in), dpi=100)
     axes: Any = figure.add_axes((0.0, -0.02, 1.0, 1.0), projection="3d")
     _set_the_scene(axes, table)
-    shown = [*(axes.plot([], [], [], c, lw=w)[0] for c, w in _LINES), *_arms(axes)]
+    shown = [axes.plot([], [], [], color, lw=width, solid_capstyle=end)[0] for color, width, end in _LINES]
     clock = figure.text(0.03, 0.94, "", family="monospace", fontsize=9, color=_BODY)
     times = np.arange(0.0, LAP_S, 1.0 / frames_a_second) + FROM_S
 
@@ -50,11 +50,8 @@ def draw(path: Path, *, frames_a_second: int = FRAMES_A_SECOND, width_in: float 
     animation.save(path, writer=PillowWriter(fps=frames_a_second))
 
 
-_LINES = ((_GROUND, 1.2), (_AIR, 2.2), (_THRUST, 2.0))
-
-
-def _arms(axes: Any) -> list[Any]:
-    return [axes.plot([], [], [], color=_BODY, lw=2.6, solid_capstyle="round")[0] for _ in range(2)]
+_ARM = (_BODY, 2.6, "round")
+_LINES = ((_GROUND, 1.2, None), (_AIR, 2.2, None), (_THRUST, 2.0, None), _ARM, _ARM)
 
 
 def _set_the_scene(axes: Any, table: SampleTable) -> None:

@@ -21,12 +21,9 @@ def _rows(columns: Iterable[Columns]) -> Iterator[tuple[str, ...]]:
     for each in columns:
         names = each.names.split()
         shown = names if len(names) <= _MANY else [names[0], "…", names[-1]]
-        meaning = each.help + (f": {_codes(_CODES[each.names])}" if each.names in _CODES else "")
+        codes = ", ".join(f"{code} {name or 'none'}" for name, code in _CODES.get(each.names, {}).items())
+        meaning = each.help + (f": {codes}" if codes else "")
         yield ", ".join(name if name == "…" else f"`{name}`" for name in shown), each.unit, meaning
-
-
-def _codes(codes: Mapping[Any, int]) -> str:
-    return ", ".join(f"{code} {name or 'none'}" for name, code in codes.items())
 
 
 PAGES = {"files.md": lambda page: with_tables(page, _tables())}

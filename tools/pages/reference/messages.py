@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from inspect import getdoc, getmembers, getsource, isclass
-from types import ModuleType
 
 import colibri.mavlink as mavlink_package
 from colibri.analysis.tables import markdown
@@ -56,7 +55,8 @@ def _taken() -> Iterator[tuple[str, ...]]:
 
 def taken() -> dict[str, str]:
     found: dict[str, str] = {}
-    for module in _modules(mavlink_package):
+    for info in pkgutil.walk_packages(mavlink_package.__path__, f"{mavlink_package.__name__}."):
+        module = import_module(info.name)
         for _, kind in getmembers(module, isclass):
             handles = getattr(kind, "handles", None)
             if kind.__module__ == module.__name__ and isinstance(handles, frozenset):
@@ -67,11 +67,6 @@ def taken() -> dict[str, str]:
     return found | dict.fromkeys(plans.handles, doc)
 
 
-def _modules(package: ModuleType) -> Iterator[ModuleType]:
-    for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-        yield import_module(info.name)
-
-
 def obeyed() -> set[str]:
     found: set[str] = set()
     for module in _HANDLERS:
@@ -80,14 +75,9 @@ def obeyed() -> set[str]:
         for node in (part for of in handlers if of.name.strip("_") == "handlers" for part in ast.walk(of)):
             if isinstance(node, ast.Attribute) and node.attr.startswith("MAV_CMD_"):
                 found.add(node.attr)
-        found |= {
-            str(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant) and _is_command(node.value)
-        }
+        texts = (str(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant))
+        found |= {text for text in texts if re.fullmatch("MAV_CMD_[A-Z0-9_]+", text)}
     return found
-
-
-def _is_command(value: object) -> bool:
-    return isinstance(value, str) and re.fullmatch("MAV_CMD_[A-Z0-9_]+", value) is not None
 
 
 PAGES = {"messages.md": lambda page: with_tables(page, tables())}
