@@ -97,5 +97,5 @@ def of_report(report: Mapping[str, Any], key: str) -> Any:
     """Return a number of a report, or the sum of a table."""
     found: Any = report
     for part in key.split("."):
-        found = None if found is None else found[part]
+        found = None if found is None else found.get(part)
     return sum(found.values()) if isinstance(found, dict) else found

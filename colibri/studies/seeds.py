@@ -31,15 +31,9 @@ _ERRORS = (
 NEES = "nees_mean"
 
 
-def _of_innovations(kind: str, figure: str) -> Metric:
-    return Metric(
-        f"nis_mean.{kind}.{figure}", lambda flight: (flight.report["nis_mean"] or {}).get(kind, {}).get(figure)
-    )
-
-
 METRICS = (
     *map(Metric, (*_ERRORS, NEES)),
-    *(_of_innovations(kind, figure) for kind in MEASURED for figure in ("mean", "innovations")),
+    *(Metric(f"nis_mean.{kind}.{figure}") for kind in MEASURED for figure in ("mean", "innovations")),
 )
 """After 20 s: RMS of one flight, m and degrees; mean NEES; by kind of measurement mean NIS over its degrees of freedom,
 and the number of innovations.

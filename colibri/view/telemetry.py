@@ -109,6 +109,7 @@ class Telemetry:
         """Return the known state; at the origin without a position."""
         now = self._now
         place = now.position_enu_m if all(map(isfinite, now.position_enu_m)) else (0.0, 0.0, 0.0)
+        volts = self._fresh("volts", now_s, nan)
         return Snapshot(
             time_s=0.0 if isnan(self._began_s) else now_s - self._began_s,
             position_enu_m=place,
@@ -121,7 +122,7 @@ class Telemetry:
             wind_enu_m_s=self._fresh("wind", now_s, NOWHERE),
             mode=self._fresh("mode", now_s, "no heartbeat"),
             armed=self._fresh("armed", now_s, None),
-            battery=self._battery(now_s),
+            battery="" if isnan(volts) else f"{volts:.2f} V",
             texts=tuple(self._texts),
         )
 
@@ -163,10 +164,6 @@ class Telemetry:
         age_s = self._moved_s - said_s
         x, y, z = np.add(place, np.multiply(age_s, velocity)).tolist()
         return (x, y, z) if age_s < _STALE_S else NOWHERE
-
-    def _battery(self, now_s: float) -> str:
-        volts = self._fresh("volts", now_s, nan)
-        return "" if isnan(volts) else f"{volts:.2f} V"
 
     def _moved(self, place: Vector, velocity: Vector, now_s: float) -> None:
         self._now = replace(self._now, position_enu_m=place, velocity_enu_m_s=velocity)

@@ -50,7 +50,8 @@ class ControlPanel:
 
     def _add_player(self, gui: viser.GuiApi, span_s: tuple[float, float]) -> None:
         self._play = gui.add_button("Play")
-        self._slider = slider = gui.add_slider("Time, s", *_widened(span_s), 0.01, round(span_s[0], 2))
+        begin_s, end_s = (round(time_s, 2) for time_s in span_s)
+        self._slider = slider = gui.add_slider("Time, s", begin_s, max(end_s, begin_s + 0.01), 0.01, begin_s)
         speed = gui.add_button_group("Speed", SPEEDS)
         self._play.on_click(lambda _: self.done.put(Done("play")))
         slider.on_update(lambda event: self._by_hand(event, Done("seek", slider.value)))
@@ -103,8 +104,3 @@ def _of_one(name: str, colour: str, now: Snapshot) -> str:
 
 def _text(foreign: str) -> str:
     return escape("".join(letter if letter.isprintable() else "\ufffd" for letter in foreign))
-
-
-def _widened(span_s: tuple[float, float]) -> tuple[float, float]:
-    """Round the ends of the time line to 0.01 s, at least that far apart."""
-    return round(span_s[0], 2), max(round(span_s[1], 2), round(span_s[0], 2) + 0.01)

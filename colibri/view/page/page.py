@@ -29,14 +29,11 @@ class Page:
         self.server = server
         self.url = address(server)
         self.laid_out = False
-        self._set_up()
-
-    def _set_up(self) -> None:
-        gui, scene = self.server.gui, self.server.scene
+        gui, scene = server.gui, server.scene
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
-        around = [source.surroundings for source in self._sources]
+        around = [source.surroundings for source in sources]
         middle, extent_m = bounds([points for each in around for points in outline(each)])
-        live = self._sources[0].is_live
+        live = sources[0].is_live
         self._extent_m = max(extent_m, _LIVE_EXTENT_M if live else 0.0)
         self._ground_m = min(each.ground_m for each in around)
         self._world = scene.add_frame("/world", show_axes=False)
@@ -123,11 +120,11 @@ class Page:
         self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
-        CommandPanels(self.server, token, modes, self.controls.done, self._ground_point)
+        def point(origin: Vector, direction: Vector) -> Vector | None:
+            x, y, z = np.subtract(origin, self._world.position).tolist()
+            return ground_point((x, y, z), direction, self._ground_m)
 
-    def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
-        x, y, z = np.subtract(origin, self._world.position).tolist()
-        return ground_point((x, y, z), direction, self._ground_m)
+        CommandPanels(self.server, token, modes, self.controls.done, point)
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
         """Return an animation of the scene, which works without a server."""

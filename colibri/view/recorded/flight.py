@@ -96,6 +96,7 @@ class RecordedFlight:
         first = int(np.searchsorted(times_s, at_s - _TRAIL_S))
         trail = np.vstack([thinned(self._place[first:row], _TRAIL_POINTS), place])
         estimate, sigma = self._estimated(at_s)
+        volts = float(truth.at(at_s, "voltage_v")[0])
         return Snapshot(
             time_s=at_s,
             position_enu_m=_vector(place),
@@ -110,8 +111,8 @@ class RecordedFlight:
             sigma_m=sigma,
             mode=f"track {self.plan.spec.track}, {self.plan.profile.controller}",
             armed=True,
-            battery=_battery(float(truth.at(at_s, "voltage_v")[0])),
-            texts=self._said(at_s),
+            battery="" if np.isnan(volts) else f"{volts:.2f} V",
+            texts=tuple(text for said_s, text in self._events if said_s <= at_s)[-_EVENTS:][::-1],
         )
 
     def charts(self) -> tuple[Chart, ...]:
@@ -161,10 +162,6 @@ class RecordedFlight:
         estimate = self._estimate
         return _vector(estimate.at(time_s, "x", "y", "z")), _vector(estimate.at(time_s, "sd_x", "sd_y", "sd_z"))
 
-    def _said(self, time_s: float) -> tuple[str, ...]:
-        until = [text for at_s, text in self._events if at_s <= time_s]
-        return tuple(until[-_EVENTS:][::-1])
-
 
 def airframe_of(vehicle: Vehicle) -> VehicleShape:
     foot_m = vehicle.ground.foot_depth_m if vehicle.ground else 0.0
@@ -213,12 +210,9 @@ def _events(decisions: LogColumns) -> list[tuple[float, str]]:
         codes = decisions.named[column].astype(int)
         for row in np.flatnonzero(np.diff(codes, prepend=codes[:1])).tolist():
             time_s = float(decisions.times_s[row])
-            events.append((time_s, f"{time_s:.2f} s: {said} {_word(names.get(int(codes[row]), codes[row]))}"))
+            name: object = names.get(int(codes[row]), codes[row])
+            events.append((time_s, f"{time_s:.2f} s: {said} {getattr(name, 'value', name)}".replace("_", " ")))
     return sorted(events)
-
-
-def _word(what: object) -> str:
-    return str(getattr(what, "value", what)).replace("_", " ")
 
 
 def _between(times_s: Array, rows: Array, time_s: float) -> Array:
@@ -239,7 +233,3 @@ def _tilt_deg(quaternions: Array) -> Array:
 def _vector(values: Array) -> tuple[float, float, float]:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def _battery(voltage_v: float) -> str:
-    return "" if np.isnan(voltage_v) else f"{voltage_v:.2f} V"
