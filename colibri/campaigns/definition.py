@@ -141,12 +141,10 @@ class Campaign(NamedTuple):
     def values(self, option: str) -> Iterator[Any]:
         """Yield the values of an option, without continuous draws."""
         draw = self.draw.get(option)
-        yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
+        levels = (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
+        yield from (each[option] for each in (self.fly, *levels) if option in each)
         yield from (each for each in self.grid.get(option, ()) if not isinstance(each, Level))
         yield from draw.values if isinstance(draw, Choice) else ()
-
-    def _levels(self) -> Iterator[dict[str, Any]]:
-        return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
         if not self.draw:
@@ -188,7 +186,12 @@ def campaign_of(tables: CampaignTables) -> Campaign:
         metrics=() if tables.metrics is None else read_metrics(tables.metrics),
         logs=tables.logs,
         fly=_named(tables.fly, *OF_ALL),
-        grid={name: _values(name, values) for name, values in _named(tables.grid).items()},
+        grid={
+            name: tuple(Level(str(level), _named(settings)) for level, settings in values.items())
+            if has_levels(values)
+            else read_values(name, values)
+            for name, values in _named(tables.grid).items()
+        },
         draw={name: read_draw(name, given) for name, given in _named(tables.draw).items()},
     )
     if tables.metrics is None:
@@ -221,12 +224,6 @@ def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
     if twice := first_twice(names):
         raise CampaignError(f"{twice} is given twice, under two names")
     return dict(zip(names, given.values(), strict=True))
-
-
-def _values(name: str, given: Any) -> tuple[Any, ...]:
-    if has_levels(given):
-        return tuple(Level(str(level), _named(settings)) for level, settings in given.items())
-    return read_values(name, given)
 
 
 def _check_names(planned: Campaign) -> None:

@@ -249,13 +249,12 @@ def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> 
     for factor, value in factors.items():
         key = key_of(factor)
         if key is not None and key.table == table:
-            to = _scaled(_had(changed, key.key), value, factor) if key.scaled else value
-            changed = changed.replace(key.key, to)
+            if key.scaled:
+                of_profile = isinstance(changed, Profile)
+                had = changed.value(key.key) if of_profile else value_at(changed, key.key, VehicleError)
+                value = _scaled(had, value, factor)
+            changed = changed.replace(key.key, value)
     return changed
-
-
-def _had(of: Profile | Vehicle, key: str) -> Any:
-    return of.value(key) if isinstance(of, Profile) else value_at(of, key, VehicleError)
 
 
 def _scaled(had: Any, by: Any, factor: str) -> Any:

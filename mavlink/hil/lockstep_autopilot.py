@@ -74,13 +74,16 @@ class AutopilotEnd:
             elif message.name == "COMMAND_ACK" and message.fields.command == INJECT_FAILURE:
                 results.append(decode_result(message))
             elif message.name == "COMMAND_ACK":
-                self._receive_ack(message)
+                number, result = message.fields.command, message.fields.result
+                refused = number == dialect.CMD_SET_MESSAGE_INTERVAL and result != dialect.RESULT_ACCEPTED
+                self.refused = result if refused else None
             elif message.name == "BATTERY_STATUS":
                 battery = decode_battery(message)
             elif message.name == "NAMED_VALUE_INT":
                 delay_us = decode_delay(message)
             elif message.name == "HEARTBEAT":
-                self._receive_mode(message, now_s)
+                if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
+                    self._runs_freely = message.fields.custom_mode == FREE_RUNNING
             else:
                 self.dropped["unexpected"] += 1
         if not parts:
@@ -149,15 +152,6 @@ class AutopilotEnd:
 
     def _follows(self, time_us: int, before_us: int) -> bool:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
-
-    def _receive_mode(self, heartbeat: Message, now_s: float) -> None:
-        if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
-            self._runs_freely = heartbeat.fields.custom_mode == FREE_RUNNING
-
-    def _receive_ack(self, message: Message) -> None:
-        fields = message.fields
-        refused = fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.result != dialect.RESULT_ACCEPTED
-        self.refused = fields.result if refused else None
 
     def _call(self) -> bytes:
         request = self._codec.encode(

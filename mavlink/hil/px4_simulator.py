@@ -99,7 +99,8 @@ class SimulatorEnd:
                 self.received.append(datagram)
                 return
         for message in self._codec.decode(datagram):
-            if message.name in _BEGINNING and (self.peer is None or (sender != self.peer and self._is_given_up())):
+            given_up = self._answered_s is not None and self._now_s - self._answered_s >= GIVEN_UP_AFTER_S
+            if message.name in _BEGINNING and (self.peer is None or (sender != self.peer and given_up)):
                 self._begin(sender, message)
             if sender != self.peer:
                 self.dropped["second autopilot" if self.peer else "not begun"] += 1
@@ -131,9 +132,6 @@ class SimulatorEnd:
     def take_outbox(self) -> list[tuple[tuple[bytes, ...], Address]]:
         outbox, self._outbox = self._outbox, []
         return outbox
-
-    def _is_given_up(self) -> bool:
-        return self._answered_s is not None and self._now_s - self._answered_s >= GIVEN_UP_AFTER_S
 
     def _send(self, now_s: float) -> None:
         self._now_s = now_s

@@ -139,7 +139,7 @@ class MissionService:
         sends += self._explained(self._uploads.poll(now_us))
         if progress != self._shown or now_us >= self._stream_us:
             self._stream_us = now_us + STREAM_EVERY_US
-            sends.append(self._current())
+            sends.append(to_all("MISSION_CURRENT", *self.current()))
         self._shown = progress
         self._due_us = min(self._stream_us, self._uploads.due_us)
         return sends
@@ -182,9 +182,6 @@ class MissionService:
 
     def _announce(self) -> None:
         self._stream_us = self._due_us = 0
-
-    def _current(self) -> Send:
-        return to_all("MISSION_CURRENT", *self.current())
 
     def _count(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         if fields.mission_type not in PLAN_TYPES:

@@ -41,7 +41,8 @@ class ParameterService:
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "PARAM_REQUEST_LIST":
-            self._begin_list(peer, now_us)
+            listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
+            listing.left = len(self._parameters)
             return ()
         if message.name == "PARAM_REQUEST_READ":
             return self._read(fields.param_id, fields.param_index, peer)
@@ -65,10 +66,6 @@ class ParameterService:
             if refusal is not None:
                 yield _refuse(peer, name, index, refusal)
         yield self._value(index)
-
-    def _begin_list(self, peer: Peer, now_us: int) -> None:
-        listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
-        listing.left = len(self._parameters)
 
     def _go_on(self, channel: int, now_us: int) -> list[Send]:
         listing = self._listings[channel]

@@ -201,7 +201,8 @@ class Parameters:
         """Set validated values at once, without calling `prepare`."""
         for name, value in values.items():
             if value != self._values[name]:
-                self._change(name, value)
+                self._values[name] = value
+                self.revision += 1
 
     def reset(self) -> None:
         """Propose all defaults."""
@@ -211,10 +212,6 @@ class Parameters:
     def take_made(self) -> object | None:
         made, self._made = self._made, None
         return made
-
-    def _change(self, name: str, value: Value) -> None:
-        self._values[name] = value
-        self.revision += 1
 
 
 def float32(value: float) -> float:

@@ -53,7 +53,9 @@ class StreamService:
         self._telemetry = dict(telemetry)
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
-        self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_requested}
+        self._providers: dict[int, Provider] = {
+            mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: lambda asked: self._report_interval(asked.p2, asked.peer) or []
+        }
         self._schedule = Schedule()
         self._kinds: dict[int, str] = {}
         self._open: set[int] = set()
@@ -113,8 +115,8 @@ class StreamService:
     def handlers(self) -> dict[int, Handler]:
         commands: dict[int, Handler] = {
             mav.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
-            mav.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
-            mav.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            mav.MAV_CMD_GET_MESSAGE_INTERVAL: lambda command: self._report_interval(command.p1, command.peer),
+            mav.MAV_CMD_REQUEST_MESSAGE: lambda command: self._request(_whole(command.p1), command),
         }
         for command, name in _OLD_REQUESTS.items():
             commands[getattr(mav, command)] = self._request_of(name)
@@ -138,12 +140,6 @@ class StreamService:
             return Refusal(f"interval of {name} refused: {interval_us:g} is not within 1 to {MAX_INTERVAL_US} us")
         return None
 
-    def _get_message_interval(self, command: ReceivedCommand) -> Refusal | None:
-        return self._report_interval(command.p1, command.peer)
-
-    def _interval_requested(self, command: ReceivedCommand) -> list[Send] | Refusal:
-        return self._report_interval(command.p2, command.peer) or []
-
     def _report_interval(self, asked: float, peer: Peer) -> Refusal | None:
         message_id = _whole(asked)
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
@@ -155,9 +151,6 @@ class StreamService:
         else:
             return Refusal(f"no interval: {_named(message_id, asked)} is not streamed", UNSUPPORTED)
         return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
-
-    def _request_message(self, command: ReceivedCommand) -> Refusal | None:
-        return self._request(_whole(command.p1), command)
 
     def _request_of(self, name: str) -> Handler:
         message_id = _message_id(name)
