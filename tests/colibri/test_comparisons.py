@@ -1,5 +1,3 @@
-"""`colibri figures` and `colibri compare`."""
-
 import csv
 import json
 import struct

@@ -1,5 +1,3 @@
-"""The figures of a flight: the files, and that what they draw is what was flown."""
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,5 +1,3 @@
-"""`colibri sitl`: what it refuses, how it ends, and what it shows."""
-
 import os
 import signal
 import subprocess

@@ -1,5 +1,3 @@
-"""Flights that are lost, and those whose numbers exceed a limit: said why and when, and not a success."""
-
 import json
 from dataclasses import replace
 from math import pi

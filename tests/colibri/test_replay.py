@@ -1,5 +1,3 @@
-"""`colibri replay`: recorded frames give the recorded commands again, and what does not is found and named."""
-
 import shutil
 import signal
 from pathlib import Path

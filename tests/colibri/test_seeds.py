@@ -1,5 +1,3 @@
-"""`colibri compare --seeds`: the same flights by many seeds."""
-
 import csv
 import re
 from collections.abc import Iterable, Iterator

@@ -1,5 +1,3 @@
-"""`colibri study`: what it flies, its tables and figures, and what bad input gets."""
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

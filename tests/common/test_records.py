@@ -1,5 +1,3 @@
-"""Records: named tuples of numbers, arrays and further named tuples, as kernels take them."""
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Rotations and the ENU/FLU ⇄ NED/FRD conversions."""
-
 from math import cos, pi, sin
 
 import numpy as np

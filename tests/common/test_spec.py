@@ -1,5 +1,3 @@
-"""Specifications: read from command lines, keywords and JSON, and back."""
-
 from argparse import Namespace
 from dataclasses import dataclass, field, fields, replace
 from math import inf

@@ -1,5 +1,3 @@
-"""Every scenario, flown."""
-
 from collections.abc import Callable
 
 import pytest

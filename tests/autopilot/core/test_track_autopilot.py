@@ -1,5 +1,3 @@
-"""The autopilot as a composition: when it decides, what it holds, how it begins."""
-
 from typing import Any
 
 import msgspec

@@ -1,5 +1,3 @@
-"""What people are told of the estimator's health."""
-
 from colibri.autopilot.estimation.estimate import Health
 from colibri.autopilot.estimation.health import HealthWatch, not_known
 from colibri.mavlink.services.statustext import INFO, WARNING

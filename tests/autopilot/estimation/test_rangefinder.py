@@ -1,5 +1,3 @@
-"""The rangefinder: on the wire, and the Jacobian by which the filter uses it."""
-
 from math import inf
 
 import numpy as np

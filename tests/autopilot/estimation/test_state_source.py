@@ -1,5 +1,3 @@
-"""Where frames of sensors become states: when a flight begins, and when it begins anew."""
-
 import pytest
 
 from colibri.autopilot.control.profile import load_profile

@@ -1,5 +1,3 @@
-"""From sticks and setpoints to a smooth attitude demand: where it goes, how fast, and never beyond its limits."""
-
 from math import acos, cos, degrees, nan, radians, sin
 from typing import Any
 

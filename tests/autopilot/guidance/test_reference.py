@@ -1,5 +1,3 @@
-"""The chain of integrators that leads the reference: its limits, that it arrives, and that it then is the target."""
-
 from math import hypot, pi, tau
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Which numbers are parameters, and what becomes of their values."""
-
 from dataclasses import fields
 from math import radians
 from typing import Any

@@ -1,5 +1,3 @@
-"""Changing the numbers of a control law while it flies."""
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""What is caught in flight is kept, and the process ends with 1."""
-
 from pathlib import Path
 
 import msgspec

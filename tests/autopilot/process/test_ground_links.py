@@ -1,5 +1,3 @@
-"""What a process hears of its links: in turn, and for no longer than it may."""
-
 from collections import Counter
 
 import pytest

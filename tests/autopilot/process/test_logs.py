@@ -1,5 +1,3 @@
-"""The autopilot's log: what stations send is recorded up to a limit."""
-
 import pytest
 
 from colibri.autopilot.core.step import Received

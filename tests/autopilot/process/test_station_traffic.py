@@ -1,5 +1,3 @@
-"""The frames of ground stations in `flight.tlog`."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""Whole campaigns: the same table by any number of processes, and after any interruption."""
-
 from pathlib import Path
 from typing import Any
 

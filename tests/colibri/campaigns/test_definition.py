@@ -1,5 +1,3 @@
-"""Which flights a campaign has, by which draws, and what cannot be one."""
-
 from itertools import product
 from pathlib import Path
 from typing import Any

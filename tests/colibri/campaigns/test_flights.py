@@ -1,5 +1,3 @@
-"""One flight of a campaign: its factors take effect, and whatever comes of it is a row."""
-
 import pickle
 from math import inf, nan
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Limits, JSON and JUnit XML of commands for continuous integration."""
-
 import json
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""What a campaign keeps: whole rows only, of this campaign only."""
-
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Factors of one's own, whose levels set several options and keys together."""
-
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""The tables and figures of campaigns."""
-
 import csv
 import sys
 from importlib import import_module

@@ -1,5 +1,3 @@
-"""Values of factors: spans, distributions, and what is neither."""
-
 from typing import Any
 
 import numpy as np

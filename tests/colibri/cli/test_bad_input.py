@@ -1,5 +1,3 @@
-"""What bad input gets: one line and an exit code."""
-
 import os
 import subprocess
 import sys

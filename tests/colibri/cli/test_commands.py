@@ -1,5 +1,3 @@
-"""What commands print, and what they leave."""
-
 import json
 import os
 import resource

@@ -1,5 +1,3 @@
-"""Files of any content: one clear line, an exit code, no traceback and no control characters."""
-
 import json
 import os
 import subprocess

@@ -1,5 +1,3 @@
-"""What the commands answer to input that they refuse: one line each, exit code 2, and not a flight folder."""
-
 import re
 import shlex
 from pathlib import Path

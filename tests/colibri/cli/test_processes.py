@@ -1,5 +1,3 @@
-"""The processes of a command: how they begin, how they are interrupted, and what ends with what."""
-
 import os
 import signal
 import subprocess

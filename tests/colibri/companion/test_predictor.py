@@ -1,5 +1,3 @@
-"""The state predicted from late, drifting and trembling ones."""
-
 import numpy as np
 import pytest
 from scipy.linalg import expm

@@ -1,5 +1,3 @@
-"""`colibri companion` as a command: bad input, and a vehicle over UDP."""
-
 import csv
 import json
 import signal

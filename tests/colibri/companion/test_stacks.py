@@ -1,5 +1,3 @@
-"""Flight stacks: which is recognised, and the thrust conventions of each."""
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,5 +1,3 @@
-"""The response model, its inverse, a fit of it, and the smooth start of a track."""
-
 from pathlib import Path
 
 import numpy as np

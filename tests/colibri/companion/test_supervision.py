@@ -1,5 +1,3 @@
-"""The table of phases, of limits and of checks: each row by itself."""
-
 from dataclasses import replace
 from math import inf, nan
 from pathlib import Path

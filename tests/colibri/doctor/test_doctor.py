@@ -1,5 +1,3 @@
-"""`colibri doctor`: what it finds on a computer that is well, and what it says of one that is not."""
-
 import os
 import socket
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-"""Fleets of the fixture: one simulated time, and places of their own."""
-
 import pytest
 
 from colibri.sitl.backends.setting import Setting, SettingError

@@ -1,5 +1,3 @@
-"""The figure of a flight that failed: what a reader must be able to see of it."""
-
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure

@@ -1,5 +1,3 @@
-"""Orders of the fixture: when they are done, and what is no order."""
-
 from typing import Any
 
 import pytest

@@ -1,5 +1,3 @@
-"""What a part of the autopilot raises in flight fails a test, unless it says that it may be replaced."""
-
 import pytest
 
 from colibri.autopilot.control.loop import ControlLoop

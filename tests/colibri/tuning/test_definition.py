@@ -1,5 +1,3 @@
-"""What is refused of a tuning, and what its trials fly."""
-
 from pathlib import Path
 from typing import Any
 

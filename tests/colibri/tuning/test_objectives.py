@@ -1,5 +1,3 @@
-"""Flights pooled to an objective: those that were lost count."""
-
 from typing import Any
 
 import pytest

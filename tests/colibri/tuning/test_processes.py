@@ -1,5 +1,3 @@
-"""A tuning that is killed, and one that two processes are at."""
-
 import json
 import subprocess
 import sys

@@ -1,5 +1,3 @@
-"""A tuned profile's file: with its comments, where it comes from, and read back as what was flown."""
-
 from pathlib import Path
 
 import pytest

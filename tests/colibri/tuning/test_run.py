@@ -1,5 +1,3 @@
-"""Whole tunings, in this process."""
-
 import sys
 from pathlib import Path
 from typing import Any

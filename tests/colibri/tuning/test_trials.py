@@ -1,5 +1,3 @@
-"""Trials in a journal: the same whoever goes on with them."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""Before and after, in pairs."""
-
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""`colibri verify --golden`: what differs is named, what does not fit the set is refused, and hashes are renewed."""
-
 import json
 from functools import partial
 from importlib.metadata import entry_points

@@ -1,5 +1,3 @@
-"""`colibri verify`: the same flights twice, and what is not the same."""
-
 from pathlib import Path
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""A flight beside its page: the same to the last bit, whatever browsers do."""
-
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack

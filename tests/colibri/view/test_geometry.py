@@ -1,5 +1,3 @@
-"""What is drawn: colours, arrows, outlines, where a click meets the ground."""
-
 from math import nan, pi
 
 import numpy as np

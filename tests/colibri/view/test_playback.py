@@ -1,5 +1,3 @@
-"""The clock of a recorded flight."""
-
 from colibri.view.recorded.playback import SPEEDS, Playback, speed_of
 
 

@@ -1,5 +1,3 @@
-"""A flight's folder as snapshots and charts."""
-
 from contextlib import ExitStack
 from pathlib import Path
 

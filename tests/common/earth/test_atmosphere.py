@@ -1,5 +1,3 @@
-"""The standard atmosphere: its tabulated values, and back."""
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,5 +1,3 @@
-"""Places on earth and metres from an origin: there and back, and what is known of a few."""
-
 from math import cos, inf, nan, radians
 
 import pytest

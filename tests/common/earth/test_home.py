@@ -1,5 +1,3 @@
-"""LAT,LON,ALT,YAW of the command line."""
-
 from argparse import ArgumentTypeError
 
 import pytest

@@ -1,5 +1,3 @@
-"""A folder that is written to by one flight at a time."""
-
 import subprocess
 import sys
 from pathlib import Path

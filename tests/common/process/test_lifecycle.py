@@ -1,5 +1,3 @@
-"""How a process loads, flies and ends, as far as the garbage collector goes."""
-
 import gc
 import subprocess
 import sys

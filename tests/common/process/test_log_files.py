@@ -1,5 +1,3 @@
-"""Log files: records that are whole, whatever end the process has."""
-
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager

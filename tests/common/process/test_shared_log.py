@@ -1,5 +1,3 @@
-"""A log of several processes: it begins once, goes on while anybody has it open, and is another one after that."""
-
 from pathlib import Path
 
 from colibri.common.process.shared_log import SharedLog, remove_unused

@@ -1,5 +1,3 @@
-"""The file of two slots: what was written last and whole is what it holds, whatever happened meanwhile."""
-
 import os
 from pathlib import Path
 

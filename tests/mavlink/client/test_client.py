@@ -1,5 +1,3 @@
-"""A client by itself: vehicles found and lost, whom it listens to, lanes, signatures."""
-
 from typing import Any
 
 from colibri.mavlink.client.client import LOST_AFTER_US, Client, ConversationEnded, VehicleFound, VehicleLost

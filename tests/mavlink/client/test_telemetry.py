@@ -1,5 +1,3 @@
-"""What a client reads of telemetry: the vehicle's clock, its states, its reports."""
-
 from random import Random
 from typing import Any
 

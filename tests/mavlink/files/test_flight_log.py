@@ -1,5 +1,3 @@
-"""Logs of flights: one each, numbered, of everything; the oldest go."""
-
 import pytest
 
 from colibri.mavlink.files.flight_log import WRITE_BYTES, WRITE_EVERY_US, FlightLog

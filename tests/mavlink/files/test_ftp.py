@@ -1,5 +1,3 @@
-"""File transfer: files and folders, sessions, lost answers, and questions that make no sense."""
-
 import random
 from zlib import crc32
 

@@ -1,5 +1,3 @@
-"""Logs: listed, downloaded in parts by several clients, erased."""
-
 import random
 from typing import Any
 

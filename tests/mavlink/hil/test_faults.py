@@ -1,5 +1,3 @@
-"""The vocabulary of faults: names, numbers, and what is refused, with words."""
-
 from math import inf, nan
 
 import pytest

@@ -1,5 +1,3 @@
-"""The lockstep conversation: silence, repetition, strangers, restarts, and what travels beside the frames."""
-
 import random
 from math import inf, nan
 

@@ -1,5 +1,3 @@
-"""The autopilot's end of PX4's simulator interface."""
-
 from dataclasses import replace
 
 import pytest

@@ -1,5 +1,3 @@
-"""The messages between plant and autopilot: round trips, and what cannot be flown on."""
-
 from math import inf, nan
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""UDP endpoints by URL."""
-
 import sys
 from collections.abc import Iterator
 from contextlib import closing

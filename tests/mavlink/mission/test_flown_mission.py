@@ -1,5 +1,3 @@
-"""The mission that is flown: the current item, progress, and a place to fly to now."""
-
 from math import inf, nan
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""The hub: who is heard, who is obeyed, what goes where."""
-
 from typing import Any
 
 import pytest

@@ -1,5 +1,3 @@
-"""The hub where messages are signed: who is heard then, and who may set it up."""
-
 from typing import Any
 
 import pytest

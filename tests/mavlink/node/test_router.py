@@ -1,5 +1,3 @@
-"""Routing between channels, as a table."""
-
 import pytest
 
 from colibri.mavlink.node.router import SOURCES, Router, Source, target_of

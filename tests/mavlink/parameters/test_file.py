@@ -1,5 +1,3 @@
-"""Parameter files."""
-
 from contextlib import suppress
 
 import pytest

@@ -1,5 +1,3 @@
-"""Component metadata: the message, the general file, the checksums of both files, and the schema of parameters."""
-
 import json
 from zlib import crc32
 

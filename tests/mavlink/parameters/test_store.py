@@ -1,5 +1,3 @@
-"""What a parameter may be, and what happens when it changes."""
-
 from collections.abc import Collection, Mapping
 from math import inf, nan
 

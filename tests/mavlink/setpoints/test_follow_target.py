@@ -1,5 +1,3 @@
-"""Follow-me: where the target is, how it goes on, and what is dropped."""
-
 from math import isfinite, nan
 from typing import Any
 

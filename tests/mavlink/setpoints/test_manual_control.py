@@ -1,5 +1,3 @@
-"""Manual control: sticks and channels, whose they are, and what is dropped."""
-
 from typing import Any
 
 import pytest

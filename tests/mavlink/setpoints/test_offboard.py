@@ -1,5 +1,3 @@
-"""Offboard setpoints: every frame and mask in ENU, whom they are taken from, and what is never flown."""
-
 from math import cos, degrees, isfinite, isnan, nan, pi, radians, sin
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Heartbeats: ours at 1 Hz and at once with news, the time of ground stations."""
-
 import pytest
 
 from colibri.mavlink.node.service import Peer, Send

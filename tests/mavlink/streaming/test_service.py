@@ -1,5 +1,3 @@
-"""Streams: rates that hold, on each channel its own, whatever is asked."""
-
 from collections import Counter
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Paths through waypoints that a vehicle can fly: above the floor, within its limits, smooth, else as they were."""
-
 from functools import cache
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Tracks as a vehicle will fly them, and those of other packages and of files of samples."""
-
 from math import inf, pi
 from pathlib import Path
 

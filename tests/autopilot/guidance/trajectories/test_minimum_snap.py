@@ -1,5 +1,3 @@
-"""Minimum snap: what it passes, how smooth it is, and that nothing is smoother."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

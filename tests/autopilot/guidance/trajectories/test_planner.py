@@ -1,5 +1,3 @@
-"""Tracks and how they are sampled."""
-
 from pathlib import Path
 
 import numpy as np

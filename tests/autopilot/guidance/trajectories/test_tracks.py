@@ -1,5 +1,3 @@
-"""Tracks by name and options, and where they are."""
-
 from contextlib import suppress
 from math import inf, pi
 

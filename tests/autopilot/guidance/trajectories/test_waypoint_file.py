@@ -1,5 +1,3 @@
-"""Waypoints from a file: what is read, and what is said of a file that cannot be flown."""
-
 from pathlib import Path
 
 import numpy as np

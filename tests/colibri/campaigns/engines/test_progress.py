@@ -1,5 +1,3 @@
-"""Jobs on every core, with a bar."""
-
 import os
 import signal
 from time import sleep
