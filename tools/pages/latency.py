@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.analysis.estimation import rms
 from colibri.analysis.figures import GRID
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
@@ -43,14 +44,6 @@ _ON_IT = {"x": 0.0, "y": 0.0, "z": 10.0, "vx": _SPEED_M_S, "vy": _SPEED_M_S}
 LEMNISCATE = LatencyCase("lemniscate", "lemniscate:height=10", _ON_IT, 20.0, 8.0)
 
 
-class Merit(NamedTuple):
-    """Quality of a flight, from `judged_from_s` on."""
-
-    rms_m: float
-    overshoot_m: float  # past the hover, along x
-    tilt_deg: float  # largest
-
-
 class LatencyFlight(NamedTuple):
     """A flight of the sweep; `told_ms` is the delay to compensate, `None` to measure it."""
 
@@ -61,13 +54,13 @@ class LatencyFlight(NamedTuple):
 
 
 class SweepPoint(NamedTuple):
-    """Both flights of a law at one round trip; `None` if the vehicle was lost."""
+    """RMS errors, m, of both flights of a law at one round trip; `None` if the vehicle was lost."""
 
     law: str
     way: str
     round_trip_ms: float
-    step: Merit | None
-    lemniscate: Merit | None
+    step: float | None
+    lemniscate: float | None
 
 
 WAYS = {
@@ -84,20 +77,17 @@ def told_ms(way: str, round_trip_ms: float) -> float | None:
     return None if told is None else max(told, 0.0)
 
 
-def merit(recording: Recording, case: LatencyCase) -> Merit | None:
+def merit(recording: Recording, case: LatencyCase) -> float | None:
+    """Return the RMS error from `judged_from_s` on, m; `None` of a lost vehicle."""
     error, t = recording.position_error_m, recording["t"]
     upright = np.cos(recording["phi"]) * np.cos(recording["theta"])
     judged = t >= case.judged_from_s
     if t[-1] < case.duration_s - 0.1 or error.max() > LOST_M or upright[judged].min() < 0.0:
         return None
-    return Merit(
-        rms_m=float(np.sqrt(np.mean(error[judged] ** 2))),
-        overshoot_m=float(max(0.0, -recording["x"].min())),
-        tilt_deg=float(np.degrees(np.arccos(np.clip(upright.min(), -1.0, 1.0)))),
-    )
+    return rms(error[judged])
 
 
-def fly(flight: LatencyFlight) -> Merit | None:
+def fly(flight: LatencyFlight) -> float | None:
     law, case, round_trip_ms, told = flight
     spec = FlightSpec.of(
         case.track,
@@ -134,18 +124,15 @@ def tables(points: Sequence[SweepPoint]) -> Iterator[str]:
         for way, name in WAYS.items():
             those = [point for point in points if point.law == law and point.way == way]
             well = _until(those, [_is_well(point, points) for point in those])
-            limits.append((name, well, _until(those, list(map(_is_kept, those)))))
+            kept = [point.step is not None and point.lemniscate is not None for point in those]
+            limits.append((name, well, _until(those, kept)))
         yield markdown(("compensation", "good up to", "not lost up to"), limits, names=1)
 
 
 def _row(points: Sequence[SweepPoint], law: str, ms: float) -> tuple[str, ...]:
     those = {point.way: point for point in points if point.law == law and point.round_trip_ms == ms}
-    steps, tracks = ([_cell(getattr(those[way], name)) for way in WAYS] for name in ("step", "lemniscate"))
-    return f"{ms:g}", *steps, *tracks
-
-
-def _is_kept(point: SweepPoint) -> bool:
-    return point.step is not None and point.lemniscate is not None
+    errors = [getattr(those[way], name) for name in ("step", "lemniscate") for way in WAYS]
+    return f"{ms:g}", *("lost" if error is None else f"{error:.2g}" for error in errors)
 
 
 def _is_well(point: SweepPoint, points: Sequence[SweepPoint]) -> bool:
@@ -154,16 +141,12 @@ def _is_well(point: SweepPoint, points: Sequence[SweepPoint]) -> bool:
     if point.step is None or point.lemniscate is None or first.step is None or first.lemniscate is None:
         return False
     both = (point.step, first.step), (point.lemniscate, first.lemniscate)
-    return all(flown.rms_m <= max(_SETTLED * at_once.rms_m, _WELL_M) for flown, at_once in both)
+    return all(flown <= max(_SETTLED * at_once, _WELL_M) for flown, at_once in both)
 
 
 def _until(points: Sequence[SweepPoint], well: Sequence[bool]) -> str:
     count = well.index(False) if False in well else len(well)
     return f"{points[count - 1].round_trip_ms:g} ms" if count else "none"
-
-
-def _cell(it: Merit | None) -> str:
-    return "lost" if it is None else f"{it.rms_m:.2g}"
 
 
 _COLORS = dict(zip(WAYS, ("#555555", "#0072B2", "#D55E00", "#009E73"), strict=True))
@@ -180,7 +163,7 @@ def draw(points: Sequence[SweepPoint], path: Path) -> None:
             axes = grid[row][column]
             for height, way in enumerate(WAYS):
                 those = [(p.round_trip_ms, getattr(p, name)) for p in points if (p.law, p.way) == (law, way)]
-                flown = [(ms, max(it.rms_m, _FLOOR_M)) for ms, it in those if it is not None]
+                flown = [(ms, max(it, _FLOOR_M)) for ms, it in those if it is not None]
                 lost = [ms for ms, it in those if it is None]
                 style = {"ms": 4, "color": _COLORS[way], "label": WAYS[way]}
                 axes.plot(*zip(*flown, strict=True), "o-", **style) if flown else None

@@ -18,7 +18,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.flights.spec import FlightSpec
 from tools.harness.processes import Process, running
 from tools.harness.relay import Relay
-from tools.pages.latency import LEMNISCATE, STEP, LatencyCase, Merit, merit
+from tools.pages.latency import LEMNISCATE, STEP, LatencyCase, merit
 
 _LOOK_EVERY_S = 0.0002
 
@@ -43,7 +43,7 @@ class DelayRelay(Relay):
             sleep(_LOOK_EVERY_S)
 
 
-def fly(case: LatencyCase, round_trip_ms: float, speed: float) -> tuple[Merit | None, float]:
+def fly(case: LatencyCase, round_trip_ms: float, speed: float) -> tuple[float | None, float]:
     """Fly a case; return how it went, and the mean round trip that the plant has measured, ms."""
     with TemporaryDirectory() as temporary:
         logs, out = Path(temporary) / "logs", Path(temporary) / "flight"
@@ -77,7 +77,8 @@ def main() -> int:
     for round_trip_ms in round_trips_ms:
         for case in (STEP, LEMNISCATE):
             went, measured_ms = fly(case, round_trip_ms, speed)
-            sys.stdout.write(f"{round_trip_ms:g} ms, measured {measured_ms:.1f} ms, {case.name}: {went or 'lost'}\n")
+            words = "lost" if went is None else f"{went:.3g} m, RMS"
+            sys.stdout.write(f"{round_trip_ms:g} ms, measured {measured_ms:.1f} ms, {case.name}: {words}\n")
             sys.stdout.flush()
     return 0
 
