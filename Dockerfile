@@ -10,7 +10,6 @@ COPY --from=build /wheels /wheels
 RUN pip install --no-cache-dir /wheels/*.whl
 USER 1000
 WORKDIR /home/pilot
-ENV NUMBA_CACHE_DIR=/home/pilot/machine-code
 RUN colibri compile --quiet
 ENTRYPOINT ["colibri"]
 CMD ["sitl"]

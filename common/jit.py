@@ -116,6 +116,6 @@ class _Compiling(Listener):
 
 def _kernel(function: Callable[..., Any], *, forceinline: bool = False) -> Any:
     kernel: Any = njit(error_model="numpy", forceinline=forceinline)(function)
-    machine_code = kernel._cache = MachineCode(function)  # noqa: SLF001
+    machine_code = kernel._cache = MachineCode(kernel)  # noqa: SLF001
     kernel.compile = machine_code.in_turn(kernel.compile)
     return kernel

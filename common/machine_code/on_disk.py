@@ -1,20 +1,19 @@
-"""numba's cache of machine code in a folder, renewed when a source file changes."""
+"""numba's cache of machine code in the user's cache folder, by the content that it was compiled from."""
 
 import os
 import sys
 from collections.abc import Callable
-from functools import cache, cached_property
-from hashlib import sha256
+from contextlib import suppress
+from functools import cache, cached_property, partial
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
-import llvmlite
-import numba
 from numba.core import config
 from numba.core.caching import FunctionCache, NullCache
+from numba.misc.appdirs import user_cache_dir
 
 from colibri.common.machine_code import results
+from colibri.common.machine_code.content import fields_of, key_of
 from colibri.common.machine_code.private_folder import private_folder
 from colibri.common.machine_code.turns import Turn
 
@@ -23,24 +22,29 @@ _NOWHERE = (
     "colibri: machine code can be kept nowhere, so each start compiles for half a minute and more; "
     "NUMBA_CACHE_DIR=FOLDER names a folder for it\n"
 )
+_KEPT_UNUSED_S = 60 * 86400.0
 
 
 class MachineCode:
     """The machine code of one kernel, located on first use: most kernels are part of their callers' code."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, kernel: Any) -> None:
+        self._kernel = kernel
         self._turns: list[Turn] = []
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load machine code; without any, wait for a process that compiles it, or take the turn to do so."""
+        for kept in (self._cache, *self._read_only):
+            found = kept.load_overload(sig, target_context)
+            if found is not None:
+                return found
+        if not isinstance(self._cache, _OnDisk):
+            return None
+        turn = Turn(self._cache.lock_file(), _report_waiting)
+        self._turns.append(turn)
         found = self._cache.load_overload(sig, target_context)
-        if found is None and isinstance(self._cache, _OnDisk):
-            turn = Turn(self._cache.lock_file(), _report_waiting)
-            self._turns.append(turn)
-            found = self._cache.load_overload(sig, target_context)
-            if found is None:
-                turn.hold_signals()
+        if found is None:
+            turn.hold_signals()
         return found
 
     def in_turn(self, compile_for: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -65,30 +69,46 @@ class MachineCode:
 
     @cached_property
     def _cache(self) -> Any:
+        folder = next(filter(_can_be_written, folders()), None)
+        if folder is None:
+            _report_nowhere()
+        return NullCache() if folder is None else self._within(folder)
+
+    @cached_property
+    def _read_only(self) -> list[Any]:
+        """Folders that cannot be written to, as those of a container's image."""
+        return [self._within(folder) for folder in folders() if folder.is_dir() and not _can_be_written(folder)]
+
+    def _within(self, folder: Path) -> Any:
         try:
-            return _OnDisk(self._function)
-        except RuntimeError:  # neither the folder of its file nor the home can be written to
-            return _OnDisk(self._function) if _use_private_folder() else NullCache()
+            return _OnDisk(self._kernel.py_func, folder, key_of(self._kernel))
+        except OSError:  # its source is not known
+            return NullCache()
 
 
 class _OnDisk(FunctionCache):
-    _impl_class = results.Results
-
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
+        self._impl_class = partial(results.Results, folder=folder, key=key)  # type: ignore[assignment]
         super().__init__(function)
-        files = map(hash_of, files_of(function) | {results.__file__})
-        # The version is compared before the rest is read, which fails where it names a type that has gone since.
-        version = (numba.__version__, llvmlite.__version__, *sorted(files))
-        self._cache_file._version = self._cache_file._source_stamp = self._impl.version = version  # noqa: SLF001
 
     def lock_file(self) -> Path:
         """Return the file that is locked during compilation."""
-        self._impl.locator.ensure_cache_path()
         return Path(self._cache_file._index_path).with_suffix(".lock")  # noqa: SLF001
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        with self._guard_against_spurious_io_errors():
+        try:
             return self._load_overload(sig, target_context)
+        except (AttributeError, ImportError):  # it names a type that has gone since
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        super().save_overload(sig, data)
+        self._impl.drop_unused(_KEPT_UNUSED_S)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (*super()._index_key(sig, codegen), fields_of(sig))
 
 
 waiting: list[Callable[[], object]] = []
@@ -100,33 +120,22 @@ def _report_waiting() -> None:
         report()
 
 
-@cache
-def _use_private_folder() -> bool:
-    folder = private_folder()
-    if folder is not None:
-        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]
-    elif not os.environ.get(_SAID):
+def _report_nowhere() -> None:
+    if not any(folder.is_dir() for folder in folders()) and not os.environ.get(_SAID):
         os.environ[_SAID] = "1"
         sys.stderr.write(_NOWHERE)
-    return folder is not None
-
-
-def files_of(function: Callable[..., Any]) -> set[str]:
-    """Return the files of a function and of the functions it calls by global name."""
-    files: set[str] = set()
-    seen: set[Any] = set()
-    waiting: list[Any] = [function]
-    while waiting:
-        it = waiting.pop()
-        it = getattr(it, "py_func", it)
-        if not isinstance(it, FunctionType) or it in seen:
-            continue
-        seen.add(it)
-        files.add(it.__code__.co_filename)
-        waiting += [it.__globals__.get(name) for name in it.__code__.co_names]
-    return files
 
 
 @cache
-def hash_of(file: str) -> str:
-    return sha256(Path(file).read_bytes()).hexdigest()
+def folders() -> list[Path]:
+    """Return the folders for machine code, the best first."""
+    private = private_folder()
+    named = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []  # type: ignore[attr-defined]
+    return [*named, Path(user_cache_dir("colibri", False)) / "kernels", *([private / "kernels"] if private else [])]
+
+
+@cache
+def _can_be_written(folder: Path) -> bool:
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    return os.access(folder, os.R_OK | os.W_OK | os.X_OK)

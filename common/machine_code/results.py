@@ -4,11 +4,15 @@ numba itself imports its compiler and SciPy before it loads the first kernel, an
 compilation of a caller needs.
 """
 
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
+from glob import escape
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from llvmlite.binding import add_symbol, address_of_symbol, parse_bitcode
-from numba.core.caching import CompileResultCacheImpl
+from numba.core.caching import CompileResultCacheImpl, _CacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
 from numba.core.environment import Environment
@@ -31,25 +35,50 @@ class _Kept(NamedTuple):
     signature: Any
 
 
+class _Place(_CacheLocator):
+    def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
+        self._py_file = function.__code__.co_filename  # which numba's warnings name
+        self._folder = folder
+        self._key = key
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        return self._key
+
+    def get_disambiguator(self) -> str:
+        return self._key
+
+
 class Results(CompileResultCacheImpl):
-    """Writer and reader of compilation results for numba.
+    """Writer and reader of compilation results for numba, in a folder and under a key."""
 
-    `version` is stored with each result: two versions that write at once may mix index and result.
-    """
+    def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Place(function, folder, key)
+        self._prefix = f"{function.__module__}.{function.__qualname__}-".replace("<", "").replace(">", "")
+        self._filename_base = self._prefix + key
 
-    version: tuple[str, ...] = ()
+    def drop_unused(self, for_s: float) -> None:
+        """Delete files of this kernel's other versions that were not read for this time before the last one written."""
+        status = {}
+        for file in Path(self._locator.get_cache_path()).glob(f"{escape(self._prefix)}*"):
+            with suppress(OSError):
+                status[file] = file.stat()
+        now_s = max((it.st_mtime for it in status.values()), default=0.0)
+        for file, it in status.items():
+            if max(it.st_atime, it.st_mtime) < now_s - for_s:
+                file.unlink(missing_ok=True)
 
     def reduce(self, cres: Any) -> Any:
-        return self.version, self._kept(cres)
+        return self._kept(cres)
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        if payload[0] != self.version:
-            return None
-        kept = payload[1]
-        if isinstance(kept, _Kept):
-            return _loaded(target_context, kept)
+        if isinstance(payload, _Kept):
+            return _loaded(target_context, payload)
         target_context.refresh()
-        return super().rebuild(target_context, kept)
+        return super().rebuild(target_context, payload)
 
     def _kept(self, cres: Any) -> Any:
         whole = super().reduce(cres)

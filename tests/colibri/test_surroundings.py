@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from colibri.common.machine_code.on_disk import folders
+
 
 @pytest.mark.parametrize("options", [("--version",), ("show", "profile", "flight")])
 def test_output_that_takes_no_more_is_one_line(options: tuple[str, ...]) -> None:
@@ -34,7 +36,7 @@ def test_a_home_that_cannot_be_written_to_is_not_spoken_of(tmp_path: Path) -> No
     unset = {name: value for name, value in os.environ.items() if name not in ("MPLCONFIGDIR", "XDG_CONFIG_HOME")}
     options = ("--link", "memory", "--duration", "0.5", "--out", str(tmp_path / "out"), "--quiet")
     command = [sys.executable, "-m", "colibri", "fly", "hover", *options]
-    there = {"HOME": str(home), "TMPDIR": str(temporary)}
+    there = {"HOME": str(home), "TMPDIR": str(temporary), "NUMBA_CACHE_DIR": str(folders()[0])}
     done = subprocess.run(command, env={**unset, **there}, capture_output=True, text=True, check=True)
     assert str(home) not in done.stderr  # on a slow computer it says that it looks for fonts
     assert "temporary cache directory" not in done.stderr

@@ -18,8 +18,8 @@ from numba.core.registry import CPUDispatcher
 
 from colibri import autopilot, common, mavlink, plant
 from colibri.common.machine_code import on_disk
+from colibri.common.machine_code.content import functions_of, key_of
 from colibri.common.machine_code.interpretation import interpret_while_waiting
-from colibri.common.machine_code.on_disk import files_of
 from colibri.common.machine_code.turns import Turn
 
 MODULES = [
@@ -77,13 +77,68 @@ def test_kernels_are_exact_and_cached_on_disk(kernel: Dispatcher) -> None:
 
 
 def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
-    names = {Path(file).name for file in files_of(KERNELS["colibri.plant.physics.integrators.runge_kutta_4"])}
+    functions = functions_of(KERNELS["colibri.plant.physics.integrators.runge_kutta_4"])
+    names = {Path(it.__code__.co_filename).name for it in functions}
     assert names == {"integrators.py", "equations.py", "matrices.py", "rotations.py"}
+
+
+KEYED = """
+from elsewhere import LIMIT, Pair, TABLE
+from numba import njit
+
+@njit(error_model="numpy")
+def inner(x):
+    return x + 1.0
+
+def made(factor):
+    @njit(error_model="numpy")
+    def kernel(x, by=2.0):
+        return Pair(inner(x) * LIMIT, [TABLE[1] * by for _ in range(3)][0]).first * factor
+    return kernel
+"""
+ELSEWHERE = """
+from typing import NamedTuple
+import numpy as np
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+LIMIT = 3.0
+TABLE = np.array([1.0, 2.0])
+"""
+
+
+def _key(folder: Path, monkeypatch: pytest.MonkeyPatch, keyed: str, elsewhere: str, factor: float) -> str:
+    folder.mkdir(parents=True)
+    (folder / "keyed.py").write_text(keyed)
+    (folder / "elsewhere.py").write_text(elsewhere)
+    monkeypatch.syspath_prepend(folder)
+    for name in ("keyed", "elsewhere"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return key_of(importlib.import_module("keyed").made(factor))
+
+
+def test_the_key_of_machine_code_is_its_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases = {
+        "same": (KEYED, ELSEWHERE, 1.0),
+        "same, at another path": (KEYED, ELSEWHERE, 1.0),
+        "source": (KEYED.replace("x + 1.0", "x + 2.0"), ELSEWHERE, 1.0),
+        "option": (KEYED.replace("numpy", "python"), ELSEWHERE, 1.0),
+        "closure": (KEYED, ELSEWHERE, 2.0),
+        "constant elsewhere": (KEYED, ELSEWHERE.replace("3.0", "4.0"), 1.0),
+        "array elsewhere": (KEYED, ELSEWHERE.replace("1.0, 2.0", "1.0, 3.0"), 1.0),
+        "fields elsewhere": (KEYED, ELSEWHERE.replace("first", "third"), 1.0),
+    }
+    keys = [_key(tmp_path / str(n), monkeypatch, *case) for n, case in enumerate(cases.values())]
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == len(cases) - 1
 
 
 def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(folder), str(Path(common.__path__[0]).parents[1])])
-    usual = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
+    cache = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(folder / "cache")}
+    usual = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **cache}
     command = [sys.executable, str(folder / "caller.py"), *words]
     done = {**os.environ, **usual, **environment}
     return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
@@ -107,7 +162,6 @@ def test_machine_code_is_renewed_with_callees_and_types(tmp_path: Path) -> None:
 @pytest.mark.parametrize("trusted", [True, False], ids=["private", "open to others"])
 def test_machine_code_needs_a_private_writable_folder(tmp_path: Path, *, trusted: bool) -> None:
     _write(tmp_path, 2.0)
-    (tmp_path / "__pycache__").touch()  # no folder can be made of this name, by root neither
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     private = temporary / f"colibri-{os.getuid()}"
@@ -135,6 +189,7 @@ def _unseen(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     (folder / "unseen.py").write_text(text)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "unseen", raising=False)
+    monkeypatch.setattr(on_disk, "folders", lambda: [folder / "cache"])
     return importlib.import_module("unseen").tripled
 
 
@@ -167,11 +222,12 @@ def test_one_process_compiles_while_others_wait(tmp_path: Path, monkeypatch: pyt
 
 def test_a_kernel_is_interpreted_while_another_compiles_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = "from colibri.common.jit import compiled\n\n@compiled\ndef reciprocal(of):\n    return 1.0 / of[0].value\n"
-    (tmp_path / "elsewhere.py").write_text(text)
+    (tmp_path / "apart.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(on_disk, "folders", lambda: [tmp_path / "cache"])
     monkeypatch.setattr(on_disk, "waiting", [])
     monkeypatch.setattr(CPUDispatcher, "__call__", CPUDispatcher.__call__)  # restored by monkeypatch
-    kernel = importlib.import_module("elsewhere").reciprocal
+    kernel = importlib.import_module("apart").reciprocal
     argument = np.array([(4.0,)], dtype=[("value", "f8")])
     interpret_while_waiting()
     other = Turn(kernel._cache.lock_file(), lambda: None)  # noqa: SLF001

@@ -1,6 +1,5 @@
 """What is built of this repository, and environments to install it in without a network."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,17 +16,6 @@ def build(kind: str, folder: Path, source: Path = ROOT) -> Path:
     return built
 
 
-def keep_compiled(site: Path) -> None:
-    """Have the kernels of the installed sources loaded from where those of the repository are kept."""
-    for source in site.glob("colibri/**/*.py"):
-        here = ROOT / source.relative_to(site)
-        if here.exists() and here.read_bytes() == source.read_bytes():
-            shutil.copystat(here, source)
-            for kernel in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
-                (source.parent / "__pycache__").mkdir(exist_ok=True)
-                shutil.copy2(kernel, source.parent / "__pycache__")
-
-
 def environment(folder: Path, *what: str) -> Path:
     """Return the `bin` of a new environment with `what` pip shall install, and whatever this one has besides."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
@@ -36,5 +24,4 @@ def environment(folder: Path, *what: str) -> Path:
     pip = [sys.executable, "-m", "pip", "--python", str(folder / "bin" / "python"), "install", "--quiet"]
     options = ("--disable-pip-version-check", "--no-deps", "--no-index", "--no-compile", "--no-build-isolation")
     subprocess.run([*pip, *options, "--ignore-installed", *what], check=True)
-    keep_compiled(site)
     return folder / "bin"

@@ -14,7 +14,7 @@ import pytest
 
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
-from tests.support.installs import ROOT, build, keep_compiled
+from tests.support.installs import ROOT, build
 
 pytest_plugins = ["pytester"]
 
@@ -284,7 +284,6 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path, link: str) ->
     (stranger / "test_delivery.py").write_text(first_test(), encoding="utf-8")
     with ZipFile(build("wheel", tmp_path)) as wheel:
         wheel.extractall(site)
-    keep_compiled(site)
     environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONSAFEPATH": "1"}
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--sitl-link", link, "-q"]
     result = subprocess.run(command, cwd=stranger, env=environment, capture_output=True, text=True, check=False)
