@@ -117,16 +117,12 @@ _CPU_INFO = Path("/proc/cpuinfo")
 
 
 def machine_code() -> Finding:
-    from colibri.common.machine_code.on_disk import MachineCode
-    from colibri.common.rotations import rotation_matrix
+    from colibri.common.machine_code.on_disk import folder_to_write
 
-    folder = MachineCode(rotation_matrix).cache_path
+    folder = folder_to_write()
     if folder is None:
         advice = "name a folder: NUMBA_CACHE_DIR=FOLDER"
         return Finding("machine code", Severity.NOTE, "cannot be cached: each start compiles again", advice)
-    if not os.access(folder, os.W_OK):
-        advice = "make it so, or name another: NUMBA_CACHE_DIR=FOLDER"
-        return Finding("machine code", Severity.NOTE, f"{folder} cannot be written to", advice)
     return Finding("machine code", Severity.FINE, f"kept in {folder}")
 
 

@@ -69,7 +69,7 @@ class MachineCode:
 
     @cached_property
     def _cache(self) -> Any:
-        folder = next(filter(_can_be_written, folders()), None)
+        folder = folder_to_write()
         if folder is None:
             _report_nowhere()
         return NullCache() if folder is None else self._within(folder)
@@ -132,6 +132,11 @@ def folders() -> list[Path]:
     private = private_folder()
     named = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []  # type: ignore[attr-defined]
     return [*named, Path(user_cache_dir("colibri", False)) / "kernels", *([private / "kernels"] if private else [])]
+
+
+def folder_to_write() -> Path | None:
+    """Return the folder that new machine code goes to."""
+    return next(filter(_can_be_written, folders()), None)
 
 
 @cache

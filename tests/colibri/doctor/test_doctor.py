@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from colibri.cli.main import main
-from colibri.common.machine_code.on_disk import MachineCode
+from colibri.common.machine_code import on_disk
 from colibri.doctor import checks as flying
 from colibri.doctor import checks as network
 from colibri.doctor import checks as packages
@@ -92,7 +92,7 @@ def test_the_way_out_of_a_container_is_the_default_gateway(tmp_path: Path, monke
 
 
 def test_a_folder_for_machine_code_that_is_none_is_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(MachineCode, "cache_path", None, raising=False)
+    monkeypatch.setattr(on_disk, "folders", list)
     found = flying.machine_code()
     assert (found.verdict, found.advice) == (Severity.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
 
