@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from colibri.analysis.logs import RecordingError, Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.common.compiled_rotations import euler_from_quaternion, nearest_turn
 from colibri.common.errors import checked
-from colibri.common.rotations import euler_from_quaternion, nearest_turn
+from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
@@ -212,11 +213,12 @@ def _inputs(vehicle: Vehicle, rotors: Array) -> Array:
     return inputs[: len(rotors)]
 
 
+@compiled
 def _euler(quaternions: Array, yaw_rad: float) -> Array:
     """Return phi, theta and psi, (n, 3), psi continuous from `yaw_rad`."""
-    angles = []
-    for qw, qx, qy, qz in quaternions.tolist():
-        phi, theta, psi = euler_from_quaternion((qw, qx, qy, qz))
-        yaw_rad = nearest_turn(psi, yaw_rad)
-        angles.append((phi, theta, yaw_rad))
-    return np.array(angles)
+    angles = np.empty((len(quaternions), 3))
+    for i in range(len(quaternions)):
+        q = quaternions[i]
+        angles[i, 0], angles[i, 1], psi = euler_from_quaternion((q[0], q[1], q[2], q[3]))
+        yaw_rad = angles[i, 2] = nearest_turn(psi, yaw_rad)
+    return angles

@@ -5,7 +5,8 @@ from typing import TypeAlias
 import numpy as np
 
 from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, POSITION_REFERENCE, SETTLED_AFTER_S, Samples
-from colibri.common.rotations import earth_from_body, quaternion_from_euler
+from colibri.common.compiled_rotations import quaternion_from_euler, rotation_matrix
+from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 
@@ -161,7 +162,7 @@ def _rows(part: Samples) -> Array:
     position, reference = part.columns(POSITION), part.columns(POSITION_REFERENCE)
     columns = [
         part.table,
-        _earth_velocity(part),
+        _earth_velocity(part.columns(ATTITUDE), part.columns(("u", "v", "w"))),
         position - reference,
         part.position_error_m[:, None],
         np.full_like(reference, np.nan),
@@ -171,6 +172,13 @@ def _rows(part: Samples) -> Array:
     return rows
 
 
-def _earth_velocity(part: Samples) -> Array:
-    rows = part.columns((*ATTITUDE, "u", "v", "w")).tolist()
-    return np.array([earth_from_body(quaternion_from_euler(*row[:3]), (row[3], row[4], row[5])) for row in rows])
+@compiled
+def _earth_velocity(attitudes: Array, velocities: Array) -> Array:
+    """Return velocities ENU of Euler angles (n, 3) and velocities FLU (n, 3)."""
+    turned = np.empty_like(velocities)
+    for i in range(len(turned)):
+        R = rotation_matrix(quaternion_from_euler(attitudes[i, 0], attitudes[i, 1], attitudes[i, 2]))
+        u, v, w = velocities[i, 0], velocities[i, 1], velocities[i, 2]
+        for k in range(3):
+            turned[i, k] = R[k][0] * u + R[k][1] * v + R[k][2] * w
+    return turned
