@@ -58,6 +58,9 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     file: str = ""  # its path; empty for a built-in profile
 
+    def __hash__(self) -> int:
+        return hash((self.name, self.file))
+
     @property
     def where(self) -> str:
         """Name in error messages."""

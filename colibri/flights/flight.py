@@ -13,7 +13,7 @@ from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING
-from colibri.mavlink.hil.sensors import sensors_as_received
+from colibri.mavlink.hil.sensors import SensorFrame, sensors_as_received
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, command_as_received, state_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.physics.world import World
@@ -97,7 +97,7 @@ class InMemory:
     """Carries the datagrams of two processes in memory; `traffic` records all frames.
 
     A frame without others beside it is only rounded as its datagram would round it, unless traffic is recorded. With
-    `replayed`, sensors have their datagrams: a replay needs them.
+    `replayed`, those of sensors are encoded: a replay needs them.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class InMemory:
         replayed: bool = True,
     ) -> None:
         self._traffic = traffic
-        self._rounds = feedback is Feedback.STATE or not replayed
+        self._replayed = replayed
         self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
         self.autopilot_end = AutopilotEnd(
             system_id=system_id, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
@@ -122,7 +122,7 @@ class InMemory:
         now_us = plant.world.time_us
         frame, plant_status = plant.measure(with_battery=self.plant_end.sends_battery(now_us))
         received, datagram = None, b""
-        if plant_status is NOTHING and self._rounds and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
+        if plant_status is NOTHING and self._traffic is None and now_us % HEARTBEAT_EVERY_US:
             received = state_as_received(frame) if isinstance(frame, StateFrame) else sensors_as_received(frame)
         if received is not None:
             step = autopilot.step(received)
@@ -130,7 +130,10 @@ class InMemory:
             if not step.faults:
                 command = command_as_received(step.command)
                 assert command is not None, "a control law's command is one that rotors can follow"
-                self.plant_end.skip()
+                if self._replayed and isinstance(frame, SensorFrame):
+                    datagram = self.plant_end.encoded(frame)
+                else:
+                    self.plant_end.skip()
                 self.autopilot_end.skip()
                 return Answered(step, command, (), datagram)
             self.plant_end.offer(frame, NEVER_LATE_S)

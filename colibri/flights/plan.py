@@ -1,6 +1,7 @@
 """A flight with its inputs read and checked."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import atan2, degrees, inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +26,9 @@ from colibri.plant.physics.contact import check_contact
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.spec import PlantSpec
 from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
+
+_loaded = lru_cache(maxsize=16)(load_track)
+"""Flights that differ in seed, wind or start alone share their track."""
 
 
 def unseen(_what: object) -> None:
@@ -120,7 +124,7 @@ class FlightPlan:
         served = bool(spec.gcs) or contents.whole is None  # stations of a recorded flight are not kept
         check_events(spec.events, plant_vehicle, on_sensors=spec.feedback is Feedback.SENSORS, served=served)
         _sent(spec)
-        track, note = load_track(spec.track, vehicle, profile, floor_m, track_file)
+        track, note = _loaded(spec.track, vehicle, profile, floor_m, track_file)
         start = spec.started(_usual_start(profile, plant_vehicle, track, spec.feedback))
         try:
             check_contact(plant_vehicle)

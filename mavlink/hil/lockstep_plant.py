@@ -28,7 +28,7 @@ from colibri.mavlink.hil.plant_status import (
     encode_delay,
     encode_results,
 )
-from colibri.mavlink.hil.sensors import Frame, encode_sensors
+from colibri.mavlink.hil.sensors import Frame, SensorFrame, encode_sensors
 from colibri.mavlink.hil.state import (
     ROTORS,
     STATE_MESSAGES,
@@ -161,6 +161,10 @@ class PlantEnd:
     def skip(self) -> None:
         """Count a frame that was not encoded, so that later ones are numbered as if it had been."""
         self._codec.skip(STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
+
+    def encoded(self, frame: SensorFrame) -> bytes:
+        """Return the datagram of a frame for records alone."""
+        return b"".join(encode_sensors(self._codec, frame))
 
     def take_faults(self) -> list[Fault | WorldChange]:
         """Return the unchecked faults and changes of the world in the last answer."""
