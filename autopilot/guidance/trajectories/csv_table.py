@@ -1,6 +1,6 @@
 """Strict CSV tables; errors name file, line and column."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -25,11 +25,12 @@ class TrackFileError(AutopilotError):
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """Columns, (n,) each, n >= 2, and their lines."""
+    """Columns, (n,) each, n >= 2, their lines, and the names of columns that are left out."""
 
     path: Path
     values: dict[str, Array]
     lines: list[int]
+    unused: tuple[str, ...] = ()
 
     def error(self, row: int, column: str, what: str) -> TrackFileError:
         return TrackFileError(f"{self.path}: line {self.lines[row]}, column {column}: {what}")
@@ -59,40 +60,60 @@ class CsvTable:
             raise self.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
 
 
-def read_table(path: Path, required: Collection[str], optional: Collection[str], text: str | None = None) -> CsvTable:
-    """Read a CSV file, or its `text`; TrackFileError if malformed."""
+def read_table(
+    path: Path,
+    required: Collection[str],
+    optional: Collection[str],
+    text: str | None = None,
+    aliases: Mapping[str, tuple[str, float]] | None = None,
+) -> CsvTable:
+    """Read a CSV file, or its `text`; TrackFileError if malformed.
+
+    Args:
+        aliases: Other names, in lower case, with the column and the factor to its unit. With them the case of names is
+            ignored, and unknown columns are left out.
+    """
     try:
         lines = (read_text(path, "utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
         raise TrackFileError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:
         raise TrackFileError(f"{path}: {reason}") from reason
-    header = _header(path, lines[0].split(",") if lines else [], required, (*required, *optional))
-    rows = list(_rows(path, lines[1:], header))
+    known, cells = (*required, *optional), [cell.strip() for cell in lines[0].split(",")] if lines else []
+    found = [(cell, 1.0) if aliases is None else aliases.get(cell.lower(), (cell.lower(), 1.0)) for cell in cells]
+    header = [name for name, _ in found]
+    _check_header(path, cells, header, required, known, spare=aliases is not None)
+    rows = list(_rows(path, lines[1:], header, known))
     if len(rows) < 2:
         raise TrackFileError(f"{path}: line {len(lines)}: the file ends, and a track needs two rows")
     columns = np.array([values for _, values in rows]).T
-    return CsvTable(path, dict(zip(header, columns, strict=True)), [line for line, _ in rows])
+    used = [(name, factor) for name, factor in found if name in known]
+    values = {name: factor * column for (name, factor), column in zip(used, columns, strict=True)}
+    unused = tuple(cell for cell, name in zip(cells, header, strict=True) if name not in known)
+    return CsvTable(path, values, [line for line, _ in rows], unused)
 
 
-def _header(path: Path, cells: list[str], required: Collection[str], known: Collection[str]) -> list[str]:
-    header = [cell.strip() for cell in cells]
-    for column in header:
-        if column not in known or header.count(column) > 1:
-            what = "twice" if column in known else "unknown"
-            raise TrackFileError(f"{path}: line 1, column {shown(column)}: {what}: choose {', '.join(known)}")
+def _check_header(
+    path: Path, cells: list[str], header: list[str], required: Collection[str], known: Collection[str], *, spare: bool
+) -> None:
+    for cell, column in zip(cells, header, strict=True):
+        if column in known and header.count(column) > 1:
+            also = "" if cell == column else f" as {column}"
+            raise TrackFileError(f"{path}: line 1, column {shown(cell)}: twice{also}: choose {', '.join(known)}")
+        if column not in known and not spare:
+            raise TrackFileError(f"{path}: line 1, column {shown(cell)}: unknown: choose {', '.join(known)}")
     for column in required:
         if column not in header:
             raise TrackFileError(f"{path}: line 1, column {column}: missing")
-    return header
 
 
-def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int, list[float]]]:
+def _rows(path: Path, lines: list[str], header: list[str], known: Collection[str]) -> Iterator[tuple[int, list[float]]]:
     for line, text in enumerate(lines, start=2):
         cells = text.split(",")
         if not text.strip():
             continue
-        for column, cell in zip(header, cells, strict=False):
+        used = [(column, cell) for column, cell in zip(header, cells, strict=False) if column in known]
+        for column, cell in used:
             if not _is_sane(cell):
                 limits = f"a number from {-_MAX_NUMBER:g} to {_MAX_NUMBER:g}"
                 raise TrackFileError(f"{path}: line {line}, column {column}: expected {limits}, not '{shown(cell)}'")
@@ -100,7 +121,7 @@ def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int
             column = header[len(cells)] if len(cells) < len(header) else str(len(header) + 1)
             what = "missing" if len(cells) < len(header) else "is not named in the header"
             raise TrackFileError(f"{path}: line {line}, column {column}: {what}")
-        yield line, [float(cell) for cell in cells]
+        yield line, [float(cell) for _, cell in used]
 
 
 def _is_sane(cell: str) -> bool:

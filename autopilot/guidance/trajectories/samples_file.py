@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFileError, read_table
 from colibri.autopilot.guidance.trajectories.local_fit import local_fit
+from colibri.common.errors import shown
 from colibri.common.types import Array
 
 _PLACE, _VELOCITY, _ACCELERATION = ("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az")
@@ -20,6 +22,26 @@ _TOLERANCE = 0.1
 """Allowed contradiction between columns, relative to the change between rows."""
 _LEAST_SMOOTHED = 7
 _ROUNDING_M, _ROUNDING_M_S = 0.005, 0.05
+_PEAK = 10.0 / 3.0**0.5
+"""Of 60 τ - 180 τ² + 120 τ³, the acceleration between two rows for positions off by 1 m, a second apart."""
+_ROUGH_M_S2 = 2.0
+_FORMS = {
+    "{}": ("{}", "p{}", "p_{}", "pos_{}", "position_{}", "{}_m"),
+    "v{}": ("v{}", "v_{}", "vel_{}", "velocity_{}", "{}_dot", "v{}_m_s"),
+    "a{}": ("a{}", "a_{}", "acc_{}", "acceleration_{}", "{}_ddot", "a_lin_{}", "a{}_m_s2"),
+}
+_ALIASES = {
+    **dict.fromkeys(("time", "time_s", "t_s", "timestamp", "seconds"), ("t", 1.0)),
+    **{
+        form.format(axis): (name.format(axis), 1.0)
+        for name, forms in _FORMS.items()
+        for form in forms
+        for axis in _PLACE
+    },
+    **dict.fromkeys(("yaw_deg", "heading_deg", "psi_deg"), ("yaw", 1.0)),
+    **dict.fromkeys(("yaw_rad", "psi", "psi_rad"), ("yaw", degrees(1.0))),
+}
+"""Names of planners: Agilicious and TOGT-Planner (p_x, v_x, a_lin_x), RotorPy (x_dot), `flight.csv` (psi, rad)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,24 +61,30 @@ class SampledTrack:
 def read_samples(path: Path, text: str | None = None) -> SampledTrack:
     """Read columns t, x, y, z, vx, vy, vz, ax, ay, az (s, m, ENU), and yaw (degrees), or raise TrackFileError.
 
-    Without accelerations, velocities and accelerations follow from smoothed positions.
+    Common other names of columns are known. Without accelerations, velocities and accelerations follow from smoothed
+    positions.
     """
-    table = read_table(path, _REQUIRED, _OPTIONAL, text)
+    table = read_table(path, _REQUIRED, _OPTIONAL, text, _ALIASES)
     times_s = table.times(_MIN_STEP_S)
     for columns in (_VELOCITY, _ACCELERATION):
         for column in columns:
             if column not in table.values and any(other in table.values for other in (*columns, *_ACCELERATION)):
                 raise TrackFileError(f"{path}: line 1, column {column}: missing")
+    unused = [*table.unused]
     known = [table.matrix(columns) for columns in (_PLACE, _VELOCITY, _ACCELERATION) if columns[0] in table.values]
     if len(known) == len(_PLACE):
-        motion = np.stack(known, axis=1)
-        _check(table, np.diff(times_s)[:, None], motion)
-        return SampledTrack(times_s, motion, table.yaw_rad)
-    count = max(_LEAST_SMOOTHED, round(_SMOOTHED_S / float(np.median(np.diff(times_s)))) | 1)
-    smooth, *rates = local_fit(times_s, known[0], count)
-    motion = np.stack([smooth, *rates], axis=1)
-    note = f"{path}: smoothed, by at most {np.abs(smooth - known[0]).max():.2g} m; velocity and acceleration follow"
-    return SampledTrack(times_s, motion, table.yaw_rad, note)
+        motion, steps_s = np.stack(known, axis=1), np.diff(times_s)[:, None]
+        _check(table, steps_s, motion)
+        note = _roughness(table, steps_s, motion)
+    else:
+        unused += [column for column in (*_VELOCITY, *_ACCELERATION) if column in table.values]
+        count = max(_LEAST_SMOOTHED, round(_SMOOTHED_S / float(np.median(np.diff(times_s)))) | 1)
+        smooth, *rates = local_fit(times_s, known[0], count)
+        motion = np.stack([smooth, *rates], axis=1)
+        off_m = np.abs(smooth - known[0]).max()
+        note = f"{path}: smoothed, by at most {off_m:.2g} m; velocity and acceleration follow"
+    said = f"{path}: columns not used: {', '.join(map(shown, unused))}" if unused else ""
+    return SampledTrack(times_s, motion, table.yaw_rad, "; ".join(filter(None, (note, said))))
 
 
 def columns_of(times_s: Array, motion: Mapping[str, Array]) -> str:
@@ -66,6 +94,21 @@ def columns_of(times_s: Array, motion: Mapping[str, Array]) -> str:
     yaw = [np.degrees(motion["yaw"])] if "yaw" in motion else []
     rows = np.concatenate([times_s[:, None], *parts, *yaw], axis=1).tolist()
     return "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+def _roughness(table: CsvTable, steps_s: Array, motion: Array) -> str:
+    """Say what rounding does: positions off by δ make accelerations of up to 5.8 δ / h² between rows h apart."""
+    x, v, a = np.moveaxis(motion, 1, 0)
+    off = np.diff(x, axis=0) - 0.5 * steps_s * (v[:-1] + v[1:]) + steps_s * steps_s / 12.0 * np.diff(a, axis=0)
+    rough = _PEAK * np.abs(off).max(axis=1) / (steps_s * steps_s)[:, 0]
+    row = int(np.argmax(rough))
+    line = table.lines[row + 1]
+    if rough[row] <= _ROUGH_M_S2 + 0.5 * np.abs(a).max():
+        return ""
+    return (
+        f"{table.path}: rounding makes accelerations of up to {rough[row]:.2g} m/s² before line {line}: "
+        "give more digits, or only positions, which are smoothed"
+    )
 
 
 def _check(table: CsvTable, steps_s: Array, motion: Array) -> None:

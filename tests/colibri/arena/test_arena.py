@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import colibri
 from colibri.arena import run
 from colibri.arena.results import ArenaResults
 from colibri.arena.run import laws_of, planned_of
@@ -16,6 +17,7 @@ from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.plant.vehicle.description import load_vehicle
 from tests.support.campaigns import Here
 from tests.support.commands import Refused
+from tests.support.pages import ROOT
 
 LAW = """
 import numpy as np
@@ -110,3 +112,11 @@ def test_the_worst_start_counts_and_a_lost_one_as_the_cap() -> None:
 )
 def test_what_cannot_be_flown_is_one_line(refused: Refused, words: list[str], line: str) -> None:
     assert refused("arena", *words) == line
+
+
+@pytest.mark.parametrize("law", ["nmpc"])
+def test_laws_of_the_examples_hold_a_point(law: str) -> None:
+    start = {"x": 0.3, "z": 2.0}
+    flight = colibri.fly("hover", controller=f"{ROOT}/examples/laws/{law}.py", link="direct", duration=3.0, start=start)
+    assert flight.lost is None
+    assert abs(flight.samples["x"][-1]) < 0.05

@@ -111,6 +111,33 @@ def test_samples_that_contradict_are_refused(tmp_path: Path, line: int, column: 
     assert str(refused.value) == f"{tmp_path / 'track.csv'}: {why}"
 
 
+@pytest.mark.parametrize(
+    ("header", "unused"),
+    [
+        ("Time,p_x,p_y,p_z,v_x,v_y,v_z,a_lin_x,a_lin_y,a_lin_z,psi", ""),
+        ("t_s,pos_x,pos_y,pos_z,x_dot,y_dot,z_dot,ax_m_s2,ay_m_s2,az_m_s2,q_w", "columns not used: q_w"),
+    ],
+)
+def test_samples_of_planners_are_read(tmp_path: Path, header: str, unused: str) -> None:
+    lines, _ = samples(0.05)
+    given = [f"{line},1.5" for line in lines[1:]]
+    plain, renamed = loaded(write(tmp_path, lines)), loaded(write(tmp_path, [header, *given]))
+    assert unused in renamed.note
+    t = np.linspace(0.0, 2.0, 50)
+    assert position(renamed.track, t).tolist() == position(plain.track, t).tolist()
+    if renamed.track.yaw is not None:
+        assert renamed.track.yaw(renamed.track.clock(t, 0)).derivative(0) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(("digits", "said"), [(2, True), (6, False)])
+def test_rounded_samples_are_noticed(tmp_path: Path, digits: int, said: bool) -> None:
+    lines, _ = samples(0.02)
+    rounded = [",".join(f"{float(cell):.{digits}f}" for cell in line.split(",")) for line in lines[1:]]
+    note = loaded(write(tmp_path, [lines[0], *rounded])).note
+    assert ("rounding makes accelerations of up to" in note) is said
+    assert "give more digits, or only positions" in note or not said
+
+
 EXAMPLE = example("tracks.md")
 
 
