@@ -1,4 +1,4 @@
-"""Flights as learning environments: `import colibri.gym` registers `colibri/Hover-v0` and `colibri/Track-v0`."""
+"""Flights as learning environments: `import colibri.gym` registers Hover, Track, Recover and Race."""
 
 from colibri.gym.errors import GymError, GymImportError
 
@@ -14,11 +14,19 @@ from colibri.gym.episodes import EpisodesSnapshot, GymTransition
 
 __all__ = ["EpisodesSnapshot", "GymError", "GymImportError", "GymTransition", "QuadrotorEnv", "QuadrotorVectorEnv"]
 
-for _name, _track in {"colibri/Hover-v0": "hover", "colibri/Track-v0": "lemniscate"}.items():
+_RACE = ((0, 0, 2), (4, 0, 2), (8, 4, 3), (4, 8, 2.5), (-4, 8, 2), (-8, 4, 3), (-4, 0, 2.5), (0, 0, 2))
+_ENVIRONMENTS: dict[str, dict[str, object]] = {
+    "colibri/Hover-v0": {"track": "hover"},
+    "colibri/Track-v0": {"track": "lemniscate"},
+    "colibri/Recover-v0": {"track": "hover:height=15", "start": "thrown", "limit_m": 20.0},
+    "colibri/Race-v0": {"gates": _RACE, "preview": 1, "duration": 30.0},
+}
+
+for _name, _options in _ENVIRONMENTS.items():
     if _name not in gymnasium.registry:
         gymnasium.register(
             _name,
             entry_point="colibri.gym.environment:QuadrotorEnv",
             vector_entry_point="colibri.gym.environment:vector_env",
-            kwargs={"track": _track},
+            kwargs=_options,
         )

@@ -3,6 +3,7 @@
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil
+from pathlib import Path, PurePath
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -14,10 +15,12 @@ from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.sampling import sampled_track
 from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
 from colibri.autopilot.spec import Trajectory
 from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
 from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
+from colibri.common.matrices import norm
 from colibri.common.types import Array
 from colibri.gym import kernels
 from colibri.gym.errors import GymError
@@ -44,9 +47,14 @@ ENDS = (
     "finished",
 )
 _COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
-_START: dict[str, Any] = {
+_NEAR: dict[str, Any] = {
     **{f"start.{key}": {"uniform": [-0.5, 0.5]} for key in ("x", "y", "z", "vx", "vy", "vz", "p", "q", "r")},
     **{f"start.{key}": {"uniform": [-15.0, 15.0]} for key in ("phi", "theta")},
+}
+_THROWN: dict[str, Any] = {
+    **{f"start.{key}": {"uniform": [-5.0, 5.0]} for key in ("vx", "vy", "vz", "p", "q", "r")},
+    **{f"start.{key}": {"uniform": [-180.0, 180.0]} for key in ("phi", "psi")},
+    "start.theta": {"uniform": [-90.0, 90.0]},
 }
 
 
@@ -56,7 +64,7 @@ class GymTransition(NamedTuple):
     observations: NDArray[np.float32]  # (n, values), after the step
     actions: Array  # (n, a), as given
     states: Array  # (n, 14 + rotors), `plant.physics.equations`
-    references: Array  # (n, 6), position m and velocity m/s, ENU
+    references: Array  # (n, 6), position m and velocity m/s, ENU; of a gate, centre and direction
     rewards: Array  # (n,), the shipped reward
     terminated: NDArray[np.bool_]  # (n,)
 
@@ -77,14 +85,17 @@ class EpisodesSnapshot(NamedTuple):
 class Episodes:
     """Episodes of `count` vehicles, each row with its own random numbers; arguments as in docs/gym.md."""
 
-    starts: Mapping[str, Any] = _START
+    near: Mapping[str, Any] = _NEAR
     """Drawn by default."""
 
     def __init__(
         self,
         count: int,
         *,
-        track: Any = "hover",
+        track: Any = None,
+        gates: Any = None,
+        gate_m: float = 0.75,
+        start: str = "near",
         vehicle: str | Vehicle = "hummingbird",
         action: str = "rotors",
         rate: float = 250.0,
@@ -124,10 +135,21 @@ class Episodes:
         rotors = self.vehicle.rotors.count
         self.size = rotors if action == "rotors" else 4
         self._floor_m = -np.inf if self.vehicle.ground is None else 0.0
-        self.reference = self._sampled(track, duration)
-        self._first = self.reference[0].copy()
-        self._gate_m = 0.0
-        self._fixed, self._draws = _read_draws({**self.starts, **_mapping(draw)})
+        if start not in ("near", "thrown"):
+            raise GymError(unknown("start", start, ("near", "thrown")))
+        within("gate_m", gate_m, 0.05, 100.0, "m")
+        self.gate_m = 0.0 if gates is None else float(gate_m)
+        if gates is None:
+            self.reference = self._sampled("hover" if track is None else track, duration)
+            self._first = self.reference[0].copy()
+        elif track is None:
+            points = _points(gates)
+            self.reference, self._stride = _gates(points, preview), 1
+            self._first = np.array((*points[0], 0.0, 0.0, 0.0))
+        else:
+            raise GymError(f'track must be left out, not "{shown(track)}", in a race through gates')
+        drawn = self.near if start == "near" else {**_THROWN, "lost": {"choice": [-1, *range(rotors)]}}
+        self._fixed, self._draws = _read_draws({**drawn, **_mapping(draw)})
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
         self._x = np.zeros((count, first.x.size))
@@ -156,8 +178,13 @@ class Episodes:
         self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
 
     def _observe(self, n: int) -> None:
-        k, last, older, out = self._steps[n], self._last[n], self._older[n], self.observations[n]
+        k, last, older, out = self.at[n], self._last[n], self._older[n], self.observations[n]
         kernels.observe(self._seen(n), last, older, self.reference, k, self._stride, out)
+
+    @property
+    def at(self) -> NDArray[np.int64]:
+        """Rows of the references, (n,): the next gates, or the intervals flown."""
+        return self._passed if self.gate_m else self._steps
 
     def _seen(self, n: int) -> Array:
         """Return the state that a row observes."""
@@ -177,7 +204,7 @@ class Episodes:
         truncated = self.flying & (self._steps >= self.length) & ~terminated
         rewards = self._rewards.copy()
         if self._reward is not None:
-            now = self.reference[self._steps]
+            now = self.reference[self.at, :6]
             seen = GymTransition(
                 self.observations.copy(), actions, self._x.copy(), now, rewards.copy(), terminated.copy()
             )
@@ -207,7 +234,7 @@ class Episodes:
             self._substeps,
             self._limit_m,
             self._floor_m,
-            self._gate_m,
+            self.gate_m,
             self.observations,
             self._rewards,
             self._ends,
@@ -316,6 +343,34 @@ class Begun(NamedTuple):
     parameters: Any
     mixer: Array
     scale: Array
+
+
+def _points(given: Any) -> Array:
+    """Return start and gates, ENU, (n, 3), of a waypoint file or an array."""
+    if isinstance(given, str | PurePath):
+        return read_waypoints(Path(given)).points_enu_m
+    try:
+        points = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.isfinite(points).all():
+        raise GymError(f'gates must be a waypoint file, or points (n, 3) in m from the start on, not "{shown(given)}"')
+    if (np.diff(points, axis=0) == 0.0).all(axis=1).any():
+        raise GymError("gates: two points in a row are the same")
+    return points
+
+
+def _gates(points: Array, preview: int) -> Array:
+    """Return the gates of `kernels.judge_race`: each is passed in the direction from the one before to the next."""
+    legs = np.diff(points, axis=0)
+    ways = legs.copy()
+    ways[:-1] += legs[1:]
+    back = (ways == 0.0).all(axis=1)
+    ways[back] = legs[back]
+    lengths = [[norm(leg)] for leg in legs]
+    units = np.array([way / norm(way) for way in ways])
+    gates = np.hstack([points[1:], units, lengths])
+    return np.vstack([gates, np.tile((*points[-1], *units[-1], 0.0), (preview + 1, 1))])
 
 
 def _mapping(draw: Any) -> Mapping[str, Any]:

@@ -41,7 +41,7 @@ _PLACES = ("x", "y", "z")
 class PilotedEpisodes(Episodes):
     """Episodes of one vehicle that its autopilot flies in mode offboard; arguments as in docs/gym.md."""
 
-    starts: Mapping[str, Any] = {f"start.{key}": {"uniform": [-0.5, 0.5]} for key in _PLACES}
+    near: Mapping[str, Any] = {f"start.{key}": {"uniform": [-0.5, 0.5]} for key in _PLACES}
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class PilotedEpisodes(Episodes):
         super().__init__(count, rate=rate, **options)
         self._max_velocity, self._max_offset_m = np.array(max_velocity, dtype=np.float64), max_offset_m
         self._max_tilt_rad = np.radians(max_tilt_deg).item()
-        self._throws = any(key.startswith("start.") and key not in self.starts for key in (*self._fixed, *self._draws))
+        self._throws = any(key.startswith("start.") and key not in self.near for key in (*self._fixed, *self._draws))
         if self._throws and self._estimates:
             raise GymError("draw: observation estimate begins in hover: of start only x, y and z can be drawn")
         self._track = self.reference
@@ -99,7 +99,7 @@ class PilotedEpisodes(Episodes):
 
     def _made(self, profile: Any) -> SteppedFlight[Copter]:
         flown, feedback = self._in_step(load_profile(profile)), Feedback.SENSORS if self._estimates else Feedback.STATE
-        x, y, z = self._track[0, :3].tolist()
+        x, y, z = self._first[:3].tolist()
         settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=feedback, reports=False)
         values = {"MIS_TAKEOFF_ALT": z}
         autopilot = copter_autopilot(flown, self.vehicle, settings, _stopped, values=values)
@@ -142,7 +142,7 @@ class PilotedEpisodes(Episodes):
                 flight.step()
                 if flight.time_us > 2 * until_us or not pilot.state.armed:
                     raise GymError("the vehicle does not reach the start of the track")
-        x, y, z = self._track[0, :3].tolist()
+        x, y, z = self._first[:3].tolist()
         self._send(PositionSetpoint((x, y, z), yaw_rad=0.0))
         pilot.select(Mode.OFFBOARD, {})
         until_us = flight.time_us + round(SETTLE_S * 1e6)
@@ -171,7 +171,7 @@ class PilotedEpisodes(Episodes):
             x = begun.x.tolist()
             place = plant.world.state[6:9]
             plant.world = plant.world._replace(state=(*x[:6], *place, *x[9:13]))
-        self._move(begun.x[6:9] - self._track[0, :3])
+        self._move(begun.x[6:9] - self._first[:3])
         self._last[n] = 0.0
         self._look()
 
@@ -196,6 +196,7 @@ class PilotedEpisodes(Episodes):
         if not self.flying[0]:
             return
         self._steps[0] += 1
+        x, y, z = self._x[0, 6:9].tolist()
         change = kernels.take(actions[0], self._last[0], self._older[0])
         self._ends[0], self._rewards[0] = kernels.BAD_ACTION, kernels.LOST
         if change >= 0.0:
@@ -208,11 +209,17 @@ class PilotedEpisodes(Episodes):
                 self._ends[0] = kernels.NOT_FINITE
                 return
             self._look()
-            self._judge(change)
+            self._judge(change, (x, y, z))
         self._observe(0)
 
-    def _judge(self, change: float) -> None:
-        reward, end = kernels.judge(self._x[0], change, self.reference, self._steps[0], self._limit_m, self._floor_m)
+    def _judge(self, change: float, before: Vector) -> None:
+        x, k, limits = self._x[0], self.at[0], (self._limit_m, self._floor_m)
+        if self.gate_m:
+            reward, end, self._passed[0] = kernels.judge_race(
+                x, before, change, self.reference, k, self.gate_m, *limits
+            )
+        else:
+            reward, end = kernels.judge(x, change, self.reference, k, *limits)
         if end == 0 and not self._flight.autopilot.stages.pilot.state.armed:
             reward, end = kernels.LOST, kernels.DISARMED
         self._rewards[0], self._ends[0] = reward, end
@@ -226,8 +233,9 @@ class PilotedEpisodes(Episodes):
             vx, vy, vz, rate = (action * self._max_velocity).tolist()
             return PositionSetpoint(velocity_m_s=(vx, vy, vz), yaw_rate_rad_s=rate)
         offset = self._max_offset_m * action[:3]
-        x, y, z = (self.reference[self._steps[0] - 1, :3] + offset).tolist()
-        vx, vy, vz = self.reference[self._steps[0] - 1, 3:6].tolist()
+        now = self.reference[self._passed[0] if self.gate_m else self._steps[0] - 1]
+        x, y, z = (now[:3] + offset).tolist()
+        vx, vy, vz = (0.0, 0.0, 0.0) if self.gate_m else now[3:6].tolist()
         return PositionSetpoint((x, y, z), (vx, vy, vz), yaw_rad=d * np.pi)
 
 

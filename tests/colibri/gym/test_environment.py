@@ -3,6 +3,7 @@
 import sys
 import warnings
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -15,7 +16,14 @@ from colibri.gym import GymTransition, QuadrotorEnv, QuadrotorVectorEnv
 from colibri.plant.vehicle.description import load_vehicle
 
 _DRAW: dict[str, Any] = {"wind": {"choice": ["5@270", "2@0"]}, "vehicle.body.mass_kg": {"uniform": [0.6, 0.7]}}
-_STEPS = 60
+_RACE: dict[str, Any] = {
+    "gates": [(0, 0, 9), (1, 0, 9), (1, 1, 9)],
+    "start": "thrown",
+    "action": "rates",
+    "preview": 1,
+    "history": 2,
+}
+_STEPS, _BEYOND = 60, -1.0
 
 
 def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
@@ -38,6 +46,9 @@ def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
         {"id": "colibri/Track-v0", "action": "rates", "preview": 3},
         {"id": "colibri/Hover-v0", "action": "velocity", "observation": "estimate", "preview": 2, "history": 2},
         {"id": "colibri/Track-v0", "action": "position", "draw": _DRAW},
+        {"id": "colibri/Recover-v0"},
+        {"id": "colibri/Recover-v0", "action": "attitude"},
+        {"id": "colibri/Race-v0", "action": "rates"},
     ],
 )
 def test_checker_of_gymnasium_passes(options: dict[str, Any]) -> None:
@@ -46,13 +57,13 @@ def test_checker_of_gymnasium_passes(options: dict[str, Any]) -> None:
         warnings.simplefilter("error")
         check_env(env.unwrapped, skip_render_check=True)
     envs = gymnasium.make_vec(num_envs=2, **options)
-    assert isinstance(envs, QuadrotorVectorEnv) == (
-        "observation" not in options and options.get("action") != "position"
-    )
+    assert isinstance(envs, QuadrotorVectorEnv) == (options.get("action") in (None, "rates"))
     assert envs.reset(seed=5)[0][1].tobytes() == env.reset(seed=6)[0].tobytes()
 
 
-@pytest.mark.parametrize("options", [{}, {"action": "rates", "draw": _DRAW, "track": "circle:speed=3", "preview": 2}])
+@pytest.mark.parametrize(
+    "options", [{}, {"action": "rates", "draw": _DRAW, "track": "circle:speed=3", "preview": 2}, _RACE]
+)
 def test_vectors_of_any_size_give_equal_bits(options: dict[str, Any]) -> None:
     seven = _flown(7, 11, **options)
     assert len(set(seven)) == 7
@@ -131,6 +142,32 @@ def test_estimates_differ_from_the_truth() -> None:
     seen, _ = env.reset(seed=1)
     error = np.linalg.norm(seen[:3] - QuadrotorEnv(action="velocity").reset(seed=1)[0][:3])
     assert 0.0 < error < 1.0
+
+
+def test_a_race_is_flown_through_its_gates(tmp_path: Path) -> None:
+    gates = tmp_path / "gates.csv"
+    gates.write_text("x,y,z\n0,0,2\n4,0,2\n4,4,3\n0,4,2\n")
+    env = QuadrotorEnv(gates=str(gates), action="velocity", preview=2, draw=_DRAW, duration=30.0)
+    seen, _ = env.reset(seed=2)
+    assert np.abs(seen[22:28] - [0.0, 4.0, 1.0, -4.0, 4.0, 0.0] + np.tile(seen[:3], 2)).max() < 1e-5
+    rewards, ended = [], False
+    while not ended:
+        action = np.zeros(4, dtype=np.float32)
+        action[:3] = -(seen[:3] - _BEYOND * seen[:3] / np.linalg.norm(seen[:3])) / (5.0, 5.0, 2.0)
+        seen, reward, ended, truncated, info = env.step(np.clip(action, -0.4, 0.4))
+        rewards.append(reward)
+        assert not truncated
+    assert info["why"] == "finished"
+    assert sum(reward > 5.0 for reward in rewards) == 3
+
+
+def test_a_gate_missed_ends_the_race() -> None:
+    env = QuadrotorEnv(gates=[(0, 0, 2), (2, 1.5, 2), (3, 1.5, 2)], action="velocity")
+    env.reset(seed=1)
+    ended = False
+    while not ended:
+        *_, reward, ended, _, info = env.step(np.array([0.2, 0.0, 0.0, 0.0], dtype=np.float32))
+    assert (info["why"], reward) == ("gate missed", -10.0)
 
 
 def test_history_and_preview_are_behind_the_state() -> None:
@@ -213,6 +250,11 @@ def test_reward_can_be_replaced() -> None:
         ({"action": "velocity", "max_velocity": 3}, "max_velocity must be four numbers"),
         ({"action": "velocity", "rate": 500.0}, "rate must be at most"),
         ({"action": "velocity", "observation": "estimate", "draw": {"start.p": 1.0}}, "only x, y and z"),
+        ({"gates": "nowhere.csv"}, "nowhere.csv: No such file"),
+        ({"gates": [(0, 0, 2)]}, "gates must be a waypoint file"),
+        ({"gates": [(0, 0, 2), (0, 0, 2)]}, "two points in a row"),
+        ({"gates": [(0, 0, 2), (1, 0, 2)], "track": "hover"}, "track must be left out"),
+        ({"start": "throw"}, 'unknown start "throw" (did you mean "thrown"?)'),
         ({"draw": {"lost": 4}}, "lost must be a rotor, 0 to 3"),
         ({"draw": [1]}, "draw must be a table"),
         ({"draw": {"start.w": 1}}, 'unknown key of draw "start.w"'),
