@@ -51,7 +51,7 @@ class LawSpec:
 
     profile: Annotated[str | Profile, Option("control profile name or .toml", "NAME")] = "flight"
     controller: Annotated[
-        Any, Option("control law: a name, FILE.py or MODULE:NAME (default: the profile's)", "NAME")
+        Any, Option("control law: a name, FILE.py, MODULE:NAME or POLICY.onnx (default: the profile's)", "NAME")
     ] = None
     solver: Annotated[str | None, Option("QP solver of qpsolvers (default: the profile's)", "NAME")] = None
     delay: Annotated[

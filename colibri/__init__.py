@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from colibri.autopilot import Fallback as Fallback
     from colibri.autopilot import Horizon as Horizon
     from colibri.autopilot import Mixer as Mixer
+    from colibri.autopilot import PolicyInputs as PolicyInputs
+    from colibri.autopilot import PolicyLaw as PolicyLaw
     from colibri.autopilot import Preview as Preview
     from colibri.autopilot import Profile as Profile
     from colibri.autopilot import QpStatus as QpStatus

@@ -1,4 +1,4 @@
-"""Control laws by the file or module that defines them: `my_law.py`, `my_law.py:PID`, `my_law:PID`."""
+"""Control laws by the file or module that defines them: `my_law.py`, `my_law.py:PID`, `my_law:PID`, `policy.onnx`."""
 
 import sys
 from collections.abc import Mapping
@@ -11,6 +11,7 @@ from typing import Any
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, unknown
 
+POLICY = ".onnx"
 _MEMBERS = ("initial", "step")
 _provided: dict[str, tuple[str, Any]] = {}
 _modules: dict[Path, tuple[int, ModuleType]] = {}
@@ -22,7 +23,7 @@ class LawFileError(AutopilotError):
 
 
 def is_place(name: str) -> bool:
-    return name.endswith(".py") or ":" in name
+    return name.endswith((".py", POLICY)) or ":" in name
 
 
 def table_of(name: str) -> str:
@@ -48,6 +49,8 @@ def law_at(place: str) -> Any:
     """Return the law at a full name; LawFileError if it cannot be loaded."""
     if place in _provided:
         return _provided[place][1]
+    if place.endswith(POLICY):
+        return import_module("colibri.autopilot.control.policy").OnnxFile.read(place)  # a law, as by an entry point
     where, _, name = place.rpartition(":")
     module = _module(where)
     if not hasattr(module, name):

@@ -57,7 +57,7 @@ def registered() -> EntryPoints:
 
 
 def load_controller(name: str) -> Factory:
-    """Return the factory registered as `name`, or at a place such as `my_law.py` or `my_law:PID`.
+    """Return the factory registered as `name`, or at a place such as `my_law.py`, `my_law:PID` or `policy.onnx`.
 
     Raises:
         ControllerError: The name is unknown, or its package cannot be loaded.
@@ -125,6 +125,8 @@ def registered_origin(name: str) -> Origin:
 
 def origin_of_factory(law: Factory) -> Origin:
     law = type(law.law) if isinstance(law, Made) else law
+    if hash_ := getattr(law, "sha256", ""):
+        return Origin(getattr(law, "__name__", ""), "", hash_)
     module = getattr(law, "__module__", "")
     file = getattr(modules.get(module), "__file__", None)
     return Origin(f"{module}:{getattr(law, '__qualname__', type(law).__qualname__)}", "", _sha256(file))

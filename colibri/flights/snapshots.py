@@ -195,6 +195,7 @@ _CHANGING: tuple[tuple[type, Keep], ...] = (
 _STATELESS_PACKAGES = (
     "numba",
     "_nrt_python",
+    "onnxruntime",
     "llvmlite",
     "msgspec",
     "re",

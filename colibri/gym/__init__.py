@@ -11,8 +11,17 @@ except ModuleNotFoundError as error:
 
 from colibri.gym.environment import QuadrotorEnv, QuadrotorVectorEnv
 from colibri.gym.episodes import EpisodesSnapshot, GymTransition
+from colibri.gym.export import export_policy
 
-__all__ = ["EpisodesSnapshot", "GymError", "GymImportError", "GymTransition", "QuadrotorEnv", "QuadrotorVectorEnv"]
+__all__ = [
+    "EpisodesSnapshot",
+    "GymError",
+    "GymImportError",
+    "GymTransition",
+    "QuadrotorEnv",
+    "QuadrotorVectorEnv",
+    "export_policy",
+]
 
 _RACE = ((0, 0, 2), (4, 0, 2), (8, 4, 3), (4, 8, 2.5), (-4, 8, 2), (-8, 4, 3), (-4, 0, 2.5), (0, 0, 2))
 _ENVIRONMENTS: dict[str, dict[str, object]] = {

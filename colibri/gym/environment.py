@@ -13,8 +13,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from colibri.autopilot.control.parts import policy_interface
 from colibri.common.errors import shown, unknown
-from colibri.gym import kernels
 from colibri.gym.episodes import PILOTED, Episodes, EpisodesSnapshot
 from colibri.gym.errors import GymError
 
@@ -28,20 +28,20 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
     metadata = {"render_modes": []}  # noqa: RUF012 - declared by gymnasium
 
     def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
-        self._episodes = _episodes(1, render_mode, options)
-        self.observation_space, self.action_space = _spaces(self._episodes)
+        self.episodes = _episodes(1, render_mode, options)
+        self.observation_space, self.action_space = _spaces(self.episodes)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Values, dict[str, Any]]:
         """Begin an episode; the same seed gives the same bits. `options` must be empty."""
         super().reset(seed=_seed(seed))
         if options:
             raise GymError(f'options: none are known, not "{shown(options)}": distributions are the keyword draw')
-        self._episodes.begin(0, self.np_random)
-        return self._episodes.observations[0].copy(), self._episodes.info()
+        self.episodes.begin(0, self.np_random)
+        return self.episodes.observations[0].copy(), self.episodes.info()
 
     def step(self, action: Values) -> tuple[Values, float, bool, bool, dict[str, Any]]:
         """Advance one control interval; `info["why"]` names the reason of a termination."""
-        episodes = self._episodes
+        episodes = self.episodes
         if not episodes.flying[0]:
             raise GymError("reset() is required: no episode is running")
         given = np.asarray(action)
@@ -53,12 +53,12 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
 
     def snapshot(self) -> EpisodesSnapshot:
         """Keep the episode, with its random numbers."""
-        return self._episodes.snapshot()
+        return self.episodes.snapshot()
 
     def restore(self, snapshot: EpisodesSnapshot) -> Values:
         """Continue from a snapshot with the same bits; return its observation."""
-        self._episodes.restore(snapshot, [self.np_random])
-        seen: Values = self._episodes.observations[0].copy()
+        self.episodes.restore(snapshot, [self.np_random])
+        seen: Values = self.episodes.observations[0].copy()
         return seen
 
 
@@ -71,9 +71,9 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(self, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> None:
-        self._episodes = _episodes(_count(num_envs), render_mode, options)
+        self.episodes = _episodes(_count(num_envs), render_mode, options)
         self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = _spaces(self._episodes)
+        self.single_observation_space, self.single_action_space = _spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._chances = [seeding.np_random(None)[0] for _ in range(num_envs)]
@@ -97,9 +97,9 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
         for n in np.flatnonzero(mask).tolist():
             if seeds[n] is not None:
                 self._chances[n] = seeding.np_random(seeds[n])[0]
-            self._episodes.begin(n, self._chances[n])
+            self.episodes.begin(n, self._chances[n])
         self._begun = self._begun or bool(mask.all())
-        return self._episodes.observations.copy(), {}
+        return self.episodes.observations.copy(), {}
 
     def step(
         self, actions: Values
@@ -107,7 +107,7 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
         """Advance all rows one control interval; `infos["why"]` names the reasons of terminations."""
         if not self._begun:
             raise GymError("reset() is required: no episode is running")
-        episodes = self._episodes
+        episodes = self.episodes
         waiting = np.flatnonzero(~episodes.flying).tolist()
         rewards, terminated, truncated = episodes.step(actions)
         for n in waiting:
@@ -119,13 +119,13 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
 
     def snapshot(self) -> EpisodesSnapshot:
         """Keep the episodes of all rows, with their random numbers."""
-        return self._episodes.snapshot()
+        return self.episodes.snapshot()
 
     def restore(self, snapshot: EpisodesSnapshot) -> Values:
         """Continue from a snapshot with the same bits; return its observations."""
-        self._episodes.restore(snapshot, self._chances)
+        self.episodes.restore(snapshot, self._chances)
         self._begun = True
-        return self._episodes.observations.copy()
+        return self.episodes.observations.copy()
 
 
 def vector_env(num_envs: int = 1, **options: Any) -> VectorEnv[Values, Values, Any]:
@@ -168,12 +168,12 @@ def _seed(given: Any) -> int | None:
 def _spaces(episodes: Episodes) -> tuple[Space[Values], Space[Values]]:
     most = np.concatenate(
         [
-            np.full(3, kernels.MAX_POSITION_M),
-            np.full(3, kernels.MAX_SPEED_M_S),
+            np.full(3, policy_interface.MAX_POSITION_M),
+            np.full(3, policy_interface.MAX_SPEED_M_S),
             np.ones(9),
-            np.full(3, kernels.MAX_RATE_RAD_S),
+            np.full(3, policy_interface.MAX_RATE_RAD_S),
             np.ones(episodes.size),
-            np.full(3 * episodes.preview, kernels.MAX_POSITION_M),
+            np.full(3 * episodes.preview, policy_interface.MAX_POSITION_M),
             np.ones(episodes.size * (episodes.history - 1)),
         ]
     ).astype(np.float32)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from colibri.autopilot.control.parts.policy_interface import level_action, observe, scale_of, width
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.sampling import sampled_track
 from colibri.autopilot.guidance.trajectories.tracks import position
@@ -130,7 +130,7 @@ class Episodes:
         self.action, self._reward, self._limit_m = action, reward, float(limit_m)
         self._stride = max(1, round(preview_s * rate))
         self._substeps = max(1, ceil(self.interval_s / RK4_STEP_S - 1e-6))
-        self._max_rates = tuple(map(float, max_rates))
+        self.max_rates, self.preview_s = tuple(map(float, max_rates)), preview_s
         self.vehicle = load_vehicle(vehicle)
         rotors = self.vehicle.rotors.count
         self.size = rotors if action == "rotors" else 4
@@ -156,11 +156,10 @@ class Episodes:
         self._last, self._older = np.zeros((count, self.size)), np.zeros((count, history - 1, self.size))
         self._steps, self._passed = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
         self._parameters = np.empty(count, dtype=first.parameters.dtype)
-        self._mixers, self._scales = np.empty((count, rotors, 4)), np.empty((count, 6))
+        self._mixers, self._scales = np.empty((count, rotors, 4)), np.empty((count, 9))
         self._chances: list[Generator | None] = [None] * count
         self._ends, self._rewards = np.zeros(count, dtype=np.int64), np.zeros(count)
-        width = kernels.FIXED + 3 * preview + self.size * history
-        self.observations = np.zeros((count, width), dtype=np.float32)
+        self.observations = np.zeros((count, width(self.size, preview, history)), dtype=np.float32)
         self.flying = np.zeros(count, dtype=np.bool_)
 
     def begin(self, n: int, chance: Generator) -> None:
@@ -179,7 +178,7 @@ class Episodes:
 
     def _observe(self, n: int) -> None:
         k, last, older, out = self.at[n], self._last[n], self._older[n], self.observations[n]
-        kernels.observe(self._seen(n), last, older, self.reference, k, self._stride, out)
+        observe(self._seen(n), last, older, self.reference, k, self._stride, out)
 
     @property
     def at(self) -> NDArray[np.int64]:
@@ -308,11 +307,7 @@ class Episodes:
             start[key] = start.get(key, 0.0) + float(self._first[place])
         start.setdefault("rotors", vehicle.hover_rpm)
         world = starting_world(Start(**start), vehicle)
-        top = vehicle.rotors.max_speed
-        thrust_n = float(vehicle.max_wrench()[0])
-        share = world.rotor_speeds[0] / top
-        level = 2.0 * share - 1.0
-        action = (2.0 * share * share - 1.0, 0.0, 0.0, 0.0) if self.action == "rates" else (level,) * self.size
+        scale, mixer = scale_of(vehicle, self.max_rates)
         parameters = packed(parameters_of(vehicle, wind.velocity_enu_m_s))
         if not isinstance(lost, int) or not -1 <= lost < vehicle.rotors.count:
             most = vehicle.rotors.count - 1
@@ -325,10 +320,10 @@ class Episodes:
             wind,
             lost,
             np.array((*world.state, *world.rotor_speeds, 0.0)),
-            np.array(action),
+            level_action(world.rotor_speeds, vehicle, rates=self.action == "rates"),
             parameters,
-            exact_inverse(vehicle.allocation()),
-            np.array((vehicle.rotors.idle_speed, top, thrust_n, *self._max_rates)),
+            mixer,
+            scale,
         )
 
 

@@ -8,6 +8,7 @@ from msgspec import structs
 from numpy.random import Generator
 
 from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.parts.policy_interface import take
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.copter import Copter, copter_autopilot
 from colibri.autopilot.ground.stations import StationSettings
@@ -197,7 +198,7 @@ class PilotedEpisodes(Episodes):
             return
         self._steps[0] += 1
         x, y, z = self._x[0, 6:9].tolist()
-        change = kernels.take(actions[0], self._last[0], self._older[0])
+        change = take(actions[0], self._last[0], self._older[0])
         self._ends[0], self._rewards[0] = kernels.BAD_ACTION, kernels.LOST
         if change >= 0.0:
             self._send(self._setpoint(self._last[0]))

@@ -132,6 +132,14 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             colibri check-controller lpv-mpc --only memory --only limits
             """,
         ),
+        "gym": CommandEntry(
+            "write the inputs and outputs of a learned policy, so that it flies as a control law",
+            "laws",
+            """
+            colibri gym export policy.onnx --env colibri/Hover-v0 --set action=rates
+            colibri fly circle --controller policy.onnx
+            """,
+        ),
         "certify": CommandEntry(
             "certify a profile's attitude law",
             "laws",
