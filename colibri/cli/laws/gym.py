@@ -35,7 +35,7 @@ def run(args: Namespace) -> int:
         env = gymnasium.make(args.env, disable_env_checker=True, **dict(args.set))
     except gymnasium.error.Error as error:
         raise GymError(f"--env: {error}") from None
-    print(export_policy(args.policy, env))  # noqa: T201
+    print(export_policy(args.policy, env))
     return 0
 
 
