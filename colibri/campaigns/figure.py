@@ -1,5 +1,6 @@
 """The figure of a campaign."""
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +12,9 @@ from matplotlib.ticker import MaxNLocator
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
 from colibri.campaigns.factors import is_number
 from colibri.campaigns.flight_table import FlightTable, wilson
+from colibri.common.spec import fields_of
 from colibri.common.types import Array
+from colibri.flights.spec import FlightSpec
 
 COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
 _LOST = "#D00000"
@@ -23,6 +26,23 @@ _CHARACTER_IN = 0.085
 _WIDE_SPREAD = 20.0
 """Ratio of largest to smallest value from which the axis is logarithmic."""
 _PANEL_IN, _MAP_IN = 2.6, 3.4
+
+_UNITS = {
+    **{
+        "n_m": "N m",
+        "rad_s": "rad/s",
+        "deg_s": "°/s",
+        "m_s2": "m/s²",
+        "m_s": "m/s",
+        "deg": "°",
+        "us": "µs",
+        "ms": "ms",
+    },
+    **{"mm": "mm", "m": "m", "s": "s", "kg": "kg", "hz": "Hz", "n": "N", "v": "V", "ah": "Ah", "a": "A", "w": "W"},
+    **{"rad": "rad", "g": "g", "percent": "%"},
+}
+"""Of names by how they end, the longest first."""
+_WORDS = {"rmse": "RMSE", "qp": "QP", "nees": "NEES", "max": "maximum", "p50": "median", "p99": "99th percentile"}
 
 
 class _Group(NamedTuple):
@@ -50,6 +70,19 @@ def draw(table: FlightTable, metric: str | None = None) -> Figure:
     if drawn and len(groups) <= _MAX_CURVES:
         return _scatter(table, name, values, drawn, groups)
     return _strips(table, name, values, groups[:_MAX_STRIPS])
+
+
+def label_of(name: str) -> str:
+    """Return a metric's or factor's name in words, with its unit: "rmse_after_20s_m" is "RMSE after 20 s (m)"."""
+    option = fields_of(FlightSpec).get(name)
+    parts, unit = name.split("."), option.option.unit if option else ""
+    for place, part in enumerate(parts):
+        ending = next((it for it in _UNITS if part.endswith(f"_{it}")), None)
+        if ending and not unit:
+            parts[place], unit = part.removesuffix(f"_{ending}"), _UNITS[ending]
+    text = re.sub(r"\b(\d+)s\b", r"\1 s", ", ".join(parts).replace("_", " "))
+    text = re.sub(r"\w+", lambda found: _WORDS.get(found[0], found[0]), text)
+    return f"{text} ({unit})" if unit else text
 
 
 def _groups(table: FlightTable, along: Sequence[str]) -> list[_Group]:
@@ -95,11 +128,11 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
         at = [group.at[0] for group in of_name]
         lower.fill_between(at, *np.transpose(bounds), color=color, alpha=0.2, linewidth=0)
         lower.plot(at, [lost / of if of else np.nan for lost, of in shares], "o-", color=color, markersize=3.5)
-    upper.set_ylabel(f"{metric}\nmedian, 5 to 95 %")
+    upper.set_ylabel(f"{label_of(metric)}\nmedian, 5 to 95 %")
     scale_values(upper, values)
     lower.set_ylabel("share lost\nwith its 95 % interval")
     lower.set_ylim(-0.03, 1.03)
-    lower.set_xlabel(along)
+    lower.set_xlabel(label_of(along))
     _scale_factor(lower, [group.at[0] for group in groups])
     for axes in (upper, lower):
         axes.grid(**GRID)
@@ -122,14 +155,14 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
                 lost[cell] = 2 * table.lost(group.places)[0] > len(group.places)
         edges = np.arange(len(xs) + 1), np.arange(len(ys) + 1)
         image = axes.pcolormesh(*edges, medians, cmap="viridis", norm="log" if _is_wide(medians) else "linear")
-        figure.colorbar(image, ax=axes, label=f"{metric}, median")
+        figure.colorbar(image, ax=axes, label=f"{label_of(metric)}, median")
         crosses = np.argwhere(lost)
         axes.plot(crosses[:, 1] + 0.5, crosses[:, 0] + 0.5, "x", color=_LOST, label="more than half lost")
         for axis, numbers, label in ((axes.xaxis, xs, along[0]), (axes.yaxis, ys, along[1])):
             axis.set_major_locator(MaxNLocator(10, integer=True))
             shown = range(0, len(numbers), max(1, len(numbers) // 8))
             axis.set_ticks([place + 0.5 for place in shown], [f"{numbers[place]:.4g}" for place in shown])
-            axis.set_label_text(label)
+            axis.set_label_text(label_of(label))
         axes.set_title(name, fontsize="medium", loc="left")
     note = "; crosses: more than half lost" if any(each.verdict.is_lost for each in table.flown) else ""
     put_title(figure, _title(table) + note)
@@ -149,8 +182,8 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
             if lost:
                 axes.plot(at[lost], [0.97] * len(lost), "x", color=color, markersize=5, transform=edge)
         scale_values(axes, values)
-        axes.set_ylabel(metric)
-        axes.set_xlabel(factor)
+        axes.set_ylabel(label_of(metric))
+        axes.set_xlabel(label_of(factor))
         axes.grid(**GRID)
     put_head(figure, _title(table), columns=min(len(groups) + 1, 3))
     return figure
@@ -173,7 +206,7 @@ def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Gr
     axes.set_ylim(-len(groups) + 0.4, 0.6)
     if _is_wide(values):
         axes.set_xscale("log")
-    axes.set_xlabel(f"{metric}; bars: medians")
+    axes.set_xlabel(f"{label_of(metric)}; bars: medians")
     axes.grid(axis="x", **GRID)
     put_title(figure, _title(table))
     return figure

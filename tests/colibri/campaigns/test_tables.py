@@ -10,6 +10,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from colibri.campaigns.factors import CampaignError
+from colibri.campaigns.figure import label_of
 from colibri.campaigns.flight_table import wilson
 from colibri.campaigns.flights import FlightResult, Verdict
 from colibri.campaigns.results import CampaignResults
@@ -101,11 +102,29 @@ def points(line: Line2D) -> list[list[float]]:
     return [np.asarray(values).tolist() for values in line.get_data()]
 
 
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("rmse_after_20s_m", "RMSE after 20 s (m)"),
+        ("max_tilt_deg", "maximum tilt (°)"),
+        ("solve_time_us.p99", "solve time, 99th percentile (µs)"),
+        ("attitude_rmse_deg.roll", "attitude RMSE, roll (°)"),
+        ("qp_failures", "QP failures"),
+        ("limit_cycle_rad_s", "limit cycle (rad/s)"),
+        ("effort_n_m", "effort (N m)"),
+        ("vehicle.mass_kg", "vehicle, mass (kg)"),
+        (LATENCY, "latency (ms)"),
+    ],
+)
+def test_figures_label_axes_in_words_with_units(name: str, label: str) -> None:
+    assert label_of(name) == label
+
+
 def test_over_a_factor_it_is_a_line_a_combination() -> None:
     grid = {"track": ["hover", "spiral"], LATENCY: "1:5:5"}
     upper, lower = made({0: Verdict.LOST}, seeds="1-2", grid=grid).plot().axes
     assert upper.get_legend_handles_labels()[1] == ["hover", "spiral"]
-    assert lower.get_xlabel() == LATENCY
+    assert lower.get_xlabel() == label_of(LATENCY)
     latency, error = points(upper.get_lines()[0])
     assert latency == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert error == pytest.approx([10.002, 20.0015, 30.0015, 40.0015, 50.0015])
@@ -116,7 +135,7 @@ def test_over_two_factors_it_is_a_heat_map() -> None:
     grid = {"track": ["hover"], LATENCY: "1:4:4", FLOOR: "0:1:3"}
     figure = made({0: Verdict.LOST}, grid=grid).plot()
     axes = figure.axes[0]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == (LATENCY, FLOOR)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (label_of(LATENCY), label_of(FLOOR))
     (mesh,) = (each for each in axes.collections if each.get_array() is not None)
     medians: Any = np.ma.filled(np.ma.asarray(mesh.get_array()).reshape(3, 4), nan)
     assert np.isnan(medians[0, 0])
@@ -127,7 +146,7 @@ def test_over_two_factors_it_is_a_heat_map() -> None:
 def test_over_what_is_drawn_it_is_a_dot_a_flight() -> None:
     figure = made({3: Verdict.LOST}, seeds="0-9", draw={LATENCY: {"uniform": [1.0, 2.0]}}).plot()
     (axes,) = figure.axes
-    assert axes.get_xlabel() == LATENCY
+    assert axes.get_xlabel() == label_of(LATENCY)
     through, lost = axes.get_lines()
     assert (len(points(through)[0]), len(points(lost)[0])) == (9, 1)
 
