@@ -27,20 +27,9 @@ _WIDE_SPREAD = 20.0
 """Ratio of largest to smallest value from which the axis is logarithmic."""
 _PANEL_IN, _MAP_IN = 2.6, 3.4
 
-_UNITS = {
-    **{
-        "n_m": "N m",
-        "rad_s": "rad/s",
-        "deg_s": "°/s",
-        "m_s2": "m/s²",
-        "m_s": "m/s",
-        "deg": "°",
-        "us": "µs",
-        "ms": "ms",
-    },
-    **{"mm": "mm", "m": "m", "s": "s", "kg": "kg", "hz": "Hz", "n": "N", "v": "V", "ah": "Ah", "a": "A", "w": "W"},
-    **{"rad": "rad", "g": "g", "percent": "%"},
-}
+_UNITS = dict(
+    n_m="N m", rad_s="rad/s", deg_s="°/s", m_s2="m/s²", m_s="m/s", deg="°", rad="rad", us="µs", ms="ms", mm="mm"
+) | dict(m="m", s="s", kg="kg", g="g", hz="Hz", n="N", v="V", ah="Ah", a="A", w="W", percent="%")
 """Of names by how they end, the longest first."""
 _WORDS = {"rmse": "RMSE", "qp": "QP", "nees": "NEES", "max": "maximum", "p50": "median", "p99": "99th percentile"}
 
