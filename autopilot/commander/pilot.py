@@ -173,7 +173,7 @@ class Pilot:
 
     def adopt(self, behaviour: Behaviour) -> None:
         self.behaviour = behaviour
-        if not behaviour.land_on_three:
+        if not behaviour.rotor_failure:
             self.readiness.trust_rotors()
 
     def sense(self, sensed: Sensed) -> None:

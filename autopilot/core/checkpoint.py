@@ -44,7 +44,7 @@ class Checkpoint(NamedTuple):
         plan_ids: Opaque ids of mission, geofence and rally points, which are stored separately.
         charge_ah: Charge taken from the battery.
         state_source: State of the estimator; empty on state feedback.
-        rotor_lost: 0..3; None if all rotors turn.
+        rotor_lost: Index; None if all rotors turn.
         rotor_speeds: Modelled speeds, parts of the largest, (4,).
         had_station: Whether a ground station was ever connected; the link-loss timer starts at the restart.
     """
@@ -152,4 +152,4 @@ class Checkpointer:
         if lost is not None:
             flying = pilot.state.armed and not ground.standing
             parts.rotor_loss.resume(lost, checkpoint.rotor_speeds, state, ground.height_m, flying=flying)
-            pilot.readiness.lose_rotor(lost)
+            pilot.readiness.lose_rotor(lost, parts.rotor_loss.remaining, lands=parts.rotor_loss.landing_for is not None)

@@ -117,6 +117,12 @@ def parts_of(
         ),
         flown=FlownSettings(parameters.values, Tuned(flown, assumed, loop.controller)),
     )
+
+    def rebuild(lost: int | None) -> None:
+        tuning.lost = lost
+        subscribers.fly(tuning.built(parameters.values))
+
+    rotor_loss.rebuild = rebuild
     return Parts(
         parameters,
         subscribers,

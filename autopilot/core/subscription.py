@@ -65,6 +65,13 @@ class Subscribers:
         if self._flown is not None:
             self._flown = FlownSettings(parameters.values, tuned or self._flown.tuned)
 
+    def fly(self, tuned: Tuned) -> None:
+        """Adopt another control law and vehicle with the same parameters."""
+        for call in self._calls_of(tuned):
+            call()
+        if self._flown is not None:
+            self._flown = self._flown._replace(tuned=tuned)
+
     def keep(self, parameters: Parameters) -> None:
         """Return to the settings before a change that a subscriber refused."""
         if self._flown is None:
@@ -84,5 +91,8 @@ class Subscribers:
         flies_by = behaviour(parameters)
         yield from (partial(adopt, flies_by) for adopt in self._behaviour)
         if tuned is not None:
-            yield from (partial(adopt, tuned.controller, tuned.vehicle) for adopt in self._law)
-            yield from (partial(adopt, tuned.vehicle) for adopt in self._vehicle)
+            yield from self._calls_of(tuned)
+
+    def _calls_of(self, tuned: Tuned) -> Iterator[Callable[[], None]]:
+        yield from (partial(adopt, tuned.controller, tuned.vehicle) for adopt in self._law)
+        yield from (partial(adopt, tuned.vehicle) for adopt in self._vehicle)

@@ -78,7 +78,7 @@ class Supervision:
         sent, charge_ah = parts.actuation.sent, parts.battery.charge_ah
         if rotor_loss.look(state, sent, charge_ah, airborne=airborne, ground_m=pilot.ground.height_m):
             assert rotor_loss.lost is not None, "what is lost has a number"
-            pilot.readiness.lose_rotor(rotor_loss.lost)
+            pilot.readiness.lose_rotor(rotor_loss.lost, rotor_loss.remaining, lands=rotor_loss.landing_for is not None)
         if not feels:
             parts.state_source.help_inertial(rotor_loss.watch.expected, armed=pilot.state.armed)
 
@@ -101,7 +101,7 @@ class Supervision:
             fence=stations.fence.margin_m if stations.fence.exists else None,
             decided=None if decision is None else decision.diagnostics,
             late=pilot.behaviour.solve_time_s * 1e6 > parts.loop.control_interval_us,
-            rotor_lost=parts.rotor_loss.lost,
+            rotor_lost=parts.rotor_loss.landing_for,
             pace=pilot.behaviour.limits,
         )
 

@@ -2,6 +2,8 @@
 
 from math import isnan
 
+import numpy as np
+
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
@@ -53,6 +55,7 @@ class SnapshotBuilder:
 
     def adopt(self, vehicle: Vehicle) -> None:
         self._max_speed_rad_s = vehicle.rotors.max_speed * vehicle.rad_s_per_speed_unit
+        self._levers = levers_of(vehicle)
         self._forecaster = Forecaster(vehicle, self._interval_s, self._columns)
         self._velocity: Vector | None = None
         self._solver = NOT_SOLVED
@@ -102,6 +105,7 @@ class SnapshotBuilder:
             home=HomePosition(home.position_enu_m, home.yaw_rad),
             rotor_speeds_rad_s=tuple([control * speed for control in controls]),
             controls=controls,
+            levers=self._levers,
             battery=battery,
             setpoint=setpoint(guidance, decision, controls),
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
@@ -157,6 +161,14 @@ def landed_state(pilot: Pilot, state: VehicleState) -> int:
 def _comes_down(pilot: Pilot, state: VehicleState) -> bool:
     reference, height_m = pilot.generator.reference, state.position_enu_m[2] - pilot.home.position_enu_m[2]
     return height_m < _NEAR_GROUND_M and reference is not None and float(reference.motion[1, 2]) < _SINKING_M_S
+
+
+def levers_of(vehicle: Vehicle) -> tuple[PerRotor, PerRotor, PerRotor]:
+    """Return how roll, pitch and yaw, FRD, follow from rotor controls, -1 to 1."""
+    x, y, _ = vehicle.arms_m().T
+    rows = ((y, 1.0), (x, 1.0), (vehicle.rotors.spin(), 2.0))
+    roll, pitch, yaw = (tuple((most * row / max(float(np.abs(row).sum()), 1e-9)).tolist()) for row, most in rows)
+    return roll, pitch, yaw
 
 
 def setpoint(guidance: Guidance, decision: Decision | None, controls: PerRotor) -> Setpoint:

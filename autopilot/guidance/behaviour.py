@@ -40,7 +40,7 @@ class Behaviour:
     follow_distance_m: float = 8.0
     follow_angle_deg: float = 180.0
     follow_altitude_mode: int = 0
-    land_on_three: bool = True
+    rotor_failure: int = 1
     inject_failures: bool = False
     solve_time_s: float = 0.0
     delay_s: float = -0.001

@@ -119,9 +119,9 @@ ROWS = (
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
     BehaviourRow(
-        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Rotor failure"),
+        *("CA_FAILURE_MODE", "rotor_failure", "", 0, 2, "Rotor failure"),
         *("Detection; 0 also clears a detected failure.",),
-        values=((0, "Ignore"), (1, "Land on three rotors")),
+        values=((0, "Ignore"), (1, "Land on three of four, fly on without one of more"), (2, "Land")),
     ),
     BehaviourRow(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),

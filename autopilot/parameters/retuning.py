@@ -61,7 +61,11 @@ class Tuned(NamedTuple):
 
 
 class Retuning:
-    """Rejects changes with which the control law cannot be built or fly."""
+    """Rejects changes with which the control law cannot be built or fly.
+
+    Attributes:
+        lost: The rotor without which laws are built.
+    """
 
     def __init__(
         self,
@@ -79,6 +83,7 @@ class Retuning:
         self._rhythm = _rhythm(running)
         self._parameters, self._trial, self._budget = parameters, trial, budget or Budget()
         self._tried: Vehicle | None = None
+        self.lost: int | None = None
 
     def prepare(self, names: Collection[str], values: Mapping[str, Value]) -> Prepared | ParamError:
         """Return the control law with all these changes as a `Tuned`, or a refusal; say why one alone is refused."""
@@ -115,13 +120,18 @@ class Retuning:
         return refusal
 
     def tuned(self, values: Mapping[str, Value]) -> Tuned:
-        profile, vehicle = self._numbers.applied(values)
-        controller = self._build(profile, vehicle)
+        profile, vehicle, controller = self.built(values)
         _try(profile.controller, controller, vehicle)
         if self._trial is not None and vehicle != self._tried:
             self._trial.try_vehicle(vehicle)
             self._tried = vehicle
         return Tuned(profile, vehicle, controller)
+
+    def built(self, values: Mapping[str, Value]) -> Tuned:
+        """Build the control law, without the lost rotor."""
+        profile, vehicle = self._numbers.applied(values)
+        vehicle = vehicle if self.lost is None else vehicle.without_rotor(self.lost)
+        return Tuned(profile, vehicle, self._build(profile, vehicle))
 
     def try_all(self, values: Mapping[str, Value]) -> None:
         try:

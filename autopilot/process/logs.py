@@ -25,7 +25,16 @@ from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
-from colibri.mavlink.ulog.flight_topics import COMMAND, DECISION, ESTIMATE, FILTER, MEASURED
+from colibri.mavlink.ulog.flight_topics import (
+    COMMAND,
+    DECISION,
+    ESTIMATE,
+    FILTER,
+    MEASURED,
+    MORE_COMMAND,
+    ROTORS,
+    split,
+)
 from colibri.mavlink.ulog.inputs import RecordKind, encode_input
 from colibri.mavlink.ulog.log import FileLog, TopicLog
 from colibri.mavlink.ulog.reader import FILE
@@ -40,7 +49,6 @@ MAX_SAID_BYTES = 16 << 20
 """Limit of status texts: stations cause them, too. Errors are recorded beyond it."""
 _FULL = f"stations have sent more than {MAX_RECEIVED_BYTES >> 20} MiB: no more is recorded, a replay ends here"
 _FLYING = VehicleStatus(armed=True, custom_mode=custom_mode(Mode.TRACK))
-_STILL = (nan,) * 4
 _NO_REFERENCES = (nan,) * 11
 
 
@@ -53,10 +61,11 @@ class AutopilotLog:
         self._time_us = self._received_bytes = self._said_bytes = 0
         sensors = setup.vehicle_tables and setup.vehicle_tables.sensors
         self._kinds = kinds_of(sensors) if sensors else []
+        self._rotors = setup.vehicle_tables.rotors.count if setup.vehicle_tables else ROTORS
         self._recorder: Recorder | None = None
         self._views: tuple[SampleBlocks, SensingBlocks] | None = None
         if topics.for_viewers and not setup.ground:
-            self._views = (SampleBlocks(), SensingBlocks())
+            self._views = (SampleBlocks(self._rotors), SensingBlocks())
         self._status_us, self._thinning = -1, Thinning()
         self._fallback: Fallback | None = None
 
@@ -165,7 +174,10 @@ class AutopilotLog:
             return
         if datagram and (self._setup.feedback is Feedback.SENSORS or len(datagram) != STATE_BYTES):
             self.topics.queue(encode_input(time_us, RecordKind.FRAME, datagram))
-        self.topics.add(COMMAND, (time_us / 1e6, *controls, armed))
+        first, others = split(controls)
+        self.topics.add(COMMAND, (time_us / 1e6, *first, armed))
+        if others:
+            self.topics.add(MORE_COMMAND, (time_us / 1e6, *others))
 
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
         setup = self._setup
@@ -173,7 +185,7 @@ class AutopilotLog:
             self.say(time_us, INFO, f"{setup.track or 'no track'}, profile {setup.profile}, {setup.controller}")
         if time_us >= self._status_us:
             self._status_us = time_us + STATUS_EVERY_US
-            self.topics.append(status_message(time_us, _FLYING, setup.system_id))
+            self.topics.append(status_message(time_us, _FLYING, setup.system_id, self._rotors))
         if fallback is not self._fallback:
             self._fallback = fallback
             said = (INFO, "the QP is solved again") if fallback is None else (WARNING, f"fallback: {fallback}")
@@ -185,9 +197,9 @@ class AutopilotLog:
         if not isinstance(known, StateFrame):
             return
         _, place, velocity, attitude, rates = known
-        controls = step.command.controls if step.command.armed else _STILL
+        controls, others = split(step.command.controls if step.command.armed else (nan,) * self._rotors)
         references = _NO_REFERENCES if step.references is None else _first(step.references)
-        row = (self._time_us, *place, *velocity, *attitude, *rates, *controls, *references, *decided)
+        row = (self._time_us, *place, *velocity, *attitude, *rates, *controls, *references, *decided, *others)
         self.topics.add(samples, row)
         if estimate is not None and isinstance(frame, SensorFrame):
             self.topics.add(sensings, sensing_numbers(self._time_us, frame, estimator_state(estimate)))

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from colibri.analysis.recording import INPUT, POSITION_REFERENCE, ROTORS, SETTLED_AFTER_S
+from colibri.analysis.recording import INPUT, POSITION_REFERENCE, SETTLED_AFTER_S, rotor_names
 from colibri.analysis.report import length as in_metres
 from colibri.analysis.series.figure_series import ATTITUDE, POSITION, START_S, FigureSeries, Series
 from colibri.common.process.lifecycle import end_with, gc_frozen, handle_endings
@@ -196,7 +196,7 @@ def _rotor_panels(plan: FlightPlan) -> list[Panel]:
     unit = plan.plant_vehicle.rotors.speed_unit
     return [
         Panel(f"Ω{number} ({unit})", (*limits, Curve(name, "rotor speed", held=True)))
-        for number, name in enumerate(ROTORS, start=1)
+        for number, name in enumerate(rotor_names(plan), start=1)
     ]
 
 

@@ -91,7 +91,7 @@ def keep_flight(
 ) -> Report:
     """Write `flight.csv` and `report.json` of a flight."""
     with (plan.out / TABLE).open("wb") as file:
-        found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file).add, *others)
+        found = report_of(plan, log_of(plan.out), summary, failure, TableWriter(file, plan).add, *others)
     write_report(found, plan.out / REPORT)
     return found
 
@@ -102,7 +102,7 @@ def keep_what_there_is(plan: FlightPlan, why: str | None = None) -> Report | Non
         if why is not None:
             return keep_flight(plan, None, failure=why)
         with (plan.out / TABLE).open("wb") as file:
-            read_flight(FlightReader(plan), TableWriter(file).add)
+            read_flight(FlightReader(plan), TableWriter(file, plan).add)
     return None
 
 
@@ -111,7 +111,7 @@ def files_of(plan: FlightPlan, report: Report | None, log: TopicReader) -> Itera
     yield FILE, b"".join(log.encoded())
     if report is not None:
         table = BytesIO()
-        writer = TableWriter(table)
+        writer = TableWriter(table, plan)
         for part in FlightReader(plan, log):
             writer.add(part)
         yield TABLE, table.getvalue()

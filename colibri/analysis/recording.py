@@ -18,7 +18,7 @@ from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
-from colibri.mavlink.ulog.flight_topics import DECISION, TRUTH
+from colibri.mavlink.ulog.flight_topics import DECISION, MORE_TRUTH, TRUTH
 from colibri.mavlink.ulog.log import TopicReader
 from colibri.plant.vehicle.description import Vehicle
 
@@ -30,6 +30,7 @@ POSITION_REFERENCE = ("x_ref", "y_ref", "z_ref")
 SETTLED_AFTER_S = 20.0
 """From then on the start of a flight no longer counts."""
 COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENCE)
+_MORE_ROTORS = MORE_TRUTH.names[1:]
 
 _PLANT_STATE = slice(1, 14)
 _PLANT_ATTITUDE = slice(10, 14)
@@ -42,8 +43,8 @@ class Samples:
     """Consecutive control samples of a flight, one row each; the m decisions led to all rows but the first.
 
     Attributes:
-        table: Columns as in `COLUMNS`, (n, 27). A row holds the state at its time, the inputs that led to it, and their
-            references; the first row of a flight is the start.
+        table: Columns as in `COLUMNS`, then those of more than four rotors, (n, 27 or more). A row holds the state at
+            its time, the inputs that led to it, and their references; the first row of a flight is the start.
         qp_status: Result of each QP, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,).
         fallback: Source of a decision, as in `colibri.autopilot.control.interface.FALLBACK_CODES`, (m,).
         slack: Planned excess of soft limits, in units of each limit, (m,).
@@ -62,7 +63,7 @@ class Samples:
 
     def __getitem__(self, column: str) -> Array:
         """Return one column, (n,)."""
-        return self.table[:, COLUMNS.index(column)]
+        return self.table[:, (COLUMNS + _MORE_ROTORS).index(column)]
 
     def columns(self, names: tuple[str, ...]) -> Array:
         """Return some columns, (n, len(names))."""
@@ -132,8 +133,12 @@ class FlightReader:
     def __iter__(self) -> Iterator[Samples]:
         self._states = sha256()
         decided = Rows(self.log, DECISION)
+        more = Rows(self.log, MORE_TRUTH) if self.plan.plant_vehicle.rotors.count > len(ROTORS) else None
         frames, yaw_rad, begins = 0, self.plan.start_yaw_rad, True
         for block in read_blocks(self.log, TRUTH):
+            if more is not None:
+                others = more.take(len(block))[:, 1:]
+                block = np.hstack([block[: len(others)], others])  # the last may be missing
             sampled = self._sampled[frames : frames + len(block)]  # frames that were logged since then do not count
             frames += len(sampled)
             self._states.update(block[: len(sampled), _PLANT_STATE].tobytes())
@@ -146,13 +151,17 @@ class FlightReader:
     def _part(self, samples: Array, decisions: Array, yaw_rad: float) -> Samples:
         start_reference = [0.0, 0.0, self.plan.start_yaw_rad]
         begins = len(decisions) < len(samples)
+        count, rotors = self.plan.plant_vehicle.rotors.count, samples[:, _PLANT_ROTORS]
+        if count != len(ROTORS):
+            rotors = np.hstack([rotors, samples[:, len(TRUTH.names) :]])[:, :count]
         columns = [
             samples[:, :10],
             _euler(samples[:, _PLANT_ATTITUDE], yaw_rad),
-            _inputs(self.plan.plant_vehicle, samples[:, _PLANT_ROTORS]),
+            _inputs(self.plan.plant_vehicle, rotors),
             np.vstack([start_reference, decisions[:, 1:4]]) if begins else decisions[:, 1:4],
             samples[:, _PLANT_ROTORS],
             position(self.plan.track, path_times(samples[:, 0], self._lags)),
+            rotors[:, len(ROTORS) :],
         ]
         return Samples(
             table=np.hstack(columns),
@@ -187,12 +196,21 @@ def path_times(times_s: Array, lags: Lags) -> Array:
     return times
 
 
+def columns_of(plan: FlightPlan) -> tuple[str, ...]:
+    """Return the columns of a flight's samples."""
+    return COLUMNS + _MORE_ROTORS[: max(plan.plant_vehicle.rotors.count - len(ROTORS), 0)]
+
+
+def rotor_names(plan: FlightPlan) -> tuple[str, ...]:
+    return (ROTORS + _MORE_ROTORS)[: plan.plant_vehicle.rotors.count]
+
+
 class TableWriter:
     """Writes the table of a flight as CSV."""
 
-    def __init__(self, file: IO[bytes]) -> None:
+    def __init__(self, file: IO[bytes], plan: FlightPlan) -> None:
         self._file = file
-        file.write((",".join(COLUMNS) + "\n").encode())
+        file.write((",".join(columns_of(plan)) + "\n").encode())
 
     def add(self, part: Samples) -> None:
         self._file.write(csv_rows(part.table))
@@ -205,7 +223,7 @@ def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:
 
 
 def _inputs(vehicle: Vehicle, rotors: Array) -> Array:
-    """Return thrust and moments of rotor speeds (n, 4)."""
+    """Return thrust and moments of rotor speeds (n, m)."""
     squared = rotors**2
     if len(squared) == 1:  # a product with one row takes another way through BLAS, and its bits would be others
         squared = np.vstack([squared, squared])

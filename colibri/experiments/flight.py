@@ -9,7 +9,7 @@ import msgspec
 
 from colibri.analysis.logs import log_of
 from colibri.analysis.outcome import REPORT, files_of, fly_to_its_end, report_of
-from colibri.analysis.recording import COLUMNS, FlightReader
+from colibri.analysis.recording import FlightReader, columns_of
 from colibri.analysis.report import Report, report_rows
 from colibri.analysis.series.figure_series import FigureSeries
 from colibri.common.config import UNREADABLE
@@ -64,7 +64,7 @@ class Flight:
     @cached_property
     def samples(self) -> SampleTable:
         """`flight.csv`, one row per control sample: state, inputs, references; m, s, rad, N."""
-        return table_of(COLUMNS, (part.table for part in FlightReader(self.plan, self.log)))
+        return table_of(columns_of(self.plan), (part.table for part in FlightReader(self.plan, self.log)))
 
     @cached_property
     def frames(self) -> SampleTable:

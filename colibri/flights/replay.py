@@ -29,7 +29,7 @@ from colibri.common.serialization import of_bytes
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, encode_actuators, encode_state
-from colibri.mavlink.ulog.flight_topics import COMMAND, TRUTH
+from colibri.mavlink.ulog.flight_topics import COMMAND, MORE_COMMAND, ROTORS, TRUTH
 from colibri.mavlink.ulog.reader import FILE, FlightFile, LogFormatError
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
@@ -143,7 +143,11 @@ def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
     codec = Codec(setup.system_id, dialect.PLANT_COMPONENT)
     truth = _truth_frames(flight.log) if setup.feedback is Feedback.STATE else iter(())
     true: StateFrame | None = None
-    for time_s, c1, c2, c3, c4, armed in (row for block in flight.log.blocks(COMMAND) for row in block.tolist()):
+    rotors = setup.vehicle_tables.rotors.count if setup.vehicle_tables else ROTORS
+    others = (row[1:] for block in flight.log.blocks(MORE_COMMAND) for row in block.tolist())
+    for time_s, *controls, armed in (row for block in flight.log.blocks(COMMAND) for row in block.tolist()):
+        if rotors > ROTORS:
+            controls += next(others, ())
         time_us = round(1e6 * time_s)
         datagram = flight.inputs.frames.get(time_us)
         while datagram is None and (true is None or true.time_us < time_us):
@@ -158,7 +162,7 @@ def _recorded(flight: _Flight) -> Iterator[tuple[int, bytes, ActuatorCommand]]:
                 datagram = b"".join(encode_state(codec, true))
             except OverflowError as error:
                 raise ReplayError(f"{flight.path}: state at t = {time_s:.3f} s: {error}: the log is damaged") from error
-        yield time_us, datagram, ActuatorCommand(time_us, (c1, c2, c3, c4), bool(armed))
+        yield time_us, datagram, ActuatorCommand(time_us, tuple(controls[:rotors]), bool(armed))
 
 
 def _truth_frames(log: FlightFile) -> Iterator[StateFrame]:

@@ -39,14 +39,13 @@ COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
     *("control1", "control2", "control3", "control4", "armed", "custom_mode"),
 )
-"""Truth in SI, ENU and FLU; controls as fractions of the largest rotor speed; HEARTBEAT's custom mode."""
+"""Truth in SI, ENU and FLU; controls of all rotors as fractions of the largest speed; HEARTBEAT's custom mode."""
 PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT = (
     *("plant.tlog", "ground.tlog", "flight.csv", "flight.png", "flight.json"),
 )
 """Files of a flight."""
 
-_ROW = Struct(f"<{len(COLUMNS)}d")
-_FLOWN = Struct("<Q13d4d?")
+_CONTROL = COLUMNS.index("control1")
 
 Columns = dict[str, NDArray[np.float64]]
 
@@ -56,6 +55,7 @@ class Record:
 
     def __init__(self) -> None:
         self.frames = 0
+        self._names, self._row, self._flown = _layout(4)
         self._rows = bytearray()
         self._plant: list[tuple[int, bytes]] = []
         self._ground: list[tuple[int, bytes]] = []
@@ -66,8 +66,10 @@ class Record:
         began, command, custom_mode = instant.began, instant.command, instant.to_stations.custom_mode
         place, moves = began.position_enu_m, began.velocity_enu_m_s
         state = (*place, *moves, *began.attitude, *began.rate_flu_rad_s)
-        self._hash.update(_FLOWN.pack(began.time_us, *state, *command.controls, command.armed))
-        self._rows += _ROW.pack(began.time_us * 1e-6, *state, *command.controls, command.armed, custom_mode)
+        if not self.frames:
+            self._names, self._row, self._flown = _layout(len(command.controls))
+        self._hash.update(self._flown.pack(began.time_us, *state, *command.controls, command.armed))
+        self._rows += self._row.pack(began.time_us * 1e-6, *state, *command.controls, command.armed, custom_mode)
         self._plant.append((began.time_us, instant.frame + instant.answer))
         self.frames += 1
 
@@ -82,22 +84,29 @@ class Record:
 
     def columns(self, since_s: float = 0.0) -> Columns:
         """Return `COLUMNS` from a time on, one array each."""
-        table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(COLUMNS))
-        return dict(zip(COLUMNS, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
+        table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(self._names))
+        return dict(zip(self._names, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
     def keep(self, folder: Path) -> None:
         """Write the table and both logs into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / TABLE).open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
-            table.writerow((*COLUMNS[:-1], "mode"))
-            table.writerows((*row, mode_name(number)) for *row, number in _ROW.iter_unpack(bytes(self._rows)))
+            table.writerow((*self._names[:-1], "mode"))
+            table.writerows((*row, mode_name(number)) for *row, number in self._row.iter_unpack(bytes(self._rows)))
         for name, passed in ((PLANT_LOG, self._plant), (GROUND_LOG, self._ground)):
             framer = Framer()
             log = TlogWriter(folder / name)
             for time_us, datagram in passed:
                 log.write(time_us, framer.take(datagram))
             log.close()
+
+
+def _layout(rotors: int) -> tuple[tuple[str, ...], Struct, Struct]:
+    """Return names and layout of the rows of a vehicle, and the layout of what is hashed."""
+    controls = (f"control{number}" for number in range(1, rotors + 1))
+    names = (*COLUMNS[:_CONTROL], *controls, *COLUMNS[-2:])
+    return names, Struct(f"<{len(names)}d"), Struct(f"<Q13d{rotors}d?")
 
 
 def mode_name(number: float) -> str:

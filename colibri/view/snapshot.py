@@ -19,7 +19,7 @@ class ViewError(Error):
 
 
 class VehicleShape(NamedTuple):
-    """The geometry of a vehicle with four rotors.
+    """The geometry of a vehicle.
 
     Attributes:
         rotors_m: x forward, y left of each rotor.
@@ -33,10 +33,10 @@ class VehicleShape(NamedTuple):
 
     @property
     def radius_m(self) -> float:
-        """Radius of a rotor's disc: neighbours almost touch."""
+        """Radius of a rotor's disc: neighbours almost touch; coaxial ones are none."""
         places = np.array(self.rotors_m)
-        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + np.where(np.eye(len(places)), np.inf, 0.0)
-        return float(0.46 * apart.min())
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+        return float(0.46 * apart[apart > 0.1 * apart.max()].min())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

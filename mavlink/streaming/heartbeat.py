@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from colibri.mavlink.node.service import Fields, Peer, Send, to_all
 from colibri.mavlink.services.identity import Identity
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
-from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, TYPE_QUADROTOR, Message, mav
+from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, Message, mav, vehicle_type
 
 EVERY_US = 1_000_000
 MAVLINK_VERSION = 3
@@ -52,7 +52,14 @@ class HeartbeatService:
     def fields(self, s: TelemetrySnapshot) -> Fields:
         armed = MODE_ARMED if s.armed else 0
         mode = (s.base_mode | MODE_CUSTOM | armed) & 0xFF
-        return (TYPE_QUADROTOR, self._identity.autopilot, mode, s.custom_mode, _state(s), MAVLINK_VERSION)
+        return (
+            vehicle_type(len(s.controls)),
+            self._identity.autopilot,
+            mode,
+            s.custom_mode,
+            _state(s),
+            MAVLINK_VERSION,
+        )
 
 
 def _state(s: TelemetrySnapshot) -> int:

@@ -74,13 +74,14 @@ def debug_float_array(s: TelemetrySnapshot) -> Fields:
     """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: solver figures, then the plan.
 
     Figures: status, fallback, iterations, solve_us, step_us, cost, slack; active bounds on rotors, increments, angles,
-    rates (codes: `SolverState`). Plan: squared rotor speeds over the maximum, four a step.
+    rates (codes: `SolverState`). Plan: squared rotor speeds over the maximum, all rotors a step.
     """
     solver = s.solver
     times_us = (1e6 * solver.solve_time_s, 1e6 * solver.step_time_s)
     head = (solver.status, solver.fallback, solver.iterations, *times_us, solver.cost, solver.slack, *solver.active)
     planned = [speed for step in solver.planned_squared for speed in step]
-    whole_steps = (FLOATS - len(head)) // 4 * 4
+    rotors = len(solver.planned_squared[0]) if solver.planned_squared else 1
+    whole_steps = (FLOATS - len(head)) // rotors * rotors
     data = (*map(float, head), *planned[:whole_steps])
     return (s.time_us, ARRAY_NAME, 0, data + (0.0,) * (FLOATS - len(data)))
 

@@ -1,6 +1,7 @@
 """Messages of battery, rotors and speed controllers."""
 
 from math import isfinite, pi
+from operator import mul
 
 from colibri.common.types import PerRotor
 from colibri.mavlink.node.service import Fields
@@ -15,8 +16,9 @@ HECTOJOULES_PER_WH = 36.0
 RPM = 60.0 / (2.0 * pi)
 LOW_US, SPAN_US = 1000.0, 1000.0
 OUTPUTS = 32
-ROTORS = 4
-ALL_ROTORS = 2**ROTORS - 1
+_SERVOS = 16
+_ESCS = 4
+"""Of one ESC_STATUS or ESC_INFO."""
 ESC_CONNECTION_TYPE_DSHOT = 5
 MIXED_GROUP = 0
 
@@ -34,40 +36,42 @@ def battery_status(s: TelemetrySnapshot) -> Fields | None:
     return (*kind, cells, 100.0 * battery.current_a, *used, *left, more, 0, 0)
 
 
-def esc_status(s: TelemetrySnapshot) -> Fields:
-    """ESC_STATUS (291): rpm, V, A; current shared by rotor power, the cube of its speed."""
+def esc_status(s: TelemetrySnapshot) -> list[Fields]:
+    """ESC_STATUS (291), four rotors each: rpm, V, A; current shared by rotor power, the cube of its speed."""
     cubes = [speed * speed * speed for speed in s.rotor_speeds_rad_s]
     total = sum(cubes) or 1.0
     voltage, current = (s.battery.voltage_v, s.battery.current_a) if s.battery else (0.0, 0.0)
-    rpm = tuple(RPM * speed for speed in s.rotor_speeds_rad_s)
-    return (0, s.time_us, rpm, (voltage,) * ROTORS, tuple(current * cube / total for cube in cubes))
+    rpm = [RPM * speed for speed in s.rotor_speeds_rad_s]
+    currents, voltages = [current * cube / total for cube in cubes], [voltage] * len(rpm)
+    return [
+        (first, s.time_us, *(_four(numbers[first : first + _ESCS]) for numbers in (rpm, voltages, currents)))
+        for first in range(0, len(rpm), _ESCS)
+    ]
 
 
-def esc_info(s: TelemetrySnapshot) -> Fields:
-    """ESC_INFO (290): four healthy controllers, temperature unknown."""
-    packets = s.time_us // 1_000_000 % 2**16
-    healthy = ((0,) * ROTORS, (0,) * ROTORS, (UNKNOWN_I16,) * ROTORS)
-    return (0, s.time_us, packets, ROTORS, ESC_CONNECTION_TYPE_DSHOT, ALL_ROTORS, *healthy)
+def esc_info(s: TelemetrySnapshot) -> list[Fields]:
+    """ESC_INFO (290), four rotors each: healthy controllers, temperature unknown."""
+    packets, rotors = s.time_us // 1_000_000 % 2**16, len(s.controls)
+    healthy = ((0,) * _ESCS, (0,) * _ESCS, (UNKNOWN_I16,) * _ESCS)
+    facts = (s.time_us, packets, rotors, ESC_CONNECTION_TYPE_DSHOT, _all(rotors), *healthy)
+    return [(first, *facts) for first in range(0, rotors, _ESCS)]
 
 
 def servo_output_raw(s: TelemetrySnapshot) -> Fields:
     """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; time in µs, wraps after 71 minutes."""
-    return (s.time_us % 2**32, 0, *_pulses_us(s.controls), *(0,) * 12)
+    return (s.time_us % 2**32, 0, *_pulses_us(s.controls), *(0,) * (_SERVOS - len(s.controls)))
 
 
 def actuator_output_status(s: TelemetrySnapshot) -> Fields:
     """ACTUATOR_OUTPUT_STATUS (375): pulses as in SERVO_OUTPUT_RAW."""
-    return (s.time_us, ALL_ROTORS, (*_pulses_us(s.controls), *(0.0,) * (OUTPUTS - ROTORS)))
+    rotors = len(s.controls)
+    return (s.time_us, _all(rotors), (*_pulses_us(s.controls), *(0.0,) * (OUTPUTS - rotors)))
 
 
 def actuator_control_target(s: TelemetrySnapshot) -> Fields:
-    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotor controls.
-
-    Rotors of a plus frame: front (counter-clockwise), right, rear, left.
-    """
-    front, right, rear, left = s.controls
-    moments = (0.5 * (left - right), 0.5 * (front - rear), 0.5 * (front - right + rear - left))
-    return (s.time_us, MIXED_GROUP, (*moments, 0.25 * (front + right + rear + left), 0.0, 0.0, 0.0, 0.0))
+    """ACTUATOR_CONTROL_TARGET (140), group 0: roll, pitch, yaw (FRD) and thrust of the rotor controls."""
+    mixed = [sum(map(mul, levers, s.controls)) for levers in s.levers]
+    return (s.time_us, MIXED_GROUP, (*mixed, sum(s.controls) / len(s.controls), 0.0, 0.0, 0.0, 0.0))
 
 
 def rc_channels(s: TelemetrySnapshot) -> Fields:
@@ -78,6 +82,14 @@ def rc_channels(s: TelemetrySnapshot) -> Fields:
     pitch, roll, thrust, yaw = s.sticks
     sticks = (_stick_us(roll), _stick_us(pitch), LOW_US + SPAN_US * thrust, _stick_us(yaw))
     return (from_boot_ms, len(sticks), *sticks, *(UNKNOWN_U16,) * 14, UNKNOWN_U8)
+
+
+def _all(rotors: int) -> int:
+    return (1 << rotors) - 1
+
+
+def _four(numbers: list[float]) -> tuple[float, ...]:
+    return (*numbers, *(0.0,) * (_ESCS - len(numbers)))
 
 
 def _stick_us(stick: float) -> float:

@@ -91,6 +91,9 @@ NO_SETPOINT = Setpoint()
 NOT_SOLVED = SolverState()
 
 
+_PLUS = ((0.0, -0.5, 0.0, 0.5), (0.5, 0.0, -0.5, 0.0), (0.5, -0.5, 0.5, -0.5))
+
+
 class TelemetrySnapshot(NamedTuple):
     """All values that telemetry sends."""
 
@@ -113,6 +116,7 @@ class TelemetrySnapshot(NamedTuple):
     home: HomePosition | None = None
     rotor_speeds_rad_s: PerRotor = (0.0, 0.0, 0.0, 0.0)  # estimated
     controls: PerRotor = (0.0, 0.0, 0.0, 0.0)  # commanded, parts of the largest
+    levers: tuple[PerRotor, PerRotor, PerRotor] = _PLUS  # of roll, pitch, yaw (FRD) by the controls, -1 to 1
     battery: BatteryState | None = None
     setpoint: Setpoint = NO_SETPOINT
     solver: SolverState = NOT_SOLVED

@@ -6,12 +6,13 @@ The file's format, packing, reading, CSV columns and `docs/files.md` are derived
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, groupby
+from math import nan
 from struct import Struct
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.common.types import Array
+from colibri.common.types import Array, PerRotor
 from colibri.mavlink.ulog.topics import head, message_layout
 
 _US_PER_S = 1e6
@@ -183,4 +184,30 @@ COMMAND = Topic(
         Columns("armed", "", "1 if armed", "uint8_t"),
     ),
 )
-FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND)
+ROTORS = 4
+"""In `TRUTH` and `COMMAND`."""
+MORE_TRUTH = Topic(
+    "colibri_more_truth",
+    106,
+    "more_rotors.csv",
+    "a frame of a vehicle with more than four rotors: the others, `nan` if missing",
+    (Columns("omega5 omega6 omega7 omega8", "the vehicle's", "rotor speed"),),
+)
+MORE_COMMAND = Topic(
+    "colibri_more_command",
+    107,
+    "more_commands.csv",
+    "a command of a vehicle with more than four rotors: the others, `nan` if missing",
+    (Columns("control5 control6 control7 control8", "", "rotor speeds relative to the largest", "float"),),
+)
+FLIGHT_TOPICS = (TRUTH, DECISION, ESTIMATE, FILTER, COMMAND, MORE_TRUTH, MORE_COMMAND)
+
+
+def split(rotors: PerRotor) -> tuple[PerRotor, PerRotor]:
+    """Return four rotors, and the others or (), each filled up with nan."""
+    first, others = rotors[:ROTORS], rotors[ROTORS:]
+    return _filled(first), _filled(others) if others else others
+
+
+def _filled(rotors: PerRotor) -> PerRotor:
+    return rotors if len(rotors) == ROTORS else (*rotors, *(nan,) * (ROTORS - len(rotors)))

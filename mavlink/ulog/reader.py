@@ -10,7 +10,7 @@ from colibri.common.files import regular
 from colibri.common.types import Array
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.ulog import messages
-from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
+from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, MORE_TRUTH, Topic
 from colibri.mavlink.ulog.inputs import CONTENT_BYTES, INPUT_NUMBER, InputRecord, decode_inputs
 
 FILE = "flight.ulg"
@@ -79,7 +79,7 @@ class FlightFile:
             if at - released > _MAPPED_BYTES:
                 self._release()
                 released = at
-        for topic in FLIGHT_TOPICS:
+        for topic in FLIGHT_TOPICS[: FLIGHT_TOPICS.index(MORE_TRUTH)]:  # older logs have no others
             if messages.format_of(topic.name, topic.fields) not in self._formats:
                 raise LogFormatError(f"{self._path}: no log of a flight of this version")
 

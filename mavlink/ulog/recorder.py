@@ -9,6 +9,7 @@ from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, Telemetr
 from colibri.mavlink.ulog import messages, topics
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
+from colibri.mavlink.ulog.flight_topics import split
 from colibri.mavlink.ulog.log import TopicLog
 from colibri.mavlink.ulog.samples import SampleBlocks
 from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
@@ -16,7 +17,6 @@ from colibri.mavlink.ulog.status import VehicleStatus, status_message
 from colibri.mavlink.ulog.topics import record
 
 STATUS_EVERY_US = 1_000_000
-_STILL = (nan,) * 4
 _NO_REFERENCE = (nan,) * 3
 
 
@@ -44,6 +44,8 @@ class Recorder:
         self._record_status(snapshot)
         if not self._thinning.is_due(snapshot.time_us):
             return
+        if self._samples.rotors != len(snapshot.controls):
+            self._samples = SampleBlocks(len(snapshot.controls))
         self._log.add(self._samples, sample_row(snapshot))
         if snapshot.sensed is not None and snapshot.estimator is not None:
             row = sensing_numbers(snapshot.time_us, snapshot.sensed, snapshot.estimator)
@@ -71,23 +73,25 @@ class Recorder:
             return
         self._status, self._status_us = status, now_us
         self._log.flush()
-        self._log.append(status_message(now_us, status, self._system_id))
+        self._log.append(status_message(now_us, status, self._system_id, len(s.controls)))
         if s.battery is not None and self._with_battery:
             self._log.append(battery_message(now_us, s.battery))
 
 
 def sample_row(s: TelemetrySnapshot) -> tuple[float, ...]:
     steered, solver = s.setpoint, s.solver
+    controls, others = split(s.controls if s.armed else (nan,) * len(s.controls))
     attitude = _NO_REFERENCE if s.solver.step_time_s == 0.0 else euler_from_quaternion(steered.attitude)
     return (
         s.time_us,
         *(*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude, *s.rate_flu_rad_s),
-        *(s.controls if s.armed else _STILL),
+        *controls,
         *(*steered.position_enu_m, *steered.velocity_enu_m_s, *steered.acceleration_enu_m_s2),
         *(steered.yaw_rad, steered.yaw_rate_rad_s, *attitude),
         *(solver.status, solver.fallback, 1e6 * solver.solve_time_s, 1e6 * solver.step_time_s, solver.cost),
         *(solver.slack, *solver.active, s.delay_us, solver.mass_kg, solver.path_lag_s),
         nan if solver.iterations < 0 else solver.iterations,
+        *others,
     )
 
 

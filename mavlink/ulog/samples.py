@@ -7,6 +7,7 @@ from colibri.common.jit import compiled
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw
+from colibri.mavlink.ulog.flight_topics import ROTORS
 from colibri.mavlink.ulog.topics import Records
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
@@ -24,7 +25,7 @@ COLUMNS = (
 
 Time (µs); position, velocity, attitude (wxyz, FLU to ENU), rates; commanded rotor speeds in parts of the largest, nan
 unless armed; references of position, velocity, acceleration, yaw (counter-clockwise from east) and its rate; attitude
-setpoint; and the decision, as in `autopilot.csv`.
+setpoint; and the decision, as in `autopilot.csv`. Commands of more than four rotors follow.
 """
 
 _TOPICS = (
@@ -56,8 +57,9 @@ def _quaternions(euler: Array) -> Array:
 class SampleBlocks(Blocks):
     """Encodes rows of `COLUMNS`."""
 
-    def __init__(self) -> None:
-        super().__init__(len(COLUMNS))
+    def __init__(self, rotors: int = ROTORS) -> None:
+        super().__init__(len(COLUMNS) + (ROTORS if rotors > ROTORS else 0))
+        self.rotors = rotors
         _quaternions(np.zeros((1, 3)))
         self._records = Records(BLOCK_ROWS, *_TOPICS)
         self._records[topics.POSITION, "xy_valid"][:] = True
@@ -70,7 +72,8 @@ class SampleBlocks(Blocks):
         records[topics.ATTITUDE, "q"][:count] = attitude_ned(table[:, _ATTITUDE])
         records[topics.RATES, "xyz"][:count] = turned[:, _RATES]
         records[topics.POSITION, "x"][:count] = turned[:, _PLACE]
-        records[topics.MOTORS, "control"][:count, :4] = table[:, _CONTROLS]
+        controls = np.hstack([table[:, _CONTROLS], table[:, len(COLUMNS) :]])[:, : self.rotors]
+        records[topics.MOTORS, "control"][:count, : self.rotors] = controls
         yaw_rad, yaw_rate_rad_s = table[:, _YAW].T
         trajectory = records[topics.TRAJECTORY, "position"]
         trajectory[:count, :9] = turned[:, _REFERENCE]
@@ -78,7 +81,7 @@ class SampleBlocks(Blocks):
         records[topics.POSITION_SETPOINT, "x"][:count] = trajectory[:count]
         steered = records[topics.ATTITUDE_SETPOINT, "q_d"]
         steered[:count, :4] = attitude_ned(_quaternions(table[:, _ATTITUDE_REFERENCE].copy()))
-        steered[:count, 6] = -0.25 * np.square(table[:, _CONTROLS]).sum(axis=1)
+        steered[:count, 6] = -np.square(controls).sum(axis=1) / self.rotors
         records[topics.MPC, "solve_time_us"][:count] = table[:, _MPC]
         records[topics.MPC, "active_rotors"][:count] = table[:, _ACTIVE]
         records[topics.MPC, "qp_status"][:count] = table[:, _CODES]

@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 from colibri.mavlink.ulog import messages, topics
+from colibri.mavlink.ulog.flight_topics import ROTORS
 from colibri.mavlink.ulog.topics import record
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, vehicle_type
 
 _DISARMED, _ARMED = 1, 2
 _ROTARY_WING = 1
@@ -40,9 +41,9 @@ def nav_state(custom_mode: int) -> int:
     return _NAV_STATES.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF), 31)
 
 
-def status_message(time_us: int, status: VehicleStatus, system_id: int) -> bytes:
+def status_message(time_us: int, status: VehicleStatus, system_id: int, rotors: int = ROTORS) -> bytes:
     mode = nav_state(status.custom_mode)
-    who = (_ROTARY_WING, mav.MAV_TYPE_QUADROTOR, system_id, AUTOPILOT_COMPONENT)
+    who = (_ROTARY_WING, vehicle_type(rotors), system_id, AUTOPILOT_COMPONENT)
     times_us, arming = (time_us, status.armed_us, status.takeoff_us), _ARMED if status.armed else _DISARMED
     return messages.SYNC + record(
         *(topics.STATUS, *times_us, arming, mode, mode, *who), status.failsafe, False, False, status.armable

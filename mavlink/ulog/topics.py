@@ -30,7 +30,7 @@ TOPICS: Mapping[str, str] = {
     ATTITUDE_TRUTH: _ATTITUDE,
     RATES_TRUTH: _RATES,
     POSITION_TRUTH: _POSITION,
-    ESCS: "uint64_t timestamp;uint8_t esc_count;uint8_t esc_online_flags;uint8_t esc_armed_flags;esc_report[4] esc;",
+    ESCS: "uint64_t timestamp;uint8_t esc_count;uint8_t esc_online_flags;uint8_t esc_armed_flags;esc_report[8] esc;",
     BATTERY: (
         "uint64_t timestamp;float voltage_v;float current_a;float discharged_mah;float remaining;"
         "float time_remaining_s;bool connected;uint8_t cell_count;uint8_t warning;"

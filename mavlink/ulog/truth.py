@@ -8,11 +8,10 @@ import numpy as np
 from colibri.common.types import Array
 from colibri.mavlink.ulog import topics
 from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned
-from colibri.mavlink.ulog.flight_topics import TRUTH
+from colibri.mavlink.ulog.flight_topics import ROTORS, TRUTH
 from colibri.mavlink.ulog.topics import Records, record
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
-_ROTORS, _ALL_OF_THEM = 4, 0b1111
 _UNKNOWN, _NO_WARNING = -1.0, 0
 _S_PER_H = 3600.0
 
@@ -25,13 +24,17 @@ class TruthVehicle(NamedTuple):
 
     rad_s_per_speed_unit: float  # of its rotor speeds
     capacity_ah: float  # of its battery; 0 without one
+    rotors: int = 4
 
 
 class TruthBlocks(Blocks):
-    """Encodes rows of `TRUTH`."""
+    """Encodes rows of `TRUTH`, each followed by that of `MORE_TRUTH` if there are more rotors."""
 
     def __init__(self, vehicle: TruthVehicle) -> None:
-        super().__init__(len(TRUTH.names))
+        more = vehicle.rotors > ROTORS
+        super().__init__(len(TRUTH.names) + more * ROTORS)
+        omegas = TRUTH.names.index("omega1")
+        self._omegas = [*range(omegas, omegas + ROTORS), *range(len(TRUTH.names), len(TRUTH.names) + more * ROTORS)]
         self._capacity_ah = vehicle.capacity_ah
         self._rpm_per_unit = vehicle.rad_s_per_speed_unit * 30.0 / pi
         self._charge_s = self._charge_ah = nan
@@ -39,7 +42,7 @@ class TruthBlocks(Blocks):
             BLOCK_ROWS, topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS
         )
         self._records[topics.POSITION_TRUTH, "xy_valid"][:] = True
-        self._records[topics.ESCS, "esc_count"][:] = (_ROTORS, _ALL_OF_THEM, _ALL_OF_THEM)
+        self._records[topics.ESCS, "esc_count"][:] = (vehicle.rotors, *(2**vehicle.rotors - 1,) * 2)
 
     def encode(self, table: Array) -> bytes:
         count, records, turned = len(table), self._records, _turned(table)
@@ -54,7 +57,8 @@ class TruthBlocks(Blocks):
             position[:count, place] = velocity
         escs = records[topics.ESCS, "esc"][:count]
         escs["timestamp"] = time_us[:, None]
-        escs["esc_rpm"][:, :, 0] = np.rint(self._rpm_per_unit * table[:, 14:18])
+        rpm = np.nan_to_num(self._rpm_per_unit * table[:, self._omegas])
+        escs["esc_rpm"][:, : rpm.shape[1], 0] = np.rint(rpm)
         return records.first(count) + self._battery(*table[-1, [0, 18, 19]].tolist())
 
     def _battery(self, time_s: float, voltage_v: float, charge_ah: float) -> bytes:

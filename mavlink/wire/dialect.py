@@ -21,6 +21,7 @@ TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2
 """Sends the true state, for programs between plant and autopilot."""
 
 TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
+_TYPES = {3: mav.MAV_TYPE_TRICOPTER, 4: TYPE_QUADROTOR, 6: mav.MAV_TYPE_HEXAROTOR, 8: mav.MAV_TYPE_OCTOROTOR}
 TYPE_GENERIC: int = mav.MAV_TYPE_GENERIC
 AUTOPILOT_GENERIC: int = mav.MAV_AUTOPILOT_GENERIC
 AUTOPILOT_INVALID: int = mav.MAV_AUTOPILOT_INVALID
@@ -53,6 +54,11 @@ _HEADER_BYTES_V1: int = mav.HEADER_LEN_V1
 _PARAM_VALUE = Struct("<I")
 CRC_BYTES = 2
 CRC_START = 0xFFFF
+
+
+def vehicle_type(rotors: int) -> int:
+    """Return the MAV_TYPE of a multirotor."""
+    return int(_TYPES.get(rotors, mav.MAV_TYPE_GENERIC_MULTIROTOR))
 
 
 def bits(prefix: str, names: str) -> int:

@@ -7,7 +7,7 @@ from colibri.common.process.log_files import set_aside
 from colibri.common.process.shared_log import SharedLog, remove_unused
 from colibri.mavlink.ulog.beginning import beginning
 from colibri.mavlink.ulog.blocks import Thinning
-from colibri.mavlink.ulog.flight_topics import TRUTH
+from colibri.mavlink.ulog.flight_topics import MORE_TRUTH, TRUTH, split
 from colibri.mavlink.ulog.log import FileLog, TopicLog
 from colibri.mavlink.ulog.reader import FILE
 from colibri.mavlink.ulog.truth import TruthBlocks, TruthVehicle
@@ -15,10 +15,14 @@ from colibri.mavlink.wire.tlog import TRAFFIC, TlogWriter
 from colibri.plant.physics.world import World
 from colibri.plant.vehicle.description import Vehicle
 
+_COLUMNS = len(TRUTH.names)
+
 
 def truth_row(world: World) -> tuple[float, ...]:
+    """Return a row of `TRUTH`, followed by the speeds of more than four rotors."""
     battery = (world.voltage_v, world.charge_used_ah)
-    return (world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s)
+    speeds, others = split(world.rotor_speeds)
+    return (world.time_us / 1e6, *world.state, *speeds, *battery, *world.wind_enu_m_s, *others)
 
 
 class TruthLog:
@@ -29,11 +33,13 @@ class TruthLog:
         self._log = log
         self._blocks, self._thinning = None, Thinning()
         if log.for_viewers:
-            self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah))
+            self._blocks = TruthBlocks(TruthVehicle(vehicle.rad_s_per_speed_unit, capacity_ah, vehicle.rotors.count))
 
     def write_world(self, world: World) -> None:
         row = truth_row(world)
-        self._log.add(TRUTH, row)
+        self._log.add(TRUTH, row[:_COLUMNS])
+        if len(row) > _COLUMNS:
+            self._log.add(MORE_TRUTH, (row[0], *row[_COLUMNS:]))
         if self._blocks and self._thinning.is_due(world.time_us):
             self._log.add(self._blocks, row)
 

@@ -243,6 +243,11 @@ class Vehicle(Table, frozen=True, kw_only=True):
         changed = replaced(self, key, value, VehicleError)
         return changed if key == "name" else msgspec.structs.replace(changed, name=f"{self.name.rstrip('*')}*")
 
+    def without_rotor(self, rotor: int) -> "Vehicle":
+        """Return the vehicle with a rotor, counted from 0, that has no thrust."""
+        strength = tuple(0.0 if i == rotor else part for i, part in enumerate(self.rotors.strength))
+        return self.replace("rotors.strength", strength)
+
     def without(self, parts: Iterable[str]) -> "Vehicle":
         """Return the vehicle without some of the parts `rotor-lag`, `drag`, `ground`, `battery`."""
         vehicle = self

@@ -13,7 +13,7 @@ class Readiness:
         self._lines = lines
         self._inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
         self.rotor_failed = self.error = ""
-        self.descends = False
+        self.descends = self._lands = False
 
     def update(self, inputs: ArmingInputs) -> None:
         self._inputs = inputs
@@ -31,14 +31,14 @@ class Readiness:
     @property
     def only_lands(self) -> str:
         """Reason why only landing is possible."""
-        return self.rotor_failed or (self.error if self.descends else "")
+        return (self.rotor_failed if self._lands else "") or (self.error if self.descends else "")
 
     def fail(self, error: str) -> None:
         self.error = self.error or error
 
-    def lose_rotor(self, rotor: int) -> None:
-        self.rotor_failed = f"rotor {rotor + 1} failed"
-        self._lines.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
+    def lose_rotor(self, rotor: int, remaining: str = "three rotors", *, lands: bool = True) -> None:
+        self.rotor_failed, self._lands = f"rotor {rotor + 1} failed", lands
+        self._lines.say(EMERGENCY, f"{self.rotor_failed}: {'landing' if lands else 'flying'} on {remaining}")
 
     def trust_rotors(self) -> None:
         self.rotor_failed = ""

@@ -35,7 +35,7 @@ class FailsafeInputs(NamedTuple):
         fence: Returns a place's distance inside every fence, m.
         decided: Diagnostics while the control law is active.
         late: Whether the declared solve time exceeds a control sample.
-        rotor_lost: Failed rotor, 0..3.
+        rotor_lost: Index of a failed rotor for which the vehicle must land.
     """
 
     now_us: int

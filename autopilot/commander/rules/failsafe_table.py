@@ -143,11 +143,11 @@ TABLE: tuple[FailsafeRow, ...] = (
     ),
     FailsafeRow(
         Condition.ROTOR_FAILED,
-        "the motion indicates a failed rotor; the vehicle lands on three, in any mode",
+        "the motion indicates a failed rotor; of four: the vehicle lands on three, in any mode; of more: with 2",
         (),
         "",
         "CA_FAILURE_MODE",
-        (_NOTHING, (1, Action.LAND)),
+        (_NOTHING, (1, Action.LAND), (2, Action.LAND)),
         1,
         _FULL_AGAIN,
         kept=True,

@@ -38,6 +38,7 @@ class Approach(NamedTuple):
     recovery_1_s2: float  # gains of the recovery, slower than plans
     recovery_1_s: float
     from_wrench: Array  # U1, N, and U2..U4, N m, to the squared speeds of m rotors, (m, 4)
+    turns: bool = True  # else the yaw of references is the vehicle's
 
 
 class Flat(NamedTuple):
@@ -67,11 +68,24 @@ def follow(
     p, v, a, yaw = before_jump((position[:n], velocity[:n], acceleration[:n], yaw_rad[:n]), law[0].interval_s)
     near = (target.position, target.velocity, target.acceleration)
     put(yaw, target.yaw_rad)
+    if not law[0].turns:
+        go_on_turning(rigid, law[0].interval_s, target.yaw_rad)
     approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(rigid, near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)
     put(demanded_force(rigid, near, disturbance, law, limits, vehicle), force)
+
+
+@compiled
+def go_on_turning(rigid: Array, interval_s: float, yaw_rad: Array) -> None:
+    """Fill the yaw, (n,), of a vehicle that cannot set it: at its present rate."""
+    qw, qx, qy, qz, q, r = rigid[6], rigid[7], rigid[8], rigid[9], rigid[11], rigid[12]
+    R = rotation_matrix((qw, qx, qy, qz))
+    yaw = atan2(R[1][0], R[0][0])
+    per_s = (q * R[2][1] + r * R[2][2]) / max(R[2][1] * R[2][1] + R[2][2] * R[2][2], 0.01)
+    for n in range(yaw_rad.shape[0]):
+        yaw_rad[n] = yaw + per_s * n * interval_s
 
 
 @compiled

@@ -38,7 +38,7 @@ from colibri.common.jit import opened, packed
 from colibri.common.matrices import dot
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
-from colibri.plant.vehicle.description import Vehicle
+from colibri.plant.vehicle.description import AXES, Vehicle
 
 _RECOVER_BEYOND = cos(radians(75.0))  # recovery from a larger error of the thrust axis
 _AS_PLANNED = cos(radians(15.0))  # unless the previous plan led there, within this angle
@@ -113,6 +113,8 @@ class LpvMpc(TrackingLaw[LawMemory]):
         samples = self._mpc.horizon + 2
         self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
         self._span_n = float(self.tracker.allocation[0].sum())
+        if vehicle.rotors.count > len(AXES):  # without moments
+            self._span_n = min(self._span_n, 1.0 / float(self._mpc.from_wrench[:, 0].max()))
         self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
         k1_s2, k2_s = gains(settings.guidance.poles)
         guidance = Approach(
@@ -125,6 +127,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
             h,
             *gains(settings.fallback.poles),
             self._mpc.from_wrench,
+            self._mpc.turns,
         )
         self._targets = TargetBuilder(guidance, settings.path, self._mpc)
         self._min_squared = square(self.tracker.lag.min_speed)

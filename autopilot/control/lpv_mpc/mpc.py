@@ -16,13 +16,13 @@ from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.control.parts.soft_limits import empty_qp
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
-from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse, holds_yaw
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
-from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
+from colibri.plant.vehicle.description import AXES, Vehicle
 
 
 class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -101,7 +101,7 @@ class Mpc:
         self._solver, self._clock = solver, clock
         numbers = model_of(vehicle, interval_s)
         self.model = packed(numbers)
-        self.turns = len(controlled_axes(numbers.allocation)) == len(AXES)  # whether the rotors can set the yaw
+        self.turns = holds_yaw(vehicle)
         self.from_wrench = exact_inverse(numbers.allocation)  # U1..U4, N, N m, to squared speeds, (m, 4)
         starts = np.cumsum((0, *settings.blocks))
         means, levels = lagging(starts, numbers.lag)

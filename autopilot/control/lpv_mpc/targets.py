@@ -64,6 +64,9 @@ class TargetBuilder:
         slide(references, 0.0, np.full(n, begin), h, steady, slopes)
         passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
         slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
+        if not guidance.turns:
+            feed_forward.go_on_turning(now.rigid, h, nominal[3])
+            steady[3][:], ending[3][:] = nominal[3], nominal[3][-3:]
         near, flat, last_flat, target = self._near, self._flat, self._flat_of(3), self._target
         feasible = feed_forward.feasible_part(*nominal[1:3], now.disturbance, limits, mpc.model)
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], feasible, self._law, near)
@@ -90,6 +93,9 @@ class TargetBuilder:
     def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
         n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
+        if not self._guidance.turns:
+            angles = angles.copy()
+            feed_forward.go_on_turning(now.rigid, self._guidance.interval_s, angles[:, 2])
         feed_forward.stand(angles, thrusts_n, limits, flat)
         feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
         target.yaw_rad[:], target.end_squared[:] = angles[:, 2], flat.squared[-1]

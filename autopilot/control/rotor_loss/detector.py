@@ -7,6 +7,7 @@ Each rotor's CUSUM (E. S. Page, Biometrika 41, 1954) sums the log likelihood rat
 with any moments of inertia". It grows below 0.375 of the expected thrust, about the least for a hover. One sample is
 bounded: a jump of the estimate cannot raise the alarm. Moments alone are no evidence: lift must drop with them, by part
 of the rotor's thrust below its recent mean. The ground and a failed gyroscope cause moments, but no such drop.
+Two coaxial rotors differ in their yaw moments alone: the alarm waits until one of them is `_CLEARLY` more likely.
 """
 
 from typing import NamedTuple
@@ -24,6 +25,7 @@ from colibri.common.types import Array, PerRotor, Quaternion, Vector
 from colibri.plant.vehicle.description import Vehicle
 
 ALARM = 20.0  # log odds: e²⁰ samples are a century
+_CLEARLY = 3.0  # log odds against the next rotor
 MAX_EVIDENCE = 10.0  # from one sample: an alarm takes two
 _WEAK = 0.25  # thrust loss of a weak rotor; the decision threshold is half way from here to 1
 _INERT, _AGILE = -0.4, 1.0  # relative error of the expected turn: moments of inertia 1.67 or 0.5 times the nominal
@@ -31,16 +33,16 @@ _NOISE_PART = 1.0 / 64.0  # filter gain of the noise variances, which make faili
 _USUAL_PART = 1.0 / 64.0  # filter gain of the force's mean, which holds errors of mass and steady wind
 _DROP = 0.4  # least drop of the force, in parts of the rotor's expected thrust
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
-"""Standard deviations of the residual, in parts of a rotor's hover thrust and moments, by errors of the model (mass,
-drag, gusts, weak rotors), far above sensor noise; drag makes moments mostly about z."""
+"""Standard deviations of the residual by errors of the model (mass, drag, gusts, weak rotors), in parts of a quarter of
+the weight and its moments. They are far above sensor noise; drag makes moments mostly about z."""
 
 
 class Signature(NamedTuple):
     """Effect of a vehicle's rotors; forces in N at the largest speed."""
 
-    full_thrust_n: Array  # of each rotor, (4,)
-    effect: Array  # force along z and moments about x, y, z for each N of rotor i in column i, (4, 4)
-    momentum: Array  # of each rotor at the largest speed, N m s, (4,)
+    full_thrust_n: Array  # of each rotor, (m,)
+    effect: Array  # force along z and moments about x, y, z for each N of rotor i in column i, (4, m)
+    momentum: Array  # of each rotor at the largest speed, N m s, (m,)
     inertia: Array  # kg m², (3,)
     variances: Array  # of the residual, N² and N² m², (4,)
     mass_kg: float
@@ -49,10 +51,11 @@ class Signature(NamedTuple):
 
 def signature_of(vehicle: Vehicle) -> Signature:
     allocation = vehicle.allocation()
-    effect = allocation / allocation[0]
+    turning = allocation[0] != 0.0
+    effect = allocation / np.where(turning, allocation[0], 1.0)
     lift_n = vehicle.body.mass_kg * vehicle.gravity_m_s2 / 4.0
-    arm_m = float(np.sqrt(effect[1] * effect[1] + effect[2] * effect[2]).mean())
-    yaw_m = float(np.abs(effect[3]).mean())
+    arm_m = float(np.sqrt(effect[1] * effect[1] + effect[2] * effect[2])[turning].mean())
+    yaw_m = float(np.abs(effect[3])[turning].mean())
     deviations = lift_n * np.array([_FORCE_PART, _TILT_PART * arm_m, _TILT_PART * arm_m, _YAW_PART * yaw_m])
     return Signature(
         allocation[0] * square(vehicle.rotors.max_speed),
@@ -76,9 +79,10 @@ class DetectorModel(NamedTuple):
 class DetectorState(NamedTuple):
     """State of the detector."""
 
-    speeds: Array  # of the rotors, parts of the largest, (4,)
+    speeds: Array  # of the rotors, parts of the largest, (m,)
     motion: Array  # velocity, m/s, ENU; rates, rad/s, FLU; body z axis, ENU: (9,)
-    evidence: Array  # CUSUM of each rotor, (4,)
+    evidence: Array  # CUSUM of each rotor, (m,)
+    odds: Array  # the same without the bound on one sample, (m,)
     residual: Array  # force and moments, N and N m, (4,)
     noise: Array  # variances of the residual's changes, (4,)
     usual: Array  # mean of the residual force, N, (1,)
@@ -89,14 +93,15 @@ class RotorWatch:
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         self._interval_s = interval_s
-        self.lost: int | None = None  # 0..3, permanently
+        self.lost: int | None = None  # index, permanently
         self.max_evidence = 0.0
-        self._memory = packed(DetectorState(*map(np.zeros, (4, 9, 4, 4, 4, 1))))
+        rotors = vehicle.rotors.count
+        self._memory = packed(DetectorState(*map(np.zeros, (rotors, 9, rotors, rotors, 4, 4, 1))))
         self._kept = opened(self._memory, DetectorState)
         self.adopt(vehicle)
-        controls = (0.0, 0.0, 0.0, 0.0)
-        self._take_in(AT_REST, controls, 0.0, counts=True)
-        self.begin(controls)
+        stopped = vehicle.rotors.stopped
+        self._take_in(AT_REST, stopped, 0.0, counts=True)
+        self.begin(stopped)
 
     @property
     def speeds(self) -> Array:
@@ -123,7 +128,7 @@ class RotorWatch:
     def begin(self, controls: PerRotor) -> None:
         kept = self._kept
         self.speeds = np.array(controls)
-        kept.evidence[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
+        kept.evidence[:] = kept.odds[:] = kept.residual[:] = kept.noise[:] = kept.usual[:] = 0.0
         self._began = False
 
     def step(self, state: VehicleState, controls: PerRotor, charge_ah: float, *, airborne: bool) -> int | None:
@@ -170,7 +175,7 @@ def _take_in(
     for i in range(3):
         kept.motion[i], kept.motion[3 + i], kept.motion[6 + i] = velocity_enu_m_s[i], rate_flu_rad_s[i], R[i][2]
     if not counts:
-        kept.evidence[:] = kept.usual[:] = 0.0
+        kept.evidence[:] = kept.odds[:] = kept.usual[:] = 0.0
         return 0, 0.0
     return _add_evidence(kept, before, speeds_before, known.signature, known.interval_s)
 
@@ -188,11 +193,12 @@ def _followed(speeds: Array, controls: PerRotor, open_v: float, lag: SampledLag,
 def _add_evidence(
     memory: DetectorState, before: Array, speeds_before: Array, rotors: Signature, interval_s: float
 ) -> tuple[int, float]:
-    """Add a sample to the CUSUMs in place; return the rotor with the largest, and its value."""
+    """Add a sample to the CUSUMs in place; return the likeliest rotor, and its value, below `ALARM` while in doubt."""
     evidence, now, speeds, last, noise = memory.evidence, memory.motion, memory.speeds, memory.residual, memory.noise
-    thrust_n = np.empty(4)
+    rotor_count = len(rotors.momentum)
+    thrust_n = np.empty(rotor_count)
     h, h_rate = 0.0, 0.0
-    for i in range(4):
+    for i in range(rotor_count):
         squared = 0.5 * (speeds_before[i] * speeds_before[i] + speeds[i] * speeds[i])
         thrust_n[i] = rotors.full_thrust_n[i] * squared
         h += rotors.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
@@ -207,17 +213,17 @@ def _add_evidence(
     residual[2] = iy * (now[4] - before[4]) / interval_s - (iz - ix) * p * r - p * h
     residual[3] = iz * (now[5] - before[5]) / interval_s - (ix - iy) * p * q + h_rate
     for row in range(4):
-        for i in range(4):
+        for i in range(rotor_count):
             expected[row] += rotors.effect[row, i] * thrust_n[i]
         residual[row] -= expected[row]
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
         last[row] = residual[row]
-    lift_n = 0.25 * rotors.mass_kg * rotors.gravity_m_s2
+    lift_n = rotors.mass_kg * rotors.gravity_m_s2 / rotor_count
     drop_n = memory.usual[0] - residual[0]
     memory.usual[0] -= _USUAL_PART * min(max(drop_n, -lift_n), lift_n)
-    likeliest = 0
-    for i in range(4):
+    likeliest, odds, doubtful = 0, memory.odds, False
+    for i in range(rotor_count):
         added = 0.0
         for row in range(4):
             missing = rotors.effect[row, i] * thrust_n[i]
@@ -230,6 +236,9 @@ def _add_evidence(
             added += 0.5 * (weak * weak - none * none) / (rotors.variances[row] + noise[row])
         most = MAX_EVIDENCE if drop_n > _DROP * rotors.effect[0, i] * thrust_n[i] else 0.0
         evidence[i] = max(evidence[i] + min(added, most), 0.0)
-        if evidence[i] > evidence[likeliest]:
+        odds[i] = max(odds[i] + added, 0.0) if evidence[i] > 0.0 else 0.0
+        if odds[i] > odds[likeliest]:
             likeliest = i
-    return likeliest, evidence[likeliest]
+    for i in range(rotor_count):
+        doubtful |= i != likeliest and evidence[i] >= ALARM and odds[i] > odds[likeliest] - _CLEARLY
+    return likeliest, min(evidence[likeliest], 0.99 * ALARM) if doubtful else evidence[likeliest]

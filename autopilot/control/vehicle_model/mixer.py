@@ -19,6 +19,7 @@ from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
 _PRIORITY = (1.0, 10.0, 10.0, 0.1)
 """Weights of thrust, roll, pitch and yaw, each in parts of what the rotors can set."""
 _SWEEPS, _REGULAR = 200, 1e-6
+_YAW_PART = 0.02
 
 
 class Mixing(NamedTuple):
@@ -67,6 +68,21 @@ def allocate(wrench: Array, mixing: Packed, least: float, most: float) -> Array:
                 missed[row] += scaled[row, i] * (to - squared[i])
             squared[i] = to
     return squared
+
+
+def holds_yaw(vehicle: Vehicle) -> bool:
+    """Return whether the rotors can yaw both ways in hover; with rank 4 they may still lack it, as none pulls."""
+    rotors, top = vehicle.rotors, square(vehicle.rotors.max_speed)
+    allocation = vehicle.allocation() * top
+    if rotors.count <= len(AXES) or len(controlled_axes(allocation)) < len(AXES):
+        return len(controlled_axes(allocation)) == len(AXES)
+    mixing, weight_n = mixing_of(allocation), vehicle.body.mass_kg * vehicle.gravity_m_s2
+    least, yaw_n_m = square(rotors.idle_speed) / top, _YAW_PART * float(np.abs(allocation[3]).sum())
+    for side in (-yaw_n_m, yaw_n_m):
+        squared = allocate(np.array([weight_n, 0.0, 0.0, side]), mixing, least, 1.0)
+        if abs(dot(allocation[3], squared) - side) > 0.5 * yaw_n_m:
+            return False
+    return True
 
 
 class Mixer:

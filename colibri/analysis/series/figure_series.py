@@ -4,7 +4,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, POSITION_REFERENCE, SETTLED_AFTER_S, Samples
+from colibri.analysis.recording import (
+    ATTITUDE_REFERENCE,
+    COLUMNS,
+    POSITION_REFERENCE,
+    SETTLED_AFTER_S,
+    Samples,
+    columns_of,
+)
 from colibri.common.compiled_rotations import quaternion_from_euler, rotation_matrix
 from colibri.common.jit import compiled
 from colibri.common.types import Array
@@ -109,10 +116,11 @@ class FigureSeries:
 
     def __init__(self, plan: FlightPlan) -> None:
         self._rotors = plan.plant_vehicle.rotors
+        self._names = _NAMES + columns_of(plan)[len(COLUMNS) :]
         self._start: list[Array] = []
-        self._later = Extremes(len(_NAMES), MAX_POINTS)
+        self._later = Extremes(len(self._names), MAX_POINTS)
         self._path = EveryNth(len(POSITION) + len(POSITION_REFERENCE), MAX_PATH_POINTS)
-        self._newest: Array = np.empty((0, len(_NAMES)))
+        self._newest: Array = np.empty((0, len(self._names)))
         self._squares_m2 = 0.0
         self._settled = 0
 
@@ -134,7 +142,7 @@ class FigureSeries:
 
         Velocities are ENU, m/s; `ex` to `ez` are errors, m, `distance` their norm, and `rms` its RMS once settled.
         """
-        series = _columns(_NAMES, [*self._start, *self._later.points(), self._newest[-1:]])
+        series = _columns(self._names, [*self._start, *self._later.points(), self._newest[-1:]])
         t = series["t"]
         rms = np.sqrt(self._squares_m2 / self._settled) if t[-1] > SETTLED_AFTER_S else np.nan
         return series | {
@@ -158,14 +166,15 @@ def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
 
 
 def _rows(part: Samples) -> Array:
-    """Return the series of a part, columns as in `_NAMES`, with nan as slopes of the reference."""
+    """Return the series of a part as in `_NAMES`, then more rotors; nan as slopes of the reference."""
     position, reference = part.columns(POSITION), part.columns(POSITION_REFERENCE)
     columns = [
-        part.table,
+        part.table[:, : len(COLUMNS)],
         _earth_velocity(part.columns(ATTITUDE), part.columns(("u", "v", "w"))),
         position - reference,
         part.position_error_m[:, None],
         np.full_like(reference, np.nan),
+        part.table[:, len(COLUMNS) :],
     ]
     rows = np.hstack(columns)
     rows[:, _ANGLES] = np.degrees(rows[:, _ANGLES])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.analysis.logs import RecordingError, read_blocks, read_series
-from colibri.analysis.recording import Lags, path_times
+from colibri.analysis.recording import Lags, path_times, rotor_names
 from colibri.analysis.series.figure_series import Extremes
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES
 from colibri.autopilot.guidance.trajectories.tracks import position
@@ -16,7 +16,7 @@ from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import plan_of
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.ulog.flight_topics import DECISION, ESTIMATE, TRUTH, Topic
+from colibri.mavlink.ulog.flight_topics import DECISION, ESTIMATE, MORE_TRUTH, ROTORS, TRUTH, Topic
 from colibri.mavlink.ulog.reader import FILE, FlightFile
 from colibri.plant.vehicle.description import Vehicle
 from colibri.view.geometry import thinned
@@ -56,6 +56,9 @@ class RecordedFlight:
             self.plan = plan_of(folder)
             log = FlightFile(folder / FILE)
             self._truth = _read(log, TRUTH, _ROW_S)
+            self._omegas = rotor_names(self.plan)
+            if len(self._omegas) > ROTORS:
+                self._truth = _joined(self._truth, _read(log, MORE_TRUTH, _ROW_S))
             self._decisions = _read(log, DECISION, 0.0)
             on_sensors = self.plan.spec.feedback is Feedback.SENSORS
             self._estimate = _read(log, ESTIMATE, _ROW_S) if on_sensors else None
@@ -92,7 +95,7 @@ class RecordedFlight:
         place = _between(times_s, self._place, at_s)
         attitude = truth.at(at_s, "qw", "qx", "qy", "qz")
         qw, qx, qy, qz = (attitude / np.linalg.norm(attitude)).tolist()
-        w1, w2, w3, w4 = (truth.at(at_s, "omega1", "omega2", "omega3", "omega4") / self._full_speed).tolist()
+        speeds = truth.at(at_s, *self._omegas) / self._full_speed
         first = int(np.searchsorted(times_s, at_s - _TRAIL_S))
         trail = np.vstack([thinned(self._place[first:row], _TRAIL_POINTS), place])
         estimate, sigma = self._estimated(at_s)
@@ -102,7 +105,7 @@ class RecordedFlight:
             position_enu_m=_vector(place),
             attitude=(qw, qx, qy, qz),
             velocity_enu_m_s=earth_from_body((qw, qx, qy, qz), _vector(truth.at(at_s, "u", "v", "w"))),
-            rotors=(w1, w2, w3, w4),
+            rotors=tuple(speeds.tolist()),
             reference_enu_m=_vector(_between(times_s, self._reference, at_s)),
             trail=trail,
             horizon=NO_POINTS if self._horizons is None else self._horizons.at(at_s),
@@ -120,14 +123,14 @@ class RecordedFlight:
         times_s = self._truth.times_s
         error = np.linalg.norm(self._place - self._reference, axis=1)
         tilt = _tilt_deg(self._truth.columns("qw", "qx", "qy", "qz"))
-        speeds = self._truth.columns("omega1", "omega2", "omega3", "omega4")
+        speeds = self._truth.columns(*self._omegas)
         limits = np.broadcast_to([rotors.idle_speed, rotors.max_speed], (len(times_s), 2))
         charts = [
             _chart("position error, m", ("error",), times_s, error[:, None]),
             _chart("tilt, deg", ("tilt",), times_s, tilt[:, None]),
             _chart(
                 f"rotor speeds, {rotors.speed_unit}",
-                ("1", "2", "3", "4", "(idle)", "(largest)"),
+                (*(name.removeprefix("omega") for name in self._omegas), "(idle)", "(largest)"),
                 times_s,
                 np.hstack([speeds, limits]),
                 speeds.max(axis=1),
@@ -182,6 +185,12 @@ def _read(log: FlightFile, topic: Topic, apart_s: float) -> LogColumns:
     wanted[::step] = wanted[-1] = True
     rows = np.vstack(list(read_blocks(log, topic, wanted)))
     return LogColumns(rows[:, 0], dict(zip(topic.names, rows.T, strict=True)))
+
+
+def _joined(truth: LogColumns, more: LogColumns) -> LogColumns:
+    rows = min(len(truth.times_s), len(more.times_s))
+    named = {name: column[:rows] for name, column in (more.named | truth.named).items()}
+    return LogColumns(truth.times_s[:rows], named)
 
 
 def _reference(plan: FlightPlan, times_s: Array, decisions: LogColumns) -> Array:

@@ -143,7 +143,7 @@ def test_a_failed_rotor_prevents_mode_changes_and_arming(mode: Mode) -> None:
     assert refusal.reason == f"{mode} refused: rotor 3 failed"
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.arm({}, force=True) is not None
-    cockpit.pilot.adopt(replace(cockpit.pilot.behaviour, land_on_three=False))
+    cockpit.pilot.adopt(replace(cockpit.pilot.behaviour, rotor_failure=0))
     assert cockpit.pilot.readiness.rotor_failed == ""
 
 
