@@ -188,14 +188,14 @@ ROTORS = 4
 """In `TRUTH` and `COMMAND`."""
 MORE_TRUTH = Topic(
     "colibri_more_truth",
-    106,
+    107,
     "more_rotors.csv",
     "a frame of a vehicle with more than four rotors: the others, `nan` if missing",
     (Columns("omega5 omega6 omega7 omega8", "the vehicle's", "rotor speed"),),
 )
 MORE_COMMAND = Topic(
     "colibri_more_command",
-    107,
+    108,
     "more_commands.csv",
     "a command of a vehicle with more than four rotors: the others, `nan` if missing",
     (Columns("control5 control6 control7 control8", "", "rotor speeds relative to the largest", "float"),),
