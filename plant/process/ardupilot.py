@@ -24,7 +24,7 @@ from colibri.plant.vehicle.rotor_numbering import Numbering
 
 _MAGIC = {Struct("<HHI16H"): 18458, Struct("<HHI32H"): 29569}
 _FORMATS = {form.size: form for form in _MAGIC}
-_ROTORS = slice(3, 7)
+_FIRST_ROTOR = 3
 _MIN_PULSE_US, _PULSE_RANGE_US = 1000.0, 1000.0
 _SECOND_US = 1_000_000
 _MIN_RATE_HZ = 10
@@ -77,7 +77,7 @@ class ArduPilotEnd:
         if self._count is not None and count < self._count:
             self._begin_again()
         self._count = count
-        self._advance(rate_hz, fields[_ROTORS])
+        self._advance(rate_hz, fields[_FIRST_ROTOR : _FIRST_ROTOR + self._rotors.count])
         self._reply = _encode(self.world, self._physics)
         return self._reply
 
@@ -87,9 +87,9 @@ class ArduPilotEnd:
 
     def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
-        a, b, c, d = map(_control, pulses_us)
-        turning = any((a, b, c, d))  # disarmed, ArduPilot sends the least pulse or none
-        speeds = self._rotors.speeds_of(self._motors.to_vehicle((a, b, c, d)))
+        controls = tuple(map(_control, pulses_us))
+        turning = any(controls)  # disarmed, ArduPilot sends the least pulse or none
+        speeds = self._rotors.speeds_of(self._motors.to_vehicle(controls))
         command = ActuatorCommand(self.world.time_us, speeds, turning)
         self.world = self._physics.step(self.world, command, duration_us)
         self.steps += 1

@@ -28,11 +28,11 @@ def run(spec: PlantSpec, link: UdpLink, status: Status, stop: Stop) -> int:
         start = starting_world(nudged(spec.started(Start(psi=spec.home.yaw_enu_deg))), vehicle, weather)
     except Error as error:
         fail(str(error))
-    frame_type = motors.ardupilot_frame_type
+    frame_class, frame_type = motors.ardupilot_frame
     _, expo = ardupilot_thrust_curve(vehicle.rotors)
-    text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
+    text = f"{vehicle.name} is FRAME_CLASS {frame_class}, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
     text = f"{text}; {all_parameters_by(str(spec.vehicle), 'ardupilot')}"
-    status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
+    status.say("frame", text, frame_class=frame_class, frame_type=frame_type, thrust_expo=expo)
     physics = Physics(vehicle, spec.integrator, weather, spec.disturbance)
     end = ArduPilotEnd(physics, start, motors, vehicle.rotors, is_bound)
     logs = PlantLogs(spec.out, vehicle) if spec.out else None

@@ -54,7 +54,7 @@ class Simulator:
         text = f"{vehicle.name}'s GPS is {delay_ms} ms late, SENS_GPS0_DELAY {delay_ms}"
         status.say("sensors", f"{text}; {all_parameters_by(str(spec.vehicle), 'px4')}", gps_delay_ms=delay_ms)
         self._sensors = vehicle.sensors
-        self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
+        self._rotors, self._order = vehicle.rotors, vehicle.rotors.px4_numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._start = starting_world(nudged(spec.started(Start(psi=spec.home.yaw_enu_deg))), vehicle, weather)
         self._physics = Physics(vehicle, spec.integrator, weather, spec.disturbance)

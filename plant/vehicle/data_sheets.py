@@ -7,17 +7,19 @@ vehicle that is quicker than its file, but not one that is twice as slow.
 import csv
 import io
 import tomllib
+from itertools import pairwise
 from math import isfinite, pi, radians, sqrt
 from typing import Literal, NamedTuple, TypeAlias
 
 from colibri.common.config import SettingsError, read_settings
 from colibri.common.elementary import cos, sin
 from colibri.plant.vehicle.description import Vehicle, VehicleError, vehicle_names, vehicle_text
+from colibri.plant.vehicle.rotor_numbering import FRAMES, Place
 
-Layout: TypeAlias = Literal["x", "+", "h"]
 Order: TypeAlias = Literal["px4", "clockwise"]
 Motor: TypeAlias = Literal["brushless", "brushed"]
-LAYOUTS: tuple[Layout, ...] = ("x", "+", "h")
+LAYOUTS = ("x", "+", "h", *(name for name in FRAMES if name not in ("x", "+")))
+"""Frames of other autopilots; h is x, turning the other way."""
 ORDERS: tuple[Order, ...] = ("px4", "clockwise")
 MOTORS: tuple[Motor, ...] = ("brushless", "brushed")
 
@@ -32,14 +34,8 @@ _TOY_M = 0.1
 """Propellers below this diameter are steep, and have more drag for their thrust."""
 _LOADED: dict[Motor, float] = {"brushless": 0.65, "brushed": 0.45}
 """Speed at full throttle over the speed without load, KV times voltage."""
-_BEARINGS_DEG: dict[tuple[str, Order], tuple[float, ...]] = {
-    ("x", "px4"): (45.0, -135.0, -45.0, 135.0),
-    ("x", "clockwise"): (45.0, 135.0, -135.0, -45.0),
-    ("+", "px4"): (90.0, -90.0, 0.0, 180.0),
-    ("+", "clockwise"): (0.0, 90.0, 180.0, -90.0),
-}
-"""Of each rotor, clockwise from the front."""
-_SPINS: dict[Order, tuple[str, ...]] = {"px4": ("ccw", "ccw", "cw", "cw"), "clockwise": ("ccw", "cw", "ccw", "cw")}
+_APART, _IN_WAKE = 0.1, 0.85
+"""Coaxial rotors: half of what they are apart, in diameters; thrust of the lower one, by measurements of 0.8 to 0.9."""
 _OTHER = {"ccw": "cw", "cw": "ccw"}
 _UNITS = {
     "throttle": {"": 1.0, "percent": 0.01, "pct": 0.01, "%": 0.01},
@@ -74,7 +70,7 @@ class DataSheet(NamedTuple):
     arm_m: float
     """Centre to motor: half the wheelbase."""
     propeller: Propeller
-    layout: Layout = "x"
+    layout: str = "x"
     order: Order = "px4"
     motor: Motor | None = None
     kv_rpm_v: float | None = None
@@ -87,6 +83,17 @@ class DataSheet(NamedTuple):
     drag_n_s_m: float | None = None
     """Horizontal drag of the whole vehicle in hover and slow flight."""
     stand: ThrustStand | None = None
+
+    @property
+    def motors(self) -> list[Place]:
+        motors = FRAMES["x" if self.layout == "h" else self.layout].motors
+        by_bearing = sorted(motors, key=lambda motor: (motor.bearing_deg % 360.0, -motor.level))
+        return by_bearing if self.order == "clockwise" else list(motors)
+
+    @property
+    def rotors(self) -> float:
+        """Number of rotors by thrust: those below others are in their wake."""
+        return sum(_IN_WAKE if level < 0 else 1.0 for *_, level in self.motors)
 
 
 def propeller_of(text: str) -> Propeller:
@@ -170,8 +177,8 @@ def vehicle_file(sheet: DataSheet) -> tuple[str, list[str]]:
     """
     _check(sheet)
     rotor, notes = _rotor(sheet)
-    weight_n, max_n = sheet.mass_kg * _GRAVITY_M_S2, 4.0 * rotor.coefficient * rotor.max_speed**2
-    ratio, hover = max_n / weight_n, sqrt(weight_n / (4.0 * rotor.coefficient))
+    weight_n, max_n = sheet.mass_kg * _GRAVITY_M_S2, sheet.rotors * rotor.coefficient * rotor.max_speed**2
+    ratio, hover = max_n / weight_n, sqrt(weight_n / (sheet.rotors * rotor.coefficient))
     if ratio < _MIN_THRUST_TO_WEIGHT:
         raise VehicleError(
             f"largest thrust {max_n:.3g} N is {ratio:.2f} times the weight: at least {_MIN_THRUST_TO_WEIGHT} is"
@@ -204,7 +211,8 @@ def _check(sheet: DataSheet) -> None:
             raise VehicleError(f"{option} {value:g}: must lie between {least:g} and {most:g} {unit}")
     if sheet.name in vehicle_names():
         raise VehicleError(f'name "{sheet.name}" is that of a vehicle that comes with Colibri: choose another')
-    apart_m = sqrt(2.0) * sheet.arm_m
+    bearings = sorted({motor.bearing_deg % 360.0 for motor in sheet.motors})
+    apart_m = 2.0 * sheet.arm_m * sin(radians(0.5 * min(b - a for a, b in pairwise([*bearings, bearings[0] + 360.0]))))
     if sheet.propeller.diameter_m >= apart_m:
         raise VehicleError(
             f"--propeller of {sheet.propeller.diameter_m:.3g} m: neighbouring motors are {apart_m:.3g} m apart, so that"
@@ -233,7 +241,7 @@ def _rotor(sheet: DataSheet) -> tuple[_Rotor, list[str]]:
         return _Rotor(stand.thrust_coefficient, "thrust stand", stand.max_speed_rad_s, "thrust stand"), notes
     thrust_n, thrust_from = (stand.max_thrust_n, "thrust stand") if stand is not None else (None, "")
     if thrust_n is None and sheet.hover_throttle is not None:
-        thrust_n, thrust_from = sheet.mass_kg * _GRAVITY_M_S2 / 4.0 / sheet.hover_throttle, "hover throttle"
+        thrust_n, thrust_from = sheet.mass_kg * _GRAVITY_M_S2 / sheet.rotors / sheet.hover_throttle, "hover throttle"
     if thrust_n is None:
         assert speed is not None
         return _Rotor(coefficient, origin, speed, speed_from), notes
@@ -257,11 +265,13 @@ def _propeller_coefficient(propeller: Propeller) -> float:
 def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
     """Return the texts that the template needs."""
     mass, arm, size = sheet.mass_kg, sheet.arm_m, sheet.propeller.diameter_m
-    shape = "x" if sheet.layout == "h" else sheet.layout
+    motors = sheet.motors
     places = [
-        (arm * cos(radians(bearing)), -arm * sin(radians(bearing))) for bearing in _BEARINGS_DEG[shape, sheet.order]
+        (arm * cos(radians(bearing)), -arm * sin(radians(bearing)), *([_APART * size * level] if level else []))
+        for bearing, _, level in motors
     ]
-    spins = [_OTHER[spin] if sheet.layout == "h" else spin for spin in _SPINS[sheet.order]]
+    reverse = sheet.layout == "h" or (sheet.layout, sheet.order) == ("+", "clockwise")
+    spins = [_OTHER[spin] if reverse else spin for _, spin, _ in motors]
     plane = mass * arm * arm
     inertia = sheet.inertia_kg_m2 or (0.27 * plane, 0.27 * plane, 0.48 * plane)
     lag = sheet.lag_s or (0.15 if sheet.motor == "brushed" else max(0.05 * size / 0.254, 0.02))
@@ -283,6 +293,7 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         "places": ", ".join(_texts(place) for place in places),
         "places_from": f"arm {_text(arm)} m, layout {sheet.layout}, order {sheet.order}",
         "spins": ", ".join(f'"{spin}"' for spin in spins),
+        "strength": _strength(motors),
         "lag": _text(lag),
         "lag_from": "given"
         if sheet.lag_s
@@ -292,12 +303,19 @@ def _numbers(sheet: DataSheet, rotor: _Rotor, hover: float) -> dict[str, str]:
         if drag is None
         else "given, with the rotors'",
         "rotor_drag": _text(1.2 * mass * _GRAVITY_M_S2 / (2.0 * size * hover * hover) if drag is None else 0.0),
-        "feet": ", ".join(_texts((0.6 * x, 0.6 * y)) for x, y in places),
+        "feet": ", ".join(_texts((0.6 * x, 0.6 * y)) for x, y, *_ in dict.fromkeys(place[:2] for place in places)),
         "depth": _text(0.3 * arm),
         "stiffness": _text(12_900.0 * mass),
         "damping": _text(143.0 * mass),
         "slip": _text(115.0 * mass),
     }
+
+
+def _strength(motors: list[Place]) -> str:
+    if all(motor.level >= 0 for motor in motors):
+        return ""
+    parts = _texts(tuple(_IN_WAKE if motor.level < 0 else 1.0 for motor in motors))
+    return f"strength = {parts}  # estimated: lower rotors in the wake of upper ones\n"
 
 
 def _text(number: float) -> str:
@@ -344,7 +362,7 @@ max_speed = {speed}  # {speed_from}
 position_m = [{places}]  # given: {places_from}
 direction = [{spins}]  # of that order
 gyroscopic_term = "conserving"
-
+{strength}
 [rotors.lag]
 time_constant_up_s = {lag}  # {lag_from}
 time_constant_down_s = {lag}  # {lag_from}

@@ -12,7 +12,7 @@ from colibri.common.config import NotNegative, Positive, Table, named_text, read
 from colibri.common.elementary import square
 from colibri.common.types import Array, PerRotor, Vector
 from colibri.plant.errors import PlantError
-from colibri.plant.vehicle.rotor_numbering import Numbering, numbering
+from colibri.plant.vehicle.rotor_numbering import FRAMES, Numbering, numbering
 from colibri.plant.vehicle.sensors import Sensors as Sensors
 
 Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
@@ -157,12 +157,15 @@ class Rotors(Table, frozen=True, kw_only=True):
         return speeds if self.control == "speed" else tuple(speed * speed for speed in speeds)
 
     def numbering(self) -> Numbering:
-        found = numbering(self.position_m, self.direction) if self.count == 4 else None
+        found = numbering(self.position_m, self.direction)
         if found is None:
-            raise VehicleError(
-                "rotors: PX4 and ArduPilot know a '+' or an 'x' whose opposite rotors turn alike, not this frame"
-            )
+            known = ", ".join(FRAMES)
+            raise VehicleError(f"rotors: places and directions are not those of a frame of ArduPilot ({known})")
         return found
+
+    def px4_numbering(self) -> Numbering:
+        """Return the numbering; the vehicle's own where PX4 knows none, as it is told the places of all rotors."""
+        return numbering(self.position_m, self.direction) or Numbering("", reverse=False, rotors=(*range(self.count),))
 
 
 class Drag(Table, frozen=True, kw_only=True):

@@ -24,6 +24,7 @@ _PX4_BEGINS_WITH: Final = (
     *((name, 110, 1) for name in PX4_DELAYS),
 )
 """PX4's defaults before its airframe changes them, by the ends of names, and a negligible step."""
+_PX4_CT = 6.5
 _SPIN_MIN = 0.15
 _MAX_SPIN_MIN = 0.3
 
@@ -42,10 +43,19 @@ def px4_parameters(vehicle: Vehicle) -> Values:
     rotors = _alike(vehicle)
     values: Values = {"CA_AIRFRAME": 0, "CA_ROTOR_COUNT": len(rotors.position_m)}
     torque_m = rotors.torque_coefficient / rotors.thrust_coefficient
-    for motor, rotor in enumerate(rotors.numbering().rotors):
-        x, y = rotors.position_m[rotor]
+    points_m, axes = vehicle.rotors.points_m(), rotors.axes()
+    for motor, rotor in enumerate(rotors.px4_numbering().rotors):
+        x, y, z = points_m[rotor].tolist()
         values[f"CA_ROTOR{motor}_PX"] = x
         values[f"CA_ROTOR{motor}_PY"] = 0.0 - y
+        if z != 0.0:
+            values[f"CA_ROTOR{motor}_PZ"] = -z
+        if rotors.axis:
+            forward, left, up = axes[rotor].tolist()
+            along = zip("XYZ", (forward, -left, -up), strict=True)
+            values |= {f"CA_ROTOR{motor}_A{axis}": 0.0 + part for axis, part in along}
+        if len(set(rotors.strength)) > 1:
+            values[f"CA_ROTOR{motor}_CT"] = _PX4_CT * rotors.strength[rotor]
         values[f"CA_ROTOR{motor}_KM"] = torque_m if rotors.direction[rotor] == "ccw" else -torque_m
     values["THR_MDL_FAC"] = 1.0 if rotors.control == "speed" else 0.0
     values["MPC_THR_HOVER"] = _within(_PX4_HOVER, vehicle, "hover thrust", _hover_thrust(vehicle))
@@ -64,14 +74,15 @@ def ardupilot_parameters(vehicle: Vehicle) -> Values:
     """Return the parameters of ArduPilot's SITL, which simulates the sensors itself: both ends of the GPS delay."""
     rotors = _alike(vehicle)
     spin_min, expo = ardupilot_thrust_curve(rotors)
+    frame_class, frame_type = rotors.numbering().ardupilot_frame
     if spin_min > _MAX_SPIN_MIN:
         why = f"ArduPilot's MOT_SPIN_MIN is at most {_MAX_SPIN_MIN:g}, not {spin_min:.2g}"
         raise VehicleError(f"{vehicle.name}: rotors.idle_speed: {why}")
     least = _thrust_at(rotors, spin_min)
     hover = (_hover_thrust(vehicle) - least) / (1.0 - least)
     values: Values = {
-        "FRAME_CLASS": 1,
-        "FRAME_TYPE": rotors.numbering().ardupilot_frame_type,
+        "FRAME_CLASS": frame_class,
+        "FRAME_TYPE": frame_type,
         "MOT_PWM_MIN": 1000,
         "MOT_PWM_MAX": 2000,
         "MOT_SPIN_MIN": spin_min,
@@ -99,7 +110,7 @@ def ardupilot_thrust_curve(rotors: Rotors) -> tuple[float, float]:
     (1 + s) is exact; if it is thrust, e = 0.
     """
     idle = rotors.idle_speed / rotors.max_speed
-    spin_min = max(_SPIN_MIN, rotors.controls_of((idle,) * 4)[0])
+    spin_min = max(_SPIN_MIN, rotors.controls_of((idle,))[0])
     return spin_min, (1.0 - spin_min) / (1.0 + spin_min) if rotors.control == "speed" else 0.0
 
 
@@ -125,9 +136,14 @@ FILES: Final[dict[str, Callable[[Vehicle, str], str]]] = {"px4": px4_file, "ardu
 
 
 def _alike(vehicle: Vehicle) -> Rotors:
-    if len(set(vehicle.rotors.strength)) > 1:
+    """Return the rotors; the lower ones of coaxial rotors may be weaker, by their upper ones' wake."""
+    rotors = vehicle.rotors
+    strengths = {(x, y): set[float]() for x, y, _ in rotors.points_m().tolist()}
+    for (x, y, _), part in zip(rotors.points_m().tolist(), rotors.strength, strict=True):
+        strengths[x, y].add(part)
+    if len(set(map(frozenset, strengths.values()))) > 1:
         raise VehicleError(f"{vehicle.name}: rotors.strength: PX4 and ArduPilot take all rotors to be alike")
-    return vehicle.rotors
+    return rotors
 
 
 def _hover_thrust(vehicle: Vehicle) -> float:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from colibri.common.errors import Error
+from colibri.common.errors import Error, unknown
 from colibri.common.files import read_text, write_bytes
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import fail
@@ -26,7 +26,8 @@ def add_options(parser: ArgumentParser) -> None:
     add("--mass", type=float, metavar="KG", help="of new: ready to fly, with battery")
     add("--arm", type=float, metavar="M", help="of new: from the centre to a motor")
     add("--wheelbase", type=float, metavar="M", help="of new: from motor to opposite motor, in place of --arm")
-    add("--layout", choices=("x", "+", "h"), default="x", help="of new: h is x, turning the other way (default x)")
+    layouts = "x, + or h (x, turning the other way), hexa-x, hexa-+, octo-x, octo-+, x8 or y6"
+    add("--layout", metavar="NAME", default="x", help=f"of new: {layouts} (default x)")
     add(
         "--order",
         choices=("px4", "clockwise"),
@@ -108,11 +109,13 @@ def _new(args: Namespace) -> int:
 
 
 def _sheet(args: Namespace, name: str) -> Any:
-    from colibri.plant.vehicle.data_sheets import DataSheet, propeller_of, thrust_stand_of
+    from colibri.plant.vehicle.data_sheets import LAYOUTS, DataSheet, propeller_of, thrust_stand_of
     from colibri.plant.vehicle.description import VehicleError
 
     if args.arm is not None and args.wheelbase is not None:
         raise VehicleError("--arm and --wheelbase: give one of them")
+    if args.layout not in LAYOUTS:
+        raise VehicleError(unknown("--layout", args.layout, LAYOUTS))
     arm_m = args.arm if args.wheelbase is None else 0.5 * args.wheelbase
     required = {"--mass KG": args.mass, "--arm M or --wheelbase M": arm_m, "--propeller SIZE": args.propeller}
     missing = [option for option, value in required.items() if value is None]

@@ -147,11 +147,11 @@ def test_rotors_are_numbered_by_where_they_are(
     bearings_deg: tuple[float, ...], directions: str, shape: str, rotors: tuple[int, ...], frame_type: int
 ) -> None:
     found = turned(bearings_deg, directions).numbering()
-    assert (found.shape, found.rotors, found.ardupilot_frame_type) == (shape, rotors, frame_type)
+    assert (found.shape, found.rotors, found.ardupilot_frame) == (shape, rotors, (1, frame_type))
 
 
 def test_rotors_that_nobody_else_numbers_are_refused() -> None:
-    with pytest.raises(VehicleError, match="not this frame"):
+    with pytest.raises(VehicleError, match="not those of a frame"):
         turned((22.5, 112.5, 202.5, 292.5), "tctc").numbering()
 
 

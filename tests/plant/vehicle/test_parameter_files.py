@@ -85,7 +85,7 @@ def test_ardupilots_throttle_is_thrust(name: str) -> None:
         assert thrust_n(throttle) == pytest.approx(ends[0] + (ends[1] - ends[0]) * throttle)
     assert thrust_n(values["MOT_THST_HOVER"]) == pytest.approx(vehicle.body.mass_kg * vehicle.gravity_m_s2)
     assert rotors.speeds_of((values["MOT_SPIN_MIN"],) * 4)[0] * rotors.max_speed >= rotors.idle_speed
-    assert (values["FRAME_CLASS"], values["FRAME_TYPE"]) == (1, rotors.numbering().ardupilot_frame_type)
+    assert (values["FRAME_CLASS"], values["FRAME_TYPE"]) == rotors.numbering().ardupilot_frame
     assert (values["MOT_PWM_MIN"], values["MOT_PWM_MAX"]) == (1000, 2000)
 
 
