@@ -14,7 +14,7 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING
 from colibri.mavlink.hil.sensors import SensorFrame, sensors_as_received
-from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, command_as_received, state_as_received
+from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame, command_as_received, state_as_received
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.physics.world import World
 from colibri.plant.simulation.plant import Plant
@@ -108,10 +108,13 @@ class InMemory:
         traffic: Traffic | None = None,
         *,
         replayed: bool = True,
+        rotors: int = ROTORS,
     ) -> None:
         self._traffic = traffic
         self._replayed = replayed
-        self.plant_end = PlantEnd(system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback])
+        self.plant_end = PlantEnd(
+            system_id=system_id, frame_interval_us=frame_interval_us, serves=[feedback], rotors=rotors
+        )
         self.autopilot_end = AutopilotEnd(
             system_id=system_id, frame_interval_us=frame_interval_us, now_s=NEVER_LATE_S, feedback=feedback
         )

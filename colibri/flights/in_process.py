@@ -34,8 +34,8 @@ def fly_locally(
     wire: Wire = Direct()
     if plan.spec.link == "memory":
         record = traffic.write if traffic else None
-        replayed = log.topics.for_viewers
-        wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=record, replayed=replayed)
+        replayed, rotors = log.topics.for_viewers, plan.plant_vehicle.rotors.count
+        wire = InMemory(plant.interval_us, plan.spec.feedback, traffic=record, replayed=replayed, rotors=rotors)
     frames = 0
     try:
         truth.write_world(plant.world)

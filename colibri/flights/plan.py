@@ -230,7 +230,7 @@ def _names(spec: FlightSpec, profile: Profile) -> tuple[str, str]:
 def _check_order(vehicle: Vehicle, plant_vehicle: Vehicle) -> None:
     """Refuse a plant whose rotors are the same in another order: each command would reach the wrong one."""
     ours, plants = (
-        [round(degrees(atan2(-y, x)) / _ALIKE_DEG) % _SECTORS for x, y in each.rotors.position_m]
+        [(round(degrees(atan2(-y, x)) / _ALIKE_DEG) % _SECTORS, z) for x, y, z in each.rotors.points_m().tolist()]
         for each in (vehicle, plant_vehicle)
     )
     if ours != plants and sorted(ours) == sorted(plants):

@@ -226,7 +226,7 @@ def _answers(flight: _Flight) -> Iterator[Answer]:
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
     (message,) = codec.decode(encode_actuators(codec, command))
-    arrived = decode_actuators(message)
+    arrived = decode_actuators(message, len(command.controls))
     assert arrived is not None, "what an autopilot commands can be flown"
     return arrived
 

@@ -55,7 +55,7 @@ class Flights:
         self._ends.callback(plant.close)
         autopilot = self._autopilot(setting.autopilot_spec(state), state)
         self._ends.callback(autopilot.close)
-        return LockstepSession(plant, autopilot, setting.system, setting.seed)
+        return LockstepSession(plant, autopilot, setting.system, setting.rotors, setting.seed)
 
     def _plant(self, spec: PlantSpec, state: Path) -> PlantSide:
         if self._launcher is None:

@@ -13,6 +13,7 @@ import numpy as np
 from colibri.autopilot.control.profile import Profile, ProfileError
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, position
 from colibri.common import elementwise
 from colibri.common.elementary import square
@@ -91,7 +92,9 @@ class Reach:
         self._vehicle = vehicle
         self._airframe = airframe_of(vehicle)
         self._battery = BatteryModel(vehicle)
-        self._mixed = np.abs(inverse(vehicle.allocation())) * vehicle.rotors.thrust_coefficient
+        allocation = vehicle.allocation()
+        mixed = inverse(allocation) if vehicle.rotors.count == len(allocation) else exact_inverse(allocation)
+        self._mixed = np.abs(mixed) * vehicle.rotors.thrust_coefficient
         law = profile.of(vehicle).table(profile.controller)
         try:
             self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))

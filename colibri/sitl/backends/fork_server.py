@@ -53,7 +53,7 @@ def _load() -> None:
         for flight in _FLIGHTS:
             setting = setting_of([flight])
             autopilot = MemoryAutopilot(setting.autopilot_spec(Path(folder)))
-            lockstep = LockstepSession(MemoryPlant(setting.plant_spec()), autopilot, setting.system)
+            lockstep = LockstepSession(MemoryPlant(setting.plant_spec()), autopilot, setting.system, setting.rotors)
             lockstep.advance(())
             autopilot.close()
 

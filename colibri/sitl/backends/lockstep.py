@@ -143,8 +143,8 @@ class LockstepSession:
         trouble: Faults of the link between plant and autopilot.
     """
 
-    def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, seed: int = 0) -> None:
-        self.plant = plant
+    def __init__(self, plant: PlantSide, autopilot: AutopilotSide, system: int, rotors: int, seed: int = 0) -> None:
+        self.plant, self._rotors = plant, rotors
         self.autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)
         self._autopilot_source = bytes(self._codec.source)
@@ -154,7 +154,7 @@ class LockstepSession:
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
         plant.receive(autopilot.call())
         self._frame, self.truth = self._taken_in(plant.frame())
-        still = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+        still = ActuatorCommand(0, (0.0,) * rotors, armed=False)
         self.flown = Instant(self.truth, still, StepMessage(0, ()), b"", b"")
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
@@ -248,11 +248,11 @@ class LockstepSession:
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
-        alone = read_actuators(answer, self._autopilot_source)
+        alone = read_actuators(answer, self._autopilot_source, self._rotors)
         if alone is not None:
             return alone
         for message in self._codec.decode(answer):
-            command = decode_actuators(message) if message.name == "HIL_ACTUATOR_CONTROLS" else None
+            command = decode_actuators(message, self._rotors) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:
                 return command
         raise SessionError("the autopilot sent an invalid rotor command")

@@ -76,6 +76,10 @@ class Setting(WorldSpec, LawSpec):
     strict: Annotated[bool, Option("fail the test if a part of the autopilot raises, instead of replacing it")] = True
     ready: Annotated[bool, Option("begin the test after the first HEARTBEAT")] = True
 
+    @property
+    def rotors(self) -> int:
+        return load_vehicle(self.vehicle).rotors.count
+
     def plant_spec(self) -> PlantSpec:
         """Return the specification of the plant."""
         start = _STANDING
