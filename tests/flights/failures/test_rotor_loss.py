@@ -74,6 +74,61 @@ def test_with_a_lost_rotor_only_landing_is_possible(sitl: Sitl) -> None:
     sitl.arm()
 
 
+def keep_flying(sitl: Sitl, rotor: int, remaining: str) -> None:
+    """Take a rotor away, hold for some seconds, then land."""
+    sitl.run(1.0)
+    place, began_s = sitl.position, sitl.time_s
+    sitl.inject("motor", "wrong", rotor + 1, NEXT_TO_NONE)
+    sitl.run(6.0)
+    assert sitl.inside.copter.parts.rotor_loss.lost == rotor
+    assert sitl.said(f"rotor {rotor + 1} failed: flying on {remaining}")
+    flown = sitl.flown(began_s)
+    assert max(dist((x, y, z), place) for x, y, z in zip(flown["x"], flown["y"], flown["z"], strict=True)) < 0.2
+    assert abs(flown["r"]).max() < 0.5
+    assert sitl.mode is Mode.HOLD
+    sitl.select(Mode.LAND)
+    sitl.wait_until(lambda: not sitl.armed, within=20.0)
+    assert dist(sitl.position[:2], place[:2]) < 0.2
+    assert sitl.tilt_deg < 1.0
+    refused(sitl, f"Arming denied: rotor {rotor + 1} failed", sitl.arm)
+
+
+@pytest.mark.parametrize("rotor", [0, *(pytest.param(rotor, marks=pytest.mark.long) for rotor in range(1, 6))])
+@pytest.mark.sitl(vehicle="firefly", airborne=4.0)
+def test_a_hexarotor_flies_on_with_five(sitl: Sitl, rotor: int) -> None:
+    keep_flying(sitl, rotor, "5 rotors, yaw given up")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rotor", [0, 3, 7])
+@pytest.mark.sitl(vehicle="s1000", airborne=4.0)
+def test_an_octorotor_flies_on_with_seven(sitl: Sitl, rotor: int) -> None:
+    keep_flying(sitl, rotor, "7 rotors")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rotor", [0, 3, 7])
+@pytest.mark.sitl(vehicle="x8", airborne=4.0)
+def test_coaxial_rotors_are_told_apart(sitl: Sitl, rotor: int) -> None:
+    keep_flying(sitl, rotor, "7 rotors")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rotor", [0, 3])
+@pytest.mark.sitl(vehicle="y6", airborne=4.0)
+def test_a_y6_flies_on_with_five(sitl: Sitl, rotor: int) -> None:
+    keep_flying(sitl, rotor, "5 rotors")
+
+
+@pytest.mark.sitl(vehicle="firefly", airborne=4.0, params={"CA_FAILURE_MODE": 2})
+def test_a_hexarotor_may_have_to_land(sitl: Sitl) -> None:
+    sitl.run(0.4)
+    sitl.inject("motor", "off", 2)
+    sitl.run(0.6)
+    assert sitl.mode is Mode.LAND
+    refused(sitl, "hold refused: rotor 2 failed", sitl.select, Mode.HOLD)
+
+
 @HIGH
 def test_a_rotor_lost_at_speed_is_survived(sitl: Sitl) -> None:
     sitl.goto(100.0, 0.0, 10.0, speed=5.0, wait=False)

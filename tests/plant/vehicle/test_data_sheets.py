@@ -9,11 +9,11 @@ import msgspec
 import pytest
 
 from colibri.common.config import read_settings
-from colibri.plant.vehicle.data_sheets import DataSheet, propeller_of, thrust_stand_of, vehicle_file
+from colibri.plant.vehicle.data_sheets import LAYOUTS, ORDERS, DataSheet, propeller_of, thrust_stand_of, vehicle_file
 from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
 from tools.vehicles.__main__ import OFF_M, Trial, fly, lemniscate
 
-X500 = DataSheet("x500", 2.0643, 0.25, propeller_of("1045"), kv_rpm_v=920.0, cells=4, hover_throttle=0.6)
+X500 = DataSheet("mine", 2.0643, 0.25, propeller_of("1045"), kv_rpm_v=920.0, cells=4, hover_throttle=0.6)
 CF21 = DataSheet(
     "cf", 0.0319, 0.046, propeller_of("45mm"), order="clockwise", motor="brushed", kv_rpm_v=14000.0, cells=1,
     hover_throttle=0.65, drag_n_s_m=0.0147,
@@ -26,16 +26,27 @@ def written(sheet: DataSheet) -> Vehicle:
     return read_settings(tomllib.loads(vehicle_file(sheet)[0]), Vehicle)
 
 
-@pytest.mark.parametrize("sheet", [X500, CF21, X500._replace(layout="+"), X500._replace(layout="h", capacity_ah=5.0)])
+LARGE = X500._replace(arm_m=0.5)
+
+
+@pytest.mark.parametrize(
+    "sheet",
+    [X500, CF21, X500._replace(layout="+"), X500._replace(layout="h", capacity_ah=5.0)]
+    + [LARGE._replace(layout=layout, order=order) for layout in LAYOUTS[3:] for order in ORDERS],
+)
 def test_a_written_vehicle_is_complete(sheet: DataSheet) -> None:
     vehicle = written(sheet)
     assert all((vehicle.drag, vehicle.ground, vehicle.sensors, vehicle.rotors.lag))
     assert (vehicle.battery is None) == (sheet.capacity_ah is None)
-    assert all(hypot(x, y) == pytest.approx(sheet.arm_m, rel=1e-4) for x, y in vehicle.rotors.position_m)
+    assert all(hypot(x, y) == pytest.approx(sheet.arm_m, rel=1e-4) for x, y, *_ in vehicle.rotors.position_m)
     assert sheet.hover_throttle is not None
     weight_n = sheet.mass_kg * vehicle.gravity_m_s2
     assert vehicle.max_wrench()[0] * sheet.hover_throttle == pytest.approx(weight_n, rel=1e-3)
-    assert vehicle.rotors.numbering().reverse == (sheet.layout == "h")
+    found = vehicle.rotors.numbering()
+    assert (found.shape, found.reverse) == ("x" if sheet.layout == "h" else sheet.layout, sheet.layout == "h")
+    turns = tuple(range(vehicle.rotors.count))
+    assert sheet.order != "px4" or found.rotors == turns
+    assert found.to_vehicle(found.to_motors(turns)) == turns
 
 
 def test_lag_and_inertia_are_not_below_those_of_the_true_vehicle() -> None:

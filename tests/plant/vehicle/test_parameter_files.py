@@ -9,7 +9,7 @@ import pytest
 from pymavlink.mavparm import MAVParmDict
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, enu_of
-from colibri.common.types import Array, PerRotor
+from colibri.common.types import Array, PerRotor, Vector
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.parameters.file import read
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType
@@ -164,7 +164,6 @@ def test_the_file_for_ardupilot_is_one_of_mavproxy(
         ("body.mass_kg", 1.7, r"hover thrust is 0.85., and M.._TH.*_HOVER is 0.1.* to 0.*"),
         ("body.mass_kg", 0.15, r"hover thrust is 0.0.*, and M.._TH.*_HOVER is 0.1.* to 0.*"),
         ("sensors.gps.delay_s", 0.31, r"sensors.gps.delay_s in ms is 310, and .*DELAY.* is 0 to [23].0"),
-        ("rotors.position_m", tuple(zip((0.16, 0.06, -0.16, -0.06), (0.06, -0.16, -0.06, 0.16), strict=True)), "frame"),
     ],
 )
 def test_a_vehicle_that_they_have_no_parameters_for_is_refused(whom: str, key: str, value: object, why: str) -> None:
@@ -180,3 +179,14 @@ def test_rotors_that_idle_fast_are_refused_for_ardupilot_alone() -> None:
     with pytest.raises(VehicleError, match=r"MOT_SPIN_MIN is at most 0\.3, not 0\.36"):
         ardupilot_parameters(fast)
     assert px4_parameters(fast) == px4_parameters(vehicle)
+
+
+@pytest.mark.parametrize("axis", [(), tuple((0.1 * side, 0.0, 1.0) for side in (1, -1, 1, -1))])
+def test_px4_alone_flies_frames_of_any_shape(axis: tuple[Vector, ...]) -> None:
+    turned = ((0.16, 0.06, 0.02), (0.06, -0.16), (-0.16, -0.06), (-0.06, 0.16))
+    vehicle = load_vehicle("hummingbird").replace("rotors.position_m", turned).replace("rotors.axis", axis)
+    values = px4_parameters(vehicle)
+    assert [values[f"CA_ROTOR0_P{letter}"] for letter in "XYZ"] == [0.16, -0.06, -0.02]
+    assert ("CA_ROTOR1_AX" in values) == bool(axis)
+    with pytest.raises(VehicleError, match="not those of a frame"):
+        FILES["ardupilot"](vehicle, "")
