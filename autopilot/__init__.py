@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from colibri.autopilot.control.interface import Horizon as Horizon
     from colibri.autopilot.control.interface import Preview as Preview
     from colibri.autopilot.control.interface import VehicleState as VehicleState
+    from colibri.autopilot.control.parts.rate_loop import RateLoop as RateLoop
+    from colibri.autopilot.control.parts.rotor_frame import RotorFrame as RotorFrame
     from colibri.autopilot.control.policy import PolicyInputs as PolicyInputs
     from colibri.autopilot.control.policy import PolicyLaw as PolicyLaw
     from colibri.autopilot.control.profile import Profile as Profile

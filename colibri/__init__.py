@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from colibri.autopilot import Preview as Preview
     from colibri.autopilot import Profile as Profile
     from colibri.autopilot import QpStatus as QpStatus
+    from colibri.autopilot import RateLoop as RateLoop
+    from colibri.autopilot import RotorFrame as RotorFrame
     from colibri.autopilot import TaylorSeries as TaylorSeries
     from colibri.autopilot import Track as Track
     from colibri.autopilot import TrackOptions as TrackOptions
