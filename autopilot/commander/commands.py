@@ -1,16 +1,19 @@
 """MAVLink commands to arm, change mode or speed, and set home."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isnan
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
-from colibri.autopilot.commander.motion_commands import MotionCommands, Needs, denied
+from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
+from colibri.autopilot.commander.motion_commands import MotionCommands, denied
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode, Need, mode_of, mode_of_custom
+from colibri.autopilot.commander.rules.modes import Mode, Need
+from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
 from colibri.mavlink.services.command import FAILED, UNSUPPORTED, Handler, ReceivedCommand
+from colibri.mavlink.setpoints.setpoints import OffboardSetpoint
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import read_place
 from colibri.mavlink.wire.refusal import Refusal
@@ -19,16 +22,19 @@ FORCE_MAGIC = 21196
 _OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
 """SPEED_TYPE: equivalent without an airspeed sensor."""
 _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
-CUSTOM: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 class Commands:
-    """Handlers of the commands of ground stations."""
+    """Handlers of the commands of ground stations; `taken` takes setpoints where a mode flies them by itself."""
 
-    def __init__(self, pilot: Pilot, fence: Fence, missions: Missions, needs: Needs) -> None:
+    def __init__(
+        self, pilot: Pilot, fence: Fence, missions: Missions, needs: Needs, book: ModeBook = PX4_MODES
+    ) -> None:
         self._pilot, self._missions = pilot, missions
         self._fence, self._needs = fence, needs
         self._home = pilot.home
+        self.modes = ModeSelection(book, pilot, needs)
+        self.taken: Callable[[OffboardSetpoint | None], None] | None = None
         self.motion = MotionCommands(pilot, fence, needs)
 
     def handlers(self) -> Mapping[int, Handler]:
@@ -48,15 +54,7 @@ class Commands:
         }
 
     def select(self, mode: Mode) -> Refusal | None:
-        refusal = self._pilot.select(mode, self._needs.missing())
-        remark = "" if refusal else self._needs.remark(mode)
-        if remark:
-            self._pilot.warn(remark)
-        return refusal
-
-    def _select_known(self, mode: Mode | None, numbers: str) -> Refusal | None:
-        unknown = Refusal(f"mode refused: {numbers} is no mode of this vehicle", UNSUPPORTED)
-        return unknown if mode is None else self.select(mode)
+        return self.modes.command(mode)
 
     def _select_here(self, mode: Mode, command: ReceivedCommand) -> Refusal | None:
         refusal = self.select(mode)
@@ -68,24 +66,19 @@ class Commands:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
             self._judge_fence()
-            return self._pilot.arm(self._needs.missing(), force=force)
+            return self.modes.arm(force=force)
         if command.p1 == 0.0:
             return self._pilot.disarm(force=force)
         return denied("arming", f"{command.p1:g} is not 1, to arm, or 0, to disarm")
 
     def _set_mode(self, command: ReceivedCommand) -> Refusal | None:
         self._needs.engage(command.peer, command.now_us)
-        numbers = (command.p1, command.p2, 0.0 if isnan(command.p3) else command.p3)
-        if not all(0.0 <= number < 256.0 and number == int(number) for number in numbers):
-            return denied("mode", "{:g} {:g} {:g} is not a PX4 base, main and sub mode".format(*numbers))
-        base, main, sub = map(int, numbers)
-        if not base & CUSTOM:
-            return Refusal(f"mode refused: base mode {base} has no custom mode", UNSUPPORTED)
-        return self._select_known(mode_of(main, sub), f"{main} {sub}")
+        chosen = self.modes.book.by_command(command.p1, command.p2, 0.0 if isnan(command.p3) else command.p3)
+        return chosen if isinstance(chosen, Refusal) else self.modes.select(*chosen)
 
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
-        mode = mode_of_custom(custom_mode) if base_mode & CUSTOM else None
-        return self._select_known(mode, f"{base_mode} {custom_mode}")
+        chosen = self.modes.book.by_message(base_mode, custom_mode)
+        return chosen if isinstance(chosen, Refusal) else self.modes.select(*chosen)
 
     def _start_mission(self, command: ReceivedCommand) -> Refusal | None:
         """Fly the mission from item p1 on, as in PX4; nan or -1: from the current one. It is flown to its end."""

@@ -12,6 +12,7 @@ from colibri.autopilot.guidance.reference import Reference, target_of
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
+from colibri.autopilot.guidance.tasks.guided import GuidedSettings, GuidedTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Land, Orbit, Order, OrderRecord, TakeOff, order_of, record_of
@@ -47,7 +48,7 @@ class TaskRecord(NamedTuple):
     legs: tuple[int, ...] = ()
 
 
-_ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask)
+_ORDERED = (GoToTask, OrbitTask, TakeoffTask, HoldTask, GuidedTask)
 """Tasks restarted by an order."""
 _AGAIN: Mapping[Mode, tuple[type[Order], ...]] = {
     Mode.HOLD: (GoTo, TakeOff),  # a take-off that has arrived settles in hold
@@ -121,6 +122,9 @@ class ModeTasks:
 
     def begin(self, mode: Mode, context: TaskContext) -> FlightTask:
         return self._factories[mode](context)
+
+    def guided(self, settings: Callable[[], GuidedSettings]) -> GuidedTask:
+        return GuidedTask(self._attitude, self._gravity_m_s2, settings)
 
     def again(self, record: TaskRecord, mode: Mode, context: TaskContext) -> FlightTask:
         if mode is Mode.TRACK and self._first is None and record.began_us is not None:

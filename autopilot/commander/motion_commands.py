@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from math import dist, isnan, nan, pi, radians
-from typing import Protocol
 
 from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.mode_selection import Needs
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode, Need
+from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit, turn_of
 from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
@@ -31,16 +31,6 @@ _NO_FRAME = (None, mav.MAV_FRAME_MISSION)
 _ELSEWHERE_M = 10.0
 _NOBODY = Peer(0, 0, 0)
 NOT_FLYING = "the vehicle is not flying"
-
-
-class Needs(Protocol):
-    """Unmet needs of modes."""
-
-    def missing(self) -> Mapping[Need, str]: ...
-
-    def remark(self, mode: Mode) -> str: ...
-
-    def engage(self, peer: Peer, now_us: int) -> None: ...
 
 
 class MotionCommands:

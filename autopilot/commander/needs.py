@@ -23,6 +23,12 @@ class Latest(Protocol[_T]):
     def refusal(self, now_us: int) -> str: ...
 
 
+class LatestSticks(Latest[Sticks], Protocol):
+    """The sticks, and the channels of a radio behind them."""
+
+    held: tuple[int, ...]
+
+
 class ModeNeeds:
     """Needs of modes for one pilot."""
 
@@ -30,7 +36,7 @@ class ModeNeeds:
         self,
         pilot: Pilot,
         missions: Missions,
-        manual: Latest[Sticks],
+        manual: LatestSticks,
         offboard: Latest[OffboardSetpoint],
         follow: Latest[TargetState],
         *,
@@ -51,7 +57,7 @@ class ModeNeeds:
 
     def missing(self) -> dict[Need, str]:
         """Return the unmet needs, each with its reason."""
-        sticks, setpoint, _ = self.steered(self._now_us)
+        sticks, setpoint, *_ = self.steered(self._now_us)
         met = {
             Need.ATTITUDE_CONTROL: self._takes_attitude,
             Need.STICKS: sticks is not None,
@@ -69,6 +75,10 @@ class ModeNeeds:
         unmet = {need: refused.get(need) or need.value for need, there in met.items() if not there}
         return unmet | self._missions.unmet
 
+    def refusals(self) -> list[str]:
+        """Return the reasons against arming."""
+        return self._pilot.readiness.refusals()
+
     def remark(self, mode: Mode) -> str:
         """Return what a mode waits for; empty if it waits for nothing."""
         if mode is not Mode.FOLLOW or self.steered(self._now_us).followed is not None:
@@ -81,4 +91,5 @@ class ModeNeeds:
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
             self._offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
             self._follow.latest(now_us, _TARGET_LOST_US),
+            self._manual.held,
         )

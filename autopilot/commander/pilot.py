@@ -207,6 +207,9 @@ class Pilot:
     def warn(self, text: str) -> None:
         self._lines.say(WARNING, text)
 
+    def say(self, severity: int, text: str) -> None:
+        self._lines.say(severity, text)
+
     @property
     def flight(self) -> FlightState:
         return FlightState(self.state.armed, self.ground.standing, self.state.mode, self.saving)

@@ -5,7 +5,7 @@ from colibri.autopilot.core.checkpoint import Checkpointer, History, goes_on
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.core.supervision import Supervision
 from colibri.mavlink.hil.state import StateFrame
-from colibri.mavlink.services.statustext import INFO, WARNING
+from colibri.mavlink.services.statustext import WARNING
 
 FALLS = "Restarted in flight without a record: falling"
 
@@ -60,7 +60,7 @@ class FlightStart:
         self._checkpointer.resume(history, frame, parts.tasks.again)
         turns, stopped = pilot.state.armed and not pilot.ground.idles, parts.loop.vehicle.rotors.stopped
         parts.actuation.begin(parts.loop.controls if turns else stopped)
-        parts.stations.say(INFO, parts.stations.system.banner)
+        parts.stations.introduce()
         if not pilot.state.armed:
             return
         self._catch(frame.time_us)
@@ -80,7 +80,7 @@ class FlightStart:
         parts.actuation.begin(loop.vehicle.rotors.stopped if parts.pilot.ground.standing else loop.controls)
         parts.pilot.readiness.trust_rotors()
         self._catch(frame.time_us)
-        parts.stations.say(INFO, parts.stations.system.banner)
+        parts.stations.introduce()
 
     def _catch(self, now_us: int) -> None:
         if self._parts.state_source.estimate is not None and not self._parts.state_source.rests:

@@ -27,6 +27,7 @@ from colibri.autopilot.guidance.attitude_reference import AttitudeReference, att
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.autopilot.identities import CONVENTIONS
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.mavlink.node.budget import Budget
@@ -69,7 +70,8 @@ def parts_of(
 ) -> Parts:
     """Return the parts of a vehicle; arguments and errors are those of `copter_autopilot`."""
     numbers = Numbers(profile, vehicle)
-    parameters = Parameters(definitions(profile, vehicle, settings.system_id))
+    conventions = CONVENTIONS[settings.identity]
+    parameters = conventions.parameters(definitions(profile, vehicle, settings.system_id), settings.system_id)
     parameters.load(values or {})
     flown, assumed = numbers.applied(parameters.values)
     flies_by = behaviour(parameters)
@@ -83,7 +85,7 @@ def parts_of(
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
     defence = Defence(pilot, lines.say, strict=strict)
     stations = Stations(
-        *(settings, pilot, missions, fence, lines, parameters, vehicle.name),
+        *(settings, pilot, missions, fence, lines, parameters, vehicle.name, tasks, conventions),
         takes_attitude=attitude is not None,
         defence=defence,
         budget=budget,

@@ -45,7 +45,7 @@ class Reporter:
             return
         snapshot = parts.snapshots.take(
             *(now_us, state, pilot, guidance, decision, duration_s, controls),
-            *(parts.battery.state(charge_state), fence, parts.state_source),
+            *(parts.battery.state(charge_state), fence, parts.state_source, stations.modes),
             breached=breach is not None,
         )
         stations.update(snapshot)

@@ -5,9 +5,10 @@ from math import isnan
 import numpy as np
 
 from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.mode_selection import ModeSelection
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import ROWS, Mode, custom_mode
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.control.interface import (
     FALLBACK_CODES,
     STATUS_CODES,
@@ -36,11 +37,6 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
 FORECAST_EVERY_US = 200_000
-_CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-_MANUAL = _CUSTOM | mav.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
-_AUTO = (
-    _CUSTOM | mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUIDED_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
-)
 _NEAR_GROUND_M = 1.0
 _SINKING_M_S = -0.1
 
@@ -72,22 +68,24 @@ class SnapshotBuilder:
         battery: BatteryState | None,
         fence: Fence,
         state_source: StateSource,
+        modes: ModeSelection,
         *,
         breached: bool,
     ) -> TelemetrySnapshot:
         sticks, times, home = pilot.sensed.steered.sticks, pilot.ground.times, pilot.home
-        mode, armed = pilot.state
-        number = custom_mode(mode)
+        armed = pilot.state.armed
+        modes.update()
         vx, vy, vz = velocity = state.velocity_enu_m_s
         (ux, uy, uz), self._velocity, dt = self._velocity or velocity, velocity, self._interval_s
         speed = self._max_speed_rad_s
         return TelemetrySnapshot(
             time_us=now_us,
             armed=armed,
-            base_mode=_MANUAL if sticks is not None and mode in _BY_STICKS else _AUTO,
-            custom_mode=number,
-            intended_custom_mode=number,
-            standard_mode=ROWS[mode].standard,
+            base_mode=modes.base_modes[sticks is not None],
+            custom_mode=modes.shown.number,
+            intended_custom_mode=modes.shown.number,
+            standard_mode=modes.shown.standard,
+            px4_mode=custom_mode(pilot.state.mode),
             landed_state=landed_state(pilot, state),
             failsafe=pilot.saving is not Action.NONE,
             emergency=pilot.saving >= Action.LAND,
@@ -111,6 +109,7 @@ class SnapshotBuilder:
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
             delay_us=pilot.sensed.delay_us,
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
+            channels=pilot.sensed.steered.channels,
             flight_started_us=times.armed_us,
             takeoff_us=times.takeoff_us,
             landing_us=times.landing_us,
@@ -142,9 +141,6 @@ class SnapshotBuilder:
             *(squared, forecast, how.mass_kg, how.path_lag_s),
         )
         return self._solver
-
-
-_BY_STICKS = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
 
 
 def landed_state(pilot: Pilot, state: VehicleState) -> int:

@@ -5,36 +5,37 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, TypeVarTuple
 
-from colibri.autopilot.commander.commands import CUSTOM, Commands
+from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import MODES, custom_mode
 from colibri.autopilot.commander.status_queue import StatusQueue
+from colibri.autopilot.ground.conventions import Commanded, Conventions
 from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.onboard_log import LOGS, LoggedVehicle, OnboardLog
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
-from colibri.common.earth.geodesy import Geodetic
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.log_download import Logs
 from colibri.mavlink.files.memory import MemoryFiles
 from colibri.mavlink.files.tree import Files, Tree
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
-from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.mission.service import MissionService, MissionVehicle
 from colibri.mavlink.node.budget import Budget
-from colibri.mavlink.node.hub import Hub, Outgoing
-from colibri.mavlink.node.service import to
+from colibri.mavlink.node.hub import ChannelObserver, Hub, Outgoing
+from colibri.mavlink.node.service import Service, to
 from colibri.mavlink.parameters.metadata import Metadata, metadata_json
 from colibri.mavlink.parameters.pack import packed
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import CommandService, Handler
-from colibri.mavlink.services.identity import IDENTITIES
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.shell import Shell
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
@@ -43,6 +44,7 @@ from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.setpoints.follow_target import Follow
 from colibri.mavlink.setpoints.manual_control import Manual
 from colibri.mavlink.setpoints.offboard import Offboard
+from colibri.mavlink.setpoints.radio import Radio
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
@@ -80,6 +82,13 @@ class StationSettings:
     reports: bool = True
 
 
+def home_item(home: Home) -> MissionItem:
+    """Return home as a waypoint above the sea."""
+    place = geodetic_of(home.position_enu_m, home.origin)
+    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+    return MissionItem(mav.MAV_FRAME_GLOBAL, mav.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, x, y, place.altitude_m)
+
+
 class Guarding(Protocol):
     """Catches the exceptions of named parts."""
 
@@ -101,69 +110,83 @@ class Stations:
         lines: StatusQueue,
         parameters: Parameters,
         vehicle_name: str,
+        tasks: ModeTasks,
+        conventions: Conventions,
         *,
         takes_attitude: bool,
         defence: Guarding,
         budget: Budget,
     ) -> None:
-        identity = IDENTITIES[settings.identity]
-        self._lines, self._pilot, self._guard = lines, pilot, defence.guard
+        wire, streams = conventions.wire, conventions.streams
+        self._conventions, self._lines, self._pilot, self._guard = conventions, lines, pilot, defence.guard
         self._text, self.reports = StatusText(), settings.reports
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
-        self.offboard, self._follow = Offboard(self._text), Follow(self._text)
+        self.offboard = Offboard(self._text, conventions.local_frames)
+        self._follow = Follow(self._text)
         self.manual = Manual(settings.system_id, self._text)
-        self.missions, self.fence = missions, fence
+        if conventions.radio:
+            self.manual = Radio(settings.system_id, self._text, conventions.radio, parameters)
+        self.missions, self.fence, self.parameters = missions, fence, parameters
+        self.snapshot: TelemetrySnapshot | None = None
         self.needs = ModeNeeds(pilot, missions, self.manual, self.offboard, self._follow, takes_attitude=takes_attitude)
-        self.system = SystemCommands(
-            pilot, missions, parameters, identity=settings.identity, system_id=settings.system_id
-        )
-        commands = Commands(pilot, fence, missions, self.needs)
+        self.system = SystemCommands(pilot, missions, parameters, identity=wire, system_id=settings.system_id)
+        book = conventions.modes
+        commands = conventions.commands(Commanded(pilot, fence, missions, self.needs, tasks, parameters, book))
+        self.modes, self.offboard.taken = commands.modes, commands.taken
         vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
-        self.plans = MissionService(PLAN_RULES, vehicle, self._text)
-        self._heartbeat = HeartbeatService(identity)
-        self._streams = StreamService(telemetry(settings.boot_unix_us))
+        if wire.home_first:
+            vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
+        self.plans = MissionService(
+            PLAN_RULES, vehicle, self._text, streams=wire.streams_current, old_form=wire.old_form_first or None
+        )
+        self._heartbeat = HeartbeatService(wire)
+        encoders = streams.chosen(telemetry(settings.boot_unix_us))
+        if not wire.streams_current:
+            encoders["MISSION_CURRENT"] = lambda _: self.plans.current()
+        self.streams = StreamService(encoders, streams)
         modes = StandardModes(
-            [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES],
-            lambda number, _: commands.set_custom_mode(CUSTOM, number),
+            [ModeInfo(each.name, each.number, each.standard, each.selectable) for each in book.listed()],
+            lambda number, _: commands.modes.select(number),
         )
         metadata = Metadata(metadata_json(parameters))
         files = _files(settings, metadata, parameters)
         self._provide(modes, metadata)
         self._obeys = CommandService(self._handlers(commands, modes), self._text)
         setters = Setters(self.system.set_origin, commands.move_home, commands.set_custom_mode)
-        services = (
+        further = conventions.services(self)
+        services: tuple[Service, ...] = (
             self._heartbeat,
             self._obeys,
-            self._streams,
+            self.streams,
             TimeService(),
-            ParameterService(parameters),
+            ParameterService(parameters, as_floats=wire.numbers_as_floats),
             self.plans,
             self.offboard,
             self.manual,
             self._follow,
-            OriginService(setters, self._text),
+            OriginService(setters, self._text, acknowledges_mode=wire.acknowledges_mode),
             Ftp(files, budget),
             Logs(files, (LOGS,), lambda: self.log.name, budget),
             Shell(self.system.shell(), budget),
+            *further,
         )
         self.hub = Hub(
             settings.system_id,
             AUTOPILOT_COMPONENT,
             services,
             signing=settings.signing,
-            observers=(self._streams,),
+            observers=(self.streams, *(each for each in further if isinstance(each, ChannelObserver))),
             caught=defence.caught,
             warn=lambda text: lines.say(WARNING, text),
             budget=budget,
         )
-        self.snapshot: TelemetrySnapshot | None = None
         self._logged: TelemetrySnapshot | None = None
         logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, boot_unix_us=settings.boot_unix_us)
         self.log = OnboardLog(logged, files)
 
     def use(self, channel: int, kind: str) -> None:
-        self._streams.use(channel, kind)
+        self.streams.use(channel, kind)
 
     @property
     def station_us(self) -> int | None:
@@ -178,14 +201,14 @@ class Stations:
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
         self._heartbeat.update(snapshot)
-        self._streams.update(snapshot)
+        self.streams.update(snapshot)
         self.offboard.update(snapshot.position_enu_m, vehicle.euler[2], snapshot.origin, snapshot.home)
         self._follow.update(snapshot.origin)
 
     def go_on(self) -> None:
         """Send at least the mode if a snapshot fails."""
-        mode, armed = self._pilot.state
-        self._heartbeat.go_on(custom_mode(mode), armed=armed)
+        self.modes.update()
+        self._heartbeat.go_on(self.modes.shown.number, armed=self._pilot.state.armed)
 
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
         self.needs.at(now_us)
@@ -225,6 +248,11 @@ class Stations:
         self.hub.accepts_only = _COMMANDS if reason else None
         self._obeys.closed = reason
 
+    def introduce(self) -> None:
+        """Send the texts of a start."""
+        for text in (self.system.banner, *self._conventions.banner):
+            self.say(INFO, text)
+
     def take_outbox(self) -> list[Outgoing]:
         return self.hub.take_outbox()
 
@@ -232,7 +260,9 @@ class Stations:
         self.say(WARNING, text)
 
     def say(self, severity: int, text: str) -> None:
-        self.hub.send(self._text.say(severity, text))
+        text = self._conventions.rewrite(text)
+        if text:
+            self.hub.send(self._text.say(severity, text))
 
     def take_texts(self) -> list[Line]:
         if not self._said:
@@ -242,7 +272,7 @@ class Stations:
         return said
 
     def _provide(self, modes: StandardModes, metadata: Metadata) -> None:
-        provide, version = self._streams.provide, self.system.version
+        provide, version = self.streams.provide, self.system.version
         provide("AUTOPILOT_VERSION", lambda command: [to(command.peer, "AUTOPILOT_VERSION", *version)])
         provide("AVAILABLE_MODES", modes.available_modes)
         provide("AVAILABLE_MODES_MONITOR", modes.monitor)
@@ -252,7 +282,7 @@ class Stations:
     def _handlers(self, commands: Commands, modes: StandardModes) -> Mapping[int, Handler]:
         return {
             **commands.handlers(),
-            **self._streams.handlers(),
+            **self.streams.handlers(),
             **modes.handlers(),
             **self.system.handlers(),
             mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.plans.do_set_mission_current,

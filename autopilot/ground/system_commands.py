@@ -10,7 +10,7 @@ from colibri.autopilot.ground.calibration import Calibration
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import Handler, ReceivedCommand
-from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
+from colibri.mavlink.services.identity import Identity, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.places import misplaced, misplaced_height
@@ -24,12 +24,12 @@ class SystemCommands:
     """System commands; `restart` is 0 until requested."""
 
     def __init__(
-        self, pilot: Pilot, missions: Missions, parameters: Parameters, *, identity: str, system_id: int
+        self, pilot: Pilot, missions: Missions, parameters: Parameters, *, identity: Identity, system_id: int
     ) -> None:
         self._pilot, self._missions, self._parameters = pilot, missions, parameters
         self._calibration = Calibration()
-        self.banner = banner(IDENTITIES[identity], VERSION)
-        self.version: Sequence[object] = autopilot_version(IDENTITIES[identity], version_of(VERSION), system_id)
+        self.banner = banner(identity, VERSION)
+        self.version: Sequence[object] = autopilot_version(identity, version_of(VERSION), system_id)
         self.restart = 0.0
 
     def handlers(self) -> Mapping[int, Handler]:

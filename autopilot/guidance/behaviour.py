@@ -14,7 +14,9 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 class Behaviour:
     """Numbers of the vehicle's behaviour, described in `parameters/behaviour.py`; 0 switches a limit or disarming off.
 
-    `delay_s` of commands is compensated; negative: the profile's, or measured.
+    `delay_s` of commands is compensated; negative: the profile's, or measured. A return waits `return_delay_s` above
+    home and ends `return_final_m` above it; `return_cone` limits its climb near home. Landings are slow below
+    `land_slow_below_m`, and above it as fast as `land_high_m_s`.
     """
 
     limits: Limits = _LIMITS
@@ -44,6 +46,12 @@ class Behaviour:
     inject_failures: bool = False
     solve_time_s: float = 0.0
     delay_s: float = -0.001
+    return_delay_s: float = 0.0
+    return_final_m: float = 0.0
+    return_cone: float = 0.0
+    return_speed_m_s: float = 0.0
+    land_high_m_s: float = 0.0
+    land_slow_below_m: float = 0.0
 
 
 @lru_cache(maxsize=8)

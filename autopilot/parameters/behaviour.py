@@ -145,6 +145,16 @@ ROWS = (
 )
 """One row for each number of `Behaviour` and `Limits`."""
 
+BY_IDENTITY = {
+    "RTL_LOIT_TIME": ("return_delay_s", 1e-3),
+    "RTL_ALT_FINAL": ("return_final_m", 0.01),
+    "RTL_CONE_SLOPE": ("return_cone", 1.0),
+    "RTL_SPEED": ("return_speed_m_s", 0.01),
+    "LAND_SPEED_HIGH": ("land_high_m_s", 0.01),
+    "LAND_ALT_LOW": ("land_slow_below_m", 0.01),
+}
+"""Fields that only an identity's parameters set, and their scale."""
+
 _ANSWERS = "Compatibility only, without effect."
 
 
@@ -166,6 +176,9 @@ def behaviour(parameters: Parameters) -> Behaviour:
             changed[row.field] = bool(value)
         else:
             changed[row.field] = value * row.scale if isinstance(value, float) else value
+    for name, (field, scale) in BY_IDENTITY.items():
+        if name in parameters:
+            changed[field] = parameters[name] * scale
     limits = {field: changed.pop(field) for field in Limits._fields if field in changed}
     whole = {field.name: getattr(_BEHAVIOUR, field.name) for field in fields(Behaviour)}
     return Behaviour(**{**whole, **changed, "limits": _BEHAVIOUR.limits._replace(**limits)})

@@ -15,6 +15,7 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import MAX_SAID, StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.identities import CONVENTIONS
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
@@ -63,6 +64,7 @@ class GroundService:
             signing_key=spec.signing_key,
             clock=lambda: tick_at(time()),
             params=spec.params,
+            conventions=CONVENTIONS[spec.identity],
         )
         for warning in self._state.warnings:
             status.say("said", f"warning: {warning}")

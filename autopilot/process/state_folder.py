@@ -6,6 +6,8 @@ from pathlib import Path
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
+from colibri.autopilot.ground.conventions import Conventions
+from colibri.autopilot.identities import CONVENTIONS
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.errors import unknown
 from colibri.common.files import private, read_bytes, read_text, regular
@@ -46,6 +48,7 @@ class StateFolder:
         signing_key: Path | None,
         clock: Callable[[], int],
         params: Mapping[str, float] = {},
+        conventions: Conventions = CONVENTIONS["px4"],
     ) -> None:
         """Open the folder, or raise FolderInUseError or GroundError.
 
@@ -55,7 +58,7 @@ class StateFolder:
         self._profile = profile
         self._vehicle = vehicle
         self._system_id = system_id
-        self._params = params
+        self._params, self._conventions = params, conventions
         self.warnings: list[str] = []
         self.signing = Signing(self._read_key(signing_key), clock, self._read_timestamp())
         try:
@@ -86,7 +89,12 @@ class StateFolder:
     def parameter_path(self) -> Path:
         """Return the parameter file, one for each control law and vehicle."""
         assert self._path is not None, "called only where something is kept"
-        return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
+        name = f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}"
+        return self._path / f"{name}{self._conventions.folder_suffix}.params"
+
+    def _parameters(self) -> Parameters:
+        ours = definitions(self._profile, self._vehicle, self._system_id)
+        return self._conventions.parameters(ours, self._system_id)
 
     def parameters(self) -> dict[str, Value]:
         """Return the saved parameters, or raise GroundError."""
@@ -102,12 +110,12 @@ class StateFolder:
         except (OSError, UnicodeDecodeError) as error:
             raise GroundError(f"cannot read parameters from {path}: {error}") from error
         try:
-            return read(text, Parameters(definitions(self._profile, self._vehicle, self._system_id)))
+            return read(text, self._parameters())
         except ParameterFileError as error:
             raise GroundError(f"{path}: {error}; correct or remove it") from error
 
     def _initial(self) -> dict[str, Value]:
-        parameters = Parameters(definitions(self._profile, self._vehicle, self._system_id))
+        parameters = self._parameters()
         for name, value in self._params.items():
             if name not in parameters:
                 raise GroundError(unknown("parameter", name, (each.name for each in parameters)))

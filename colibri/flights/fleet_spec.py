@@ -15,6 +15,17 @@ from colibri.mavlink.services.identity import IdentityName
 PLANT_PORT = 14560
 GROUND_PORT = 14550
 SDK_PORT = 14540
+TCP_PORT = 5760
+LINKS = {
+    "px4": ("udpout:127.0.0.1:{ground}", "udpout:127.0.0.1:{sdk}"),
+    "generic": ("udpout:127.0.0.1:{ground}", "udpout:127.0.0.1:{sdk}"),
+    "ardupilot": ("udpout:127.0.0.1:{ground}", "tcpin:127.0.0.1:{tcp}"),
+}
+"""Links of each identity."""
+
+
+def ports(instance: int) -> dict[str, int]:
+    return {"ground": GROUND_PORT, "sdk": SDK_PORT + instance, "tcp": TCP_PORT + 10 * instance}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,4 +60,4 @@ class FleetSpec(VehiclesSpec, GroundSpec):
         return None if self.out is None else self.out / str(instance)
 
     def links(self, instance: int) -> list[str]:
-        return list(self.gcs) or [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
+        return list(self.gcs) or [link.format(**ports(instance)) for link in LINKS[self.identity]]

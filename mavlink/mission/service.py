@@ -24,8 +24,8 @@ from colibri.mavlink.mission.items import (
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
-from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, ReceivedCommand, command_name
-from colibri.mavlink.services.statustext import WARNING, StatusText
+from colibri.mavlink.services.command import DEGREES, DENIED, GLOBAL_FRAMES, ReceivedCommand, command_name
+from colibri.mavlink.services.statustext import INFO, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
@@ -65,7 +65,7 @@ class Downloads:
             self._remember(peer, plan_type, plan, now_us)
         if seq >= len(plan.items):
             return None
-        is_current = plan is newest and seq == current
+        is_current = plan.id == newest.id and seq == current
         return to(peer, "MISSION_ITEM_INT", *item_fields(peer, seq, plan.items[seq], is_current, plan_type))
 
     def end(self, peer: Peer, plan_type: int) -> None:
@@ -97,17 +97,32 @@ class MissionVehicle(NamedTuple):
     progress: Callable[[], MissionProgress]  # called at every poll
     set_current: Callable[[int, bool], Refusal | None]  # (seq or -1 for the current, reset the counters)
     guided_goto: Callable[[float, float, float, int], Refusal | None]  # (degrees, degrees, m, MAV_FRAME)
+    home: Callable[[], MissionItem] | None = None  # of a vehicle whose item 0 is home
+    describe: Callable[[int, MissionItem], str] | None = None  # text of an item that begins
 
 
 class MissionService:
-    """Holds the three plans and serves the mission protocol: one method per message."""
+    """Holds the three plans and serves the mission protocol: one method per message.
 
-    def __init__(self, rules: Mapping[int, Rules], vehicle: MissionVehicle, text: StatusText) -> None:
+    With `MissionVehicle.home`, clients count the items of a mission from 1, and item 0 is home.
+    """
+
+    def __init__(
+        self,
+        rules: Mapping[int, Rules],
+        vehicle: MissionVehicle,
+        text: StatusText,
+        *,
+        streams: bool = True,
+        old_form: bool | None = None,
+    ) -> None:
+        """Serve a vehicle; `streams` sends MISSION_CURRENT unasked, `old_form` asks for items by MISSION_REQUEST."""
         self.plans: dict[int, StoredPlan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
         self._vehicle = vehicle
         self._progress = vehicle.progress
         self._text = text
-        self._uploads = Uploads(rules, self.load)
+        self._offset, self._streams = int(vehicle.home is not None), streams
+        self._uploads = Uploads(rules, self._store, unchecked_first=bool(self._offset), old_form=old_form)
         self._downloads = Downloads()
         self._outbox: list[Send] = []
         self._shown: MissionProgress | None = None
@@ -139,19 +154,37 @@ class MissionService:
         sends += self._explained(self._uploads.poll(now_us))
         if progress != self._shown or now_us >= self._stream_us:
             self._stream_us = now_us + STREAM_EVERY_US
-            sends.append(to_all("MISSION_CURRENT", *self.current()))
+            if self._streams:
+                sends.append(to_all("MISSION_CURRENT", *self.current()))
+            sends += self._described(progress)
         self._shown = progress
         self._due_us = min(self._stream_us, self._uploads.due_us)
         return sends
 
+    def _described(self, progress: MissionProgress) -> list[Send]:
+        """Return the text of an item that has begun since the last call."""
+        describe, shown, items = self._vehicle.describe, self._shown, self.plans[MISSION].items
+        active = progress.state == mav.MISSION_STATE_ACTIVE and progress.seq < len(items)
+        if describe is None or not active or (shown and shown[:2] == progress[:2]):
+            return []
+        return self._text.say(INFO, describe(progress.seq + self._offset, items[progress.seq]))
+
     def reached(self, seq: int) -> None:
-        self._outbox.append(to_all("MISSION_ITEM_REACHED", seq))
+        self._outbox.append(to_all("MISSION_ITEM_REACHED", seq + self._offset))
+        if self._vehicle.describe is not None:
+            self._outbox += self._text.say(INFO, f"Reached command #{seq + self._offset}")
+
+    def _seq(self) -> int:
+        """Return the current item as clients count; 0 until a mission with home has begun."""
+        progress = self._progress()
+        begun = progress.state not in (mav.MISSION_STATE_NO_MISSION, mav.MISSION_STATE_NOT_STARTED)
+        return progress.seq + self._offset if begun or progress.seq else 0
 
     def current(self) -> Fields:
         progress = self._progress()
         total = len(self.plans[MISSION].items) or NO_MISSION_TOTAL
         ids = (self.plans[plan_type].id for plan_type in (MISSION, FENCE, RALLY))
-        return (progress.seq, total, progress.state, progress.mode, *ids)
+        return (self._seq(), total, progress.state, progress.mode, *ids)
 
     @property
     def ids(self) -> tuple[int, ...]:
@@ -169,13 +202,23 @@ class MissionService:
         self._announce()
         return plan
 
+    def _store(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
+        """Load an uploaded plan, without home and with jumps to items as the vehicle counts them."""
+        if plan_type == MISSION and self._offset:
+            items = [_jumping(item, -self._offset) for item in items[self._offset :]]
+        return self.load(plan_type, items)
+
     def do_set_mission_current(self, command: ReceivedCommand) -> Refusal | None:
         seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
         if not isfinite(seq) or seq != int(seq):
             return Refusal(f"mission: item {seq:g} is not a whole number")
         if reset not in (0.0, 1.0):
             return Refusal(f"mission: reset {reset:g} is not 0 or 1")
-        refusal = self._vehicle.set_current(int(seq), reset == 1.0)
+        if self._offset and seq < 0.0:
+            return Refusal(f"mission: item {seq:g} is not 0 or more")
+        refusal = self._vehicle.set_current(self._inside(int(seq)), reset == 1.0)
+        if refusal is not None and self._offset:
+            return refusal._replace(result=DENIED)
         if refusal is None:
             self._announce()
         return refusal
@@ -222,14 +265,29 @@ class MissionService:
         if fields.mission_type not in PLAN_TYPES:
             return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)
         self._uploads.hush(peer)
-        return [self._downloads.begin(peer, fields.mission_type, self.plans[fields.mission_type], now_us)]
+        plan_type = fields.mission_type
+        return [self._downloads.begin(peer, plan_type, self._as_sent(plan_type), now_us)]
+
+    def _as_sent(self, plan_type: int) -> StoredPlan:
+        """Return a plan as clients see it: a mission with home as its first item."""
+        plan, home = self.plans[plan_type], self._vehicle.home
+        if plan_type != MISSION or home is None or not plan.items:
+            return plan
+        return StoredPlan((home(), *(_jumping(item, self._offset) for item in plan.items)), plan.id)
+
+    def _inside(self, seq: int) -> int:
+        """Return an item as the vehicle counts."""
+        return max(seq - self._offset, 0) if self._offset else seq
 
     def _request(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         plan_type = fields.mission_type
         if plan_type not in PLAN_TYPES:
             return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)
-        current = self._progress().seq if plan_type == MISSION else -1
-        found = self._downloads.item(peer, plan_type, fields.seq, self.plans[plan_type], current, now_us)
+        current, home = self._seq() if plan_type == MISSION else -1, self._vehicle.home
+        if home is not None and plan_type == MISSION and fields.seq == 0:
+            return [to(peer, "MISSION_ITEM_INT", *item_fields(peer, 0, home(), current == 0, plan_type))]
+        plan = self._as_sent(plan_type)
+        found = self._downloads.item(peer, plan_type, fields.seq, plan, current, now_us)
         if found is None:
             why = f"there is no item {fields.seq}"
             return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, plan_type, why)
@@ -250,7 +308,7 @@ class MissionService:
         return [ack(peer, ACCEPTED, plan_type)]
 
     def _set_current(self, fields: Any, _peer: Peer, _now_us: int) -> Iterable[Send]:
-        refusal = self._vehicle.set_current(fields.seq, False)
+        refusal = self._vehicle.set_current(self._inside(fields.seq), False)
         if refusal is not None:
             return self._text.say(WARNING, refusal.reason)
         self._announce()
@@ -267,3 +325,8 @@ class MissionService:
         reason = self._uploads.take_reason()
         text = self._text.say(WARNING, reason) if reason else ()
         return [*filter(None, sends), *text]
+
+
+def _jumping(item: MissionItem, offset: int) -> MissionItem:
+    """Return an item with a jump's target counted from another first item."""
+    return item._replace(p1=item.p1 + offset) if item.command == mav.MAV_CMD_DO_JUMP else item

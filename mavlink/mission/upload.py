@@ -12,7 +12,16 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, StoredPlan, fault_of, item_of, plan_name
+from colibri.mavlink.mission.items import (
+    ACCEPTED,
+    MISSION,
+    PLAN_TYPES,
+    MissionItem,
+    StoredPlan,
+    fault_of,
+    item_of,
+    plan_name,
+)
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.services.command import command_name
 from colibri.mavlink.wire.dialect import Message, mav
@@ -44,7 +53,9 @@ class _Answer(NamedTuple):
 
 
 class _Upload:
-    def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int, began_us: int) -> None:
+    def __init__(
+        self, peer: Peer, plan_type: int, count: int, now_us: int, began_us: int, old_form: bool | None
+    ) -> None:
         self.peer = peer
         self.began_us = began_us  # also of those that the channel began and replaced
         self.plan_type = plan_type
@@ -52,8 +63,8 @@ class _Upload:
         self.items: list[MissionItem] = []
         self.received_us = self.due_us = now_us
         self.quiet = False
-        self.asked_in_old_form = False
-        self._old_form: bool | None = None
+        self.asked_in_old_form = bool(old_form)
+        self._old_form = old_form
         self._asked = 0
         self._last_form = False
 
@@ -86,8 +97,16 @@ class _Upload:
 class Uploads:
     """The uploads in progress, at most one per type and per ground station."""
 
-    def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], StoredPlan]) -> None:
-        self._rules = rules
+    def __init__(
+        self,
+        rules: Mapping[int, Rules],
+        store: Callable[[int, Sequence[MissionItem]], StoredPlan],
+        *,
+        unchecked_first: bool = False,
+        old_form: bool | None = None,
+    ) -> None:
+        """Store plans by `store`; `unchecked_first` accepts any item 0 of a mission, `old_form` asks in it first."""
+        self._rules, self._unchecked_first, self._first_form = rules, unchecked_first, old_form
         self._store = store
         self._under_way: dict[int, _Upload] = {}
         self._reason = ""
@@ -109,7 +128,7 @@ class Uploads:
             return self._refuse(peer, mav.MAV_MISSION_NO_SPACE, plan_type, f"{count} items, more than {maximum}")
         if count == 0:  # "has the same effect as clearing the mission"
             return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)
-        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us, began_us)
+        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us, began_us, self._first_form)
         return self._asking(upload, now_us)
 
     def expects(self, peer: Peer, plan_type: int) -> bool:
@@ -127,7 +146,11 @@ class Uploads:
         if fields.seq > expected:  # "the expected item should be re-requested"
             return self._asking(upload, now_us)
         item = item_of(message.name, fields)
-        result = item if isinstance(item, int) else self._rules[upload.plan_type].check_item(item)
+        unchecked = self._unchecked_first and not expected and upload.plan_type == MISSION
+        if isinstance(item, int):
+            result = item
+        else:
+            result = ACCEPTED if unchecked else self._rules[upload.plan_type].check_item(item)
         if isinstance(item, int):
             self._blame(upload, expected, f"{command_name(fields.command)} at {fields.x:g}, {fields.y:g}")
             return self._end(upload, item, 0, now_us)

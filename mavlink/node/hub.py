@@ -2,7 +2,7 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from colibri.common.types import Address
 from colibri.mavlink.node.budget import Budget
@@ -48,6 +48,7 @@ class Outgoing(NamedTuple):
     datagram: bytes
 
 
+@runtime_checkable
 class ChannelObserver(Protocol):
     """Observer of channels; numbers are never reused."""
 

@@ -1,8 +1,9 @@
 """`@PARAM/param.pck`, all parameters in one file: https://mavlink.io/en/services/parameter_ftp.html."""
 
-from struct import Struct
+from struct import Struct, pack
 
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, bits_of
+from colibri.mavlink.wire.dialect import mav
 
 BLOCK_BYTES = 239
 """Read size of clients: a value must not cross a block boundary."""
@@ -12,7 +13,8 @@ _HEADER = Struct("<HHH")
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _TYPES = {ParamType.INT: 3, ParamType.REAL: 4}
 _HAS_DEFAULT = 0x10
-_VALUE_BYTES = 4
+_NARROW = {mav.MAV_PARAM_TYPE_INT8: (1, "<b"), mav.MAV_PARAM_TYPE_INT16: (2, "<h")}
+"""Type number and layout of integers that are narrower than 32 bits."""
 _MAX_COMMON_CHARS = 15
 
 
@@ -36,7 +38,7 @@ def packed(parameters: Parameters, query: str = "") -> bytes | None:
         value = _bytes(parameter, parameters[parameter.name])
         default = _bytes(parameter, parameter.default) if with_defaults else value
         values = value if default == value else value + default
-        entry = _name(parameter, before, len(values) > _VALUE_BYTES) + values
+        entry = _name(parameter, before, len(values) > len(value)) + values
         past = (len(file) + len(entry)) % BLOCK_BYTES
         if 0 < past < len(values):
             file += bytes(len(values) - past)
@@ -50,9 +52,12 @@ def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
     maximum = min(len(before), len(parameter.name) - 1, _MAX_COMMON_CHARS)
     common = next((i for i in range(maximum) if before[i] != parameter.name[i]), maximum)
     own = parameter.name[common:].encode()
-    kind = _TYPES[parameter.kind] | (_HAS_DEFAULT if has_default else 0)
+    kind, _ = _NARROW.get(parameter.wire, (_TYPES[parameter.kind], ""))
+    kind |= _HAS_DEFAULT if has_default else 0
     return bytes((kind, (len(own) - 1) << 4 | common)) + own
 
 
 def _bytes(parameter: Parameter, value: float) -> bytes:
-    return bits_of(parameter.kind, value).to_bytes(_VALUE_BYTES, "little")
+    if parameter.wire in _NARROW:
+        return pack(_NARROW[parameter.wire][1], int(value))
+    return bits_of(parameter.kind, value).to_bytes(4, "little")

@@ -1,10 +1,12 @@
 """The parameter microservice of the vehicle: https://mavlink.io/en/services/parameter.html.
 
-Values are encoded bytewise, as PX4's (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
+Values are encoded bytewise, as PX4's (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE), or every number as a float, as
+ArduPilot's (MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT).
 """
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import isfinite
 
 from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, bits_of, value_of
@@ -33,8 +35,9 @@ class ParameterService:
 
     handles = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
+    def __init__(self, parameters: Parameters, *, as_floats: bool = False) -> None:
+        """Serve `parameters`; `as_floats` has values as floats, and unknown names unanswered."""
+        self._parameters, self._as_floats = parameters, as_floats
         self._listings: dict[int, _Listing] = {}
         self._proposed: dict[str, list[Peer]] = {}  # who waits for `Parameters.settle`
 
@@ -87,7 +90,7 @@ class ParameterService:
         else:
             known = None if self._parameters.at(index) is None else index
         if known is None:
-            return (_refuse(peer, name, index, ParamError.DOES_NOT_EXIST),)
+            return self._unknown(peer, name, index)
         if name in self._proposed:  # its value is sent as soon as it is settled
             return ()
         return (self._value(known, peer.channel),)
@@ -96,8 +99,8 @@ class ParameterService:
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:
-            return (_refuse(peer, name, BY_ID, ParamError.DOES_NOT_EXIST),)
-        value = _meant(definition, wire_type, bits)
+            return self._unknown(peer, name, BY_ID)
+        value = _number(definition, bits) if self._as_floats else _meant(definition, wire_type, bits)
         outcome = value if isinstance(value, ParamError) else self._parameters.propose(name, value)
         if isinstance(outcome, ParamError):
             return (_refuse(peer, name, index, outcome), self._value(index))
@@ -106,11 +109,15 @@ class ParameterService:
         self._proposed.setdefault(name, []).append(peer)
         return ()
 
+    def _unknown(self, peer: Peer, name: str, index: int) -> Iterable[Send]:
+        return () if self._as_floats else (_refuse(peer, name, index, ParamError.DOES_NOT_EXIST),)
+
     def _value(self, index: int, channel: int | None = None) -> Send:
         definition = self._parameters.at(index)
         assert definition is not None, "indices are checked where they come from"
-        bits = Bits(bits_of(definition.kind, self._parameters[definition.name]))
-        fields = (definition.name, bits, definition.kind, len(self._parameters), index)
+        kind = ParamType.REAL if self._as_floats else definition.kind
+        bits = Bits(bits_of(kind, self._parameters[definition.name]))
+        fields = (definition.name, bits, definition.wire or definition.kind, len(self._parameters), index)
         return Send("PARAM_VALUE", fields, channel)
 
 
@@ -128,6 +135,14 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamErr
     if isinstance(value, float) and value.is_integer() and abs(value) < _NOT_EXACT_IN_FLOAT:
         return int(value)
     return ParamError.TYPE_MISMATCH
+
+
+def _number(definition: Parameter, bits: int) -> Value | ParamError:
+    """Return the number of a PARAM_SET that is a float whatever its type says; integers are rounded."""
+    value = value_of(ParamType.REAL, bits)
+    if definition.kind == ParamType.REAL:
+        return value
+    return round(value) if isfinite(value) else ParamError.VALUE_OUT_OF_RANGE
 
 
 def _refuse(peer: Peer, name: str, index: int, refusal: ParamError) -> Send:

@@ -50,6 +50,8 @@ Prepare: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], Prepared |
 """(changed names, all new values) -> acceptance or refusal of a change; without side effects."""
 Ready: TypeAlias = Callable[[Collection[str], Mapping[str, Value]], bool]
 """(changed names, all new values) -> whether `Prepare` may be called; if not, a slice of its work is done."""
+Linked: TypeAlias = Callable[[Mapping[str, Value], Mapping[str, Value]], Mapping[str, Value]]
+"""(changes, all values with them) -> further changes that follow from them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +71,7 @@ class Parameter:
     reboot_required: bool = False
     values: tuple[tuple[int, str], ...] = ()  # the valid ones with meanings, if not all
     read_only: bool = False
+    wire: int = 0  # MAV_PARAM_TYPE on the wire, if it is not `kind`'s
 
     def __post_init__(self) -> None:
         if not fullmatch(_NAME, self.name):
@@ -93,14 +96,25 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters sorted by name, and their values; `prepare` is called before a change."""
+    """The parameters sorted by name, and their values; `prepare` is called before a change.
 
-    def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
+    `initial` values replace defaults, which stay those of the definitions; `links` return what follows from a change.
+    """
+
+    def __init__(
+        self,
+        definitions: Iterable[Parameter],
+        prepare: Prepare | None = None,
+        *,
+        links: Linked | None = None,
+        initial: Mapping[str, Value] = {},
+    ) -> None:
         self._definitions = tuple(sorted(definitions, key=lambda parameter: parameter.name))
         self._index = {parameter.name: index for index, parameter in enumerate(self._definitions)}
         if len(self._index) < len(self._definitions):
             raise ValueError("two parameters have one name")
-        self._values = {parameter.name: parameter.default for parameter in self._definitions}
+        self._initial = {parameter.name: parameter.default for parameter in self._definitions} | dict(initial)
+        self._values, self._links = dict(self._initial), links
         self._made: object | None = None
         self.prepare = prepare
         self._ready: Ready | None = None
@@ -186,6 +200,8 @@ class Parameters:
         return definition.refusal(value) or (ParamError.READ_ONLY if definition.read_only else value)
 
     def _try(self, changes: Mapping[str, Value]) -> ParamError | None:
+        if self._links is not None:
+            changes = {**self._links(changes, {**self._values, **changes}), **changes}
         changed = {name: value for name, value in changes.items() if value != self._values[name]}
         if not changed:
             return None
@@ -205,9 +221,9 @@ class Parameters:
                 self.revision += 1
 
     def reset(self) -> None:
-        """Propose all defaults."""
-        for definition in self._definitions:
-            self.propose(definition.name, definition.default)
+        """Propose all initial values."""
+        for name, value in self._initial.items():
+            self.propose(name, value)
 
     def take_made(self) -> object | None:
         made, self._made = self._made, None

@@ -1,7 +1,8 @@
 """The autopilot's identity.
 
-Ground stations adapt to MAV_AUTOPILOT. As `px4` they offer all features of a PX4, whose custom modes Colibri follows;
-as `generic` only common ones. Either way AUTOPILOT_VERSION and the text at the start name Colibri.
+Ground stations adapt to MAV_AUTOPILOT. As `px4` or `ardupilot` they offer all features of these, as `generic` only
+common ones. AUTOPILOT_VERSION and a text at the start name Colibri. The services read their conventions here; those of
+modes, commands and parameters are in `autopilot/identities`.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Literal, TypeAlias
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.wire.dialect import bits, mav
 
-IdentityName: TypeAlias = Literal["px4", "generic"]
+IdentityName: TypeAlias = Literal["px4", "ardupilot", "generic"]
 Triple = tuple[int, int, int]
 
 PRODUCT = b"Colibri"
@@ -23,14 +24,26 @@ CAPABILITIES = bits(
 )
 
 
+COPTER_CAPABILITIES = (CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE) | bits(
+    "MAV_PROTOCOL_CAPABILITY_", "MISSION_FLOAT PARAM_FLOAT COMPASS_CALIBRATION"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """An identity.
+    """An identity on the wire.
 
     Attributes:
         autopilot: MAV_AUTOPILOT.
         product: Name of the emulated program in texts; empty without one.
         speaks: Release of the emulated interface.
+        commit: Eight hexadecimal digits, which some clients parse, as AUTOPILOT_VERSION.flight_custom_version.
+        stands_by: Whether an armed vehicle on the ground is in MAV_STATE_STANDBY, and every failsafe CRITICAL.
+        acknowledges_mode: Whether SET_MODE is answered by COMMAND_ACK.
+        numbers_as_floats: Whether PARAM_VALUE has every number as a float, and unknown names are not answered.
+        home_first: Whether item 0 of a mission is home.
+        streams_current: Whether MISSION_CURRENT is sent unasked.
+        old_form_first: Whether items are requested by MISSION_REQUEST first.
     """
 
     name: str
@@ -38,11 +51,31 @@ class Identity:
     product: str = ""
     speaks: Triple | None = None
     capabilities: int = CAPABILITIES
+    commit: bytes | None = None
+    stands_by: bool = False
+    acknowledges_mode: bool = False
+    numbers_as_floats: bool = False
+    home_first: bool = False
+    streams_current: bool = True
+    old_form_first: bool = False
 
 
 PX4 = Identity("px4", mav.MAV_AUTOPILOT_PX4, "PX4", speaks=(1, 15, 0))
 GENERIC = Identity("generic", mav.MAV_AUTOPILOT_GENERIC)
-IDENTITIES = {identity.name: identity for identity in (PX4, GENERIC)}
+ARDUPILOT = Identity(
+    "ardupilot",
+    mav.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    "ArduPilot",
+    speaks=(4, 6, 0),
+    capabilities=COPTER_CAPABILITIES,
+    commit=b"c0118121",
+    stands_by=True,
+    acknowledges_mode=True,
+    numbers_as_floats=True,
+    home_first=True,
+    streams_current=False,
+    old_form_first=True,
+)
 
 
 def version_of(text: str) -> Triple:
@@ -60,9 +93,10 @@ def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fi
     major, minor, patch = version
     own = _packed(version)
     custom = (patch, minor, major, *PRODUCT[:5])
+    flight = custom if identity.commit is None else tuple(identity.commit)
     uid2 = (*PRODUCT, *(0,) * (UID2_BYTES - len(PRODUCT) - 1), system_id)
     shown = own if identity.speaks is None else _packed(identity.speaks)
-    return (identity.capabilities, shown, own, 0, 0, custom, custom, (0,) * 8, 0, 0, system_id, uid2)
+    return (identity.capabilities, shown, own, 0, 0, flight, custom, (0,) * 8, 0, 0, system_id, uid2)
 
 
 def banner(identity: Identity, version: str) -> str:

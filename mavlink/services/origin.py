@@ -7,11 +7,15 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
-from colibri.mavlink.node.service import Peer, Send, to_all
+from colibri.mavlink.node.service import Peer, Send, to, to_all
+from colibri.mavlink.services.command import ACCEPTED
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
+
+SET_MODE_ID = 11
+"""ArduPilot up to 4.5 acknowledges SET_MODE as a command of this number, and older scripts wait for it."""
 
 
 class Setters(NamedTuple):
@@ -27,14 +31,17 @@ class OriginService:
 
     handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 
-    def __init__(self, setters: Setters, text: StatusText) -> None:
-        self._setters = setters
+    def __init__(self, setters: Setters, text: StatusText, *, acknowledges_mode: bool = False) -> None:
+        self._setters, self._acknowledges_mode = setters, acknowledges_mode
         self._text = text
 
-    def receive(self, message: Message, _peer: Peer, now_us: int) -> Iterable[Send]:
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
         if message.name == "SET_MODE":
-            return self._refused(self._setters.mode(fields.base_mode, fields.custom_mode))
+            refusal = self._setters.mode(fields.base_mode, fields.custom_mode)
+            result = ACCEPTED if refusal is None else refusal.result
+            ack = to(peer, "COMMAND_ACK", SET_MODE_ID, result, 0, 0, peer.system, peer.component)
+            return [*([ack] if self._acknowledges_mode else []), *self._refused(refusal)]
         place = Geodetic(fields.latitude * 1e-7, fields.longitude * 1e-7, fields.altitude * 1e-3)
         wrong = misplaced(place.latitude_deg, place.longitude_deg) or misplaced_height(place.altitude_m)
         if wrong:

@@ -6,7 +6,7 @@ engages the stream's mode takes over, if it streams. Equal ids on two links are 
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar
 
 from colibri.mavlink.node.service import Peer, Send
@@ -30,7 +30,10 @@ class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an err
 
 
 class StreamedService(ABC, Generic[Value]):
-    """Keeps each client's latest setpoint and obeys that of `source`; only refusals are told, with `text`."""
+    """Keeps each client's latest setpoint and obeys that of `source`; only refusals are told, with `text`.
+
+    `taken` is called with each setpoint of the source, and with None for an invalid one.
+    """
 
     handles: frozenset[str]
 
@@ -41,6 +44,7 @@ class StreamedService(ABC, Generic[Value]):
         self._received: dict[Peer, tuple[int, Value]] = {}
         self._text, self._told_us = text, -TELL_EVERY_US
         self._refusal: tuple[int, str] = (0, "")
+        self.taken: Callable[[Value | None], None] | None = None
 
     def refusal(self, now_us: int) -> str:
         """Return why the latest setpoint was refused; empty if none was of late."""
@@ -52,9 +56,13 @@ class StreamedService(ABC, Generic[Value]):
             value = self._decode(message, peer, now_us)
         except Refused as refused:
             self.dropped[str(refused)] += 1
+            if self.taken is not None:
+                self.taken(None)
             return self._tell(message.name, refused, now_us) if refused.field else ()
         if value is not None and not self.keep(peer, value, now_us):
             self.dropped["another client"] += 1
+        elif value is not None and self.taken is not None:
+            self.taken(value)
         return ()
 
     def _tell(self, name: str, refused: Refused, now_us: int) -> Iterable[Send]:

@@ -35,13 +35,14 @@ class Controls(NamedTuple):
 
 
 class Manual(StreamedService[Controls]):
-    """Keeps each client's latest sticks."""
+    """Keeps each client's latest sticks; `held` has the channels of a radio, us, if there is one."""
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
     def __init__(self, system_id: int, text: StatusText | None = None) -> None:
         super().__init__(text=text)
         self._system_id = system_id
+        self.held: tuple[int, ...] = ()
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
         controls = self._latest(now_us, timeout_us)

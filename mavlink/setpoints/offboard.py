@@ -11,7 +11,7 @@ Choices left open by the specification:
 - One masked horizontal axis of a group in a body frame means: keep this position, zero velocity, zero acceleration.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import hypot, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -92,8 +92,10 @@ class Whereabouts(NamedTuple):
     home: HomePosition | None = None
 
 
-def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
-    frame = LOCAL_FRAMES.get(fields.coordinate_frame)
+def decode_local(
+    fields: Any, here: Whereabouts, now_us: int, frames: Mapping[int, Frame] = LOCAL_FRAMES
+) -> PositionSetpoint:
+    frame = frames.get(fields.coordinate_frame)
     if frame is None:
         raise Refused("frame", f"frame {fields.coordinate_frame} is not local")
     velocity, acceleration = _derivatives(fields, body=frame.body, up=frame.up)
@@ -259,9 +261,9 @@ class Offboard(StreamedService[OffboardSetpoint]):
 
     handles = frozenset(_DECODERS)
 
-    def __init__(self, text: StatusText | None = None) -> None:
+    def __init__(self, text: StatusText | None = None, frames: Mapping[int, Frame] = LOCAL_FRAMES) -> None:
         super().__init__(text=text)
-        self._here = Whereabouts()
+        self._here, self._frames = Whereabouts(), frames
 
     def update(self, position_enu_m: Vector, yaw_rad: float, origin: Geodetic, home: HomePosition | None) -> None:
         self._here = Whereabouts(position_enu_m, yaw_rad, origin, home)
@@ -270,4 +272,6 @@ class Offboard(StreamedService[OffboardSetpoint]):
         return self._latest(now_us, timeout_us)
 
     def _decode(self, message: Message, _peer: Peer, now_us: int) -> OffboardSetpoint:
+        if message.name == "SET_POSITION_TARGET_LOCAL_NED":
+            return decode_local(message.fields, self._here, now_us, self._frames)
         return _DECODERS[message.name](message.fields, self._here, now_us)

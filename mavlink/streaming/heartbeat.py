@@ -52,14 +52,15 @@ class HeartbeatService:
     def fields(self, s: TelemetrySnapshot) -> Fields:
         armed = MODE_ARMED if s.armed else 0
         mode = (s.base_mode | MODE_CUSTOM | armed) & 0xFF
-        return (
-            vehicle_type(len(s.controls)),
-            self._identity.autopilot,
-            mode,
-            s.custom_mode,
-            _state(s),
-            MAVLINK_VERSION,
-        )
+        kind = vehicle_type(len(s.controls))
+        return (kind, self._identity.autopilot, mode, s.custom_mode, self._state(s), MAVLINK_VERSION)
+
+    def _state(self, s: TelemetrySnapshot) -> int:
+        if not self._identity.stands_by:
+            return _state(s)
+        if s.failsafe:
+            return int(mav.MAV_STATE_CRITICAL)
+        return int(mav.MAV_STATE_STANDBY if s.landed_state == mav.MAV_LANDED_STATE_ON_GROUND else mav.MAV_STATE_ACTIVE)
 
 
 def _state(s: TelemetrySnapshot) -> int:

@@ -1,4 +1,10 @@
-"""Default rate of each message."""
+"""Default rate of each message, and the groups of MAV_DATA_STREAM."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from colibri.mavlink.services.command import DENIED, UNSUPPORTED
+from colibri.mavlink.telemetry.encoder import Encoder
 
 HZ = 1_000_000
 
@@ -73,4 +79,31 @@ GROUPS: dict[int, tuple[str, ...]] = {
 """The messages of each MAV_DATA_STREAM, grouped as by ArduPilot: raw sensors, extended status, radio channels, raw
 controller, position, extra 1 to 3. MAV_DATA_STREAM_ALL (0) means all groups.
 """
-ALL_GROUPS = tuple(name for names in GROUPS.values() for name in names)
+
+
+class Streams(NamedTuple):
+    """The messages of an identity.
+
+    Attributes:
+        groups: Messages of each MAV_DATA_STREAM.
+        defaults: Interval of each message, us, by the kind of channel.
+        names: All messages that are sent; empty: every one.
+        encoders: Of messages that only this identity sends.
+        unsent: MAV_RESULT of a request for another message.
+        unstreamed: MAV_RESULT of an interval for a known message that is not streamed, and for any other.
+    """
+
+    groups: Mapping[int, tuple[str, ...]]
+    defaults: Mapping[str, Mapping[str, int]]
+    names: frozenset[str] = frozenset()
+    encoders: Mapping[str, Encoder] = {}
+    unsent: int = UNSUPPORTED
+    unstreamed: tuple[int, int] = (DENIED, UNSUPPORTED)
+
+    def chosen(self, encoders: Mapping[str, Encoder]) -> dict[str, Encoder]:
+        """Return the encoders of this identity's messages."""
+        every = {**encoders, **self.encoders}
+        return {name: encoder for name, encoder in every.items() if not self.names or name in self.names}
+
+
+PX4_STREAMS = Streams(GROUPS, DEFAULTS)

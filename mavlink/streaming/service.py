@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Handler, ReceivedCommand
-from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SILENT
+from colibri.mavlink.services.command import TEMPORARILY_REJECTED, UNSUPPORTED, Handler, ReceivedCommand
+from colibri.mavlink.streaming.rates import GCS, PX4_STREAMS, SILENT, Streams
 from colibri.mavlink.streaming.schedule import Schedule
 from colibri.mavlink.telemetry.encoder import Encoder
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
@@ -49,8 +49,8 @@ class StreamService:
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
-    def __init__(self, telemetry: Mapping[str, Encoder]) -> None:
-        self._telemetry = dict(telemetry)
+    def __init__(self, telemetry: Mapping[str, Encoder], streams: Streams = PX4_STREAMS) -> None:
+        self._telemetry, self._streams = dict(telemetry), streams
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
         self._providers: dict[int, Provider] = {
@@ -95,7 +95,9 @@ class StreamService:
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
-        names = ALL_GROUPS if fields.req_stream_id == mav.MAV_DATA_STREAM_ALL else GROUPS.get(fields.req_stream_id, ())
+        groups, number = self._streams.groups, fields.req_stream_id
+        every = number == mav.MAV_DATA_STREAM_ALL
+        names = [name for group in groups.values() for name in group] if every else groups.get(number, ())
         rate_hz = fields.req_message_rate if fields.start_stop else 0
         interval_us = max(MIN_GROUP_INTERVAL_US, round(1e6 / rate_hz)) if rate_hz else None
         for name in names:
@@ -127,7 +129,7 @@ class StreamService:
         message_id, interval_us = _whole(command.p1), command.p2
         name = self._names.get(message_id)
         if name is None:
-            result = DENIED if self._is_known(message_id) else UNSUPPORTED
+            result = self._streams.unstreamed[not self._is_known(message_id)]
             return Refusal(f"interval refused: {_named(message_id, command.p1)} is not streamed", result)
         if interval_us == DISABLED:
             self._set(command.peer.channel, name, None, command.now_us)
@@ -163,7 +165,7 @@ class StreamService:
             return answer if isinstance(answer, Refusal) else self._post(answer)
         name = self._names.get(message_id)
         if name is None:
-            return Refusal(f"request refused: {_named(message_id, command.p1)} is not sent", UNSUPPORTED)
+            return Refusal(f"request refused: {_named(message_id, command.p1)} is not sent", self._streams.unsent)
         sends = [to(command.peer, name, *fields) for fields in self._encode(name)]
         return self._post(sends) if sends else Refusal(f"{name} is not known yet", TEMPORARILY_REJECTED)
 
@@ -187,7 +189,7 @@ class StreamService:
 
     def _default(self, channel: int, name: str) -> int | None:
         kind = self._kinds.get(channel, GCS if channel in self._open else SILENT)
-        return DEFAULTS[kind].get(name)
+        return self._streams.defaults[kind].get(name)
 
     def _set(self, channel: int, name: str, interval_us: int | None, now_us: int) -> None:
         if name not in self._telemetry:

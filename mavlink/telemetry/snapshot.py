@@ -103,6 +103,7 @@ class TelemetrySnapshot(NamedTuple):
     custom_mode: int = 0  # in the identity's layout
     intended_custom_mode: int = 0  # last requested
     standard_mode: int = 0  # MAV_STANDARD_MODE or 0
+    px4_mode: int = 0  # in PX4's layout, for logs
     landed_state: int = 1  # MAV_LANDED_STATE
     failsafe: bool = False  # acting on a failsafe
     emergency: bool = False  # descending for it
@@ -133,6 +134,10 @@ class TelemetrySnapshot(NamedTuple):
     gps_ok: bool = True
     fence_enabled: bool = False
     fence_breached: bool = False
+    fence_breaches: int = 0  # so far, with FENCE_BREACH and time of the last one
+    fence_breach_type: int = 0
+    fence_breached_us: int = 0
+    channels: tuple[int, ...] = ()  # of the radio, us
     load: float = 0.0  # computing time, part of the frame interval
     sensed: SensorFrame | None = None  # None under state feedback
     fix: GpsFix | None = None

@@ -18,6 +18,7 @@ class ClientInputs(NamedTuple):
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
     followed: TargetState | None = None
+    channels: tuple[int, ...] = ()  # of a radio, us
 
 
 NOT_STEERED = ClientInputs()

@@ -3,7 +3,7 @@
 import pytest
 
 from colibri.autopilot.commander.missions import MissionTask
-from colibri.autopilot.commander.needs import Latest, ModeNeeds
+from colibri.autopilot.commander.needs import Latest, LatestSticks, ModeNeeds
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
@@ -65,6 +65,8 @@ def test_a_track_from_time_0_is_flown_once() -> None:
 
 
 class Nobody:
+    held: tuple[int, ...] = ()
+
     def __init__(self, refusal: str = "") -> None:
         self._refusal = refusal
 
@@ -89,7 +91,7 @@ class Somebody(Nobody):
 
 def needs_of(
     cockpit: Cockpit,
-    manual: Latest[Sticks] | None = None,
+    manual: LatestSticks | None = None,
     offboard: Latest[OffboardSetpoint] | None = None,
     follow: Latest[TargetState] | None = None,
 ) -> ModeNeeds:

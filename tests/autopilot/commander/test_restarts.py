@@ -18,6 +18,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.guidance.mission.executor import MissionRecord
 from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
+from colibri.autopilot.guidance.tasks.guided import GuidedSettings, GuidedTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import GoTo, Orbit
@@ -73,6 +74,12 @@ def circle(cockpit: Cockpit) -> None:
     cockpit.pilot.fly(Mode.ORBIT, OrbitTask(Orbit((0.0, 0.0, 2.0), 2.0), cockpit.pilot.context()), {})
 
 
+def guide(cockpit: Cockpit) -> None:
+    task = cockpit.tasks.guided(lambda: GuidedSettings(3_000_000, looks_ahead=True, by_thrust=False, hover=0.4))
+    cockpit.pilot.fly(Mode.HOLD, task, {})
+    task.take(PositionSetpoint((20.0, 5.0, 8.0)), cockpit.pilot.context())
+
+
 def begins(mode: Mode) -> Callable[[Cockpit], object]:
     return lambda cockpit: cockpit.pilot.select(mode, {})
 
@@ -82,6 +89,7 @@ MIDWAY: dict[type, tuple[Callable[[Cockpit], object], float]] = {
     DescentTask: (lambda cockpit: cockpit.pilot.save(Action.DESCEND), 0.5),
     FollowTargetTask: (begins(Mode.FOLLOW), 2.0),
     GoToTask: (go_far, 3.0),
+    GuidedTask: (guide, 2.0),
     HoldTask: (brake, 0.3),
     LandTask: (begins(Mode.LAND), 0.7),
     MissionTask: (begins(Mode.MISSION), 7.0),

@@ -12,7 +12,7 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.registry import track
-from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
+from colibri.autopilot.parameters.behaviour import BY_IDENTITY, ROWS, TRACKS
 from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, paths, read
@@ -124,7 +124,7 @@ def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
 @pytest.mark.parametrize("kind", [Behaviour, Limits])
 def test_every_number_of_the_behaviour_is_a_parameter(kind: Any) -> None:
     names = set(Limits._fields) if kind is Limits else {field.name for field in fields(Behaviour)} - {"limits"}
-    assert names <= {row.field for row in ROWS}
+    assert names <= {row.field for row in ROWS} | {field for field, _ in BY_IDENTITY.values()}
 
 
 def test_behaviour_is_what_the_parameters_say() -> None:

@@ -154,7 +154,7 @@ def test_a_remote_link_needs_a_key_or_an_explicit_option(tmp_path: Path, allows:
     [
         (("--gcs", "14550"), "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT or tcp:HOST:PORT"),
         (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
-        (("--identity", "ardupilot"), 'argument --identity: unknown value "ardupilot" (choose '),
+        (("--identity", "betaflight"), 'argument --identity: unknown value "betaflight" (choose '),
         (("--system-id", "0"), "argument --system-id: must be a whole number from 1 to 255, not 0"),
         (("--controller", "pid"), 'unknown controller "pid" (choose '),
         (("--track", "loop"), 'unknown track "loop" (choose spiral'),

@@ -105,7 +105,7 @@ MESSAGES = [
         "sitl --plant-port 0 --home 0,181,0,0",
         "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180",
     ),
-    ("sitl --plant-port 0 --identity ardupilot", 'argument --identity: unknown value "ardupilot" (choose '),
+    ("sitl --plant-port 0 --identity betaflight", 'argument --identity: unknown value "betaflight" (choose '),
     ("sitl --plant-port 0 --profile fast", 'unknown profile "fast" (choose agile, flight'),
     ("sitl --plant-port 0 --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),
     ("sitl --plant-port 0 --plant-vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, ReceivedCommand
-from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
+from colibri.mavlink.streaming.rates import DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
@@ -62,8 +62,8 @@ def test_the_defaults_hold_over_a_minute(kind: str) -> None:
 
 
 def test_every_default_and_every_group_can_be_told() -> None:
-    names = {name for rates in DEFAULTS.values() for name in rates} | set(ALL_GROUPS)
-    assert names <= TELEMETRY.keys()
+    every = (*DEFAULTS.values(), *GROUPS.values())
+    assert {name for names in every for name in names} <= TELEMETRY.keys()
 
 
 def test_frames_share_the_messages() -> None:
@@ -218,7 +218,7 @@ def test_requests_between_two_frames_have_a_limit() -> None:
 def test_a_data_stream_is_a_group_of_messages(group: int) -> None:
     stream = flying()
     assert list(stream.receive(message("REQUEST_DATA_STREAM", 0, 0, group, 4, 1), GROUND, 0)) == []
-    names = GROUPS[group] if group else ALL_GROUPS
+    names = GROUPS[group] if group else [name for names in GROUPS.values() for name in names]
     told = counts(fly(stream, 0, 10_000_000))
     assert told.keys() == set(names)
     assert all(count == pytest.approx(40, abs=1) for count in told.values())

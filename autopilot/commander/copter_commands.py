@@ -1,0 +1,168 @@
+"""ArduCopter's commands: modes by its rules, missions, fence, servos, and the results that its clients expect.
+
+Source: ArduCopter's GCS_MAVLink_Copter.cpp and GCS_Common.cpp, 4.6.
+"""
+
+from collections.abc import Mapping
+from math import isnan, radians
+
+from colibri.autopilot.commander.commands import FORCE_MAGIC, Commands
+from colibri.autopilot.commander.copter_motion import AUTO, CIRCLE, CopterMotion
+from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.mode_selection import Needs
+from colibri.autopilot.commander.mode_tasks import ModeTasks
+from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.commander.rules.shown_modes import ModeBook
+from colibri.autopilot.guidance.tasks.guided import GuidedSettings
+from colibri.mavlink.parameters.store import ParamError, Parameters
+from colibri.mavlink.services.command import DENIED, FAILED, Handler, ReceivedCommand
+from colibri.mavlink.services.statustext import CRITICAL, INFO
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
+
+DO_AUX_FUNCTION, DO_SEND_BANNER = 218, 42428
+"""Of the dialect ardupilotmega."""
+_BY_THRUST, _YAW_STAYS = 8, 0
+_ARM_FORCE = (FORCE_MAGIC, 2989)
+_GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
+_MAX_TAG = 65535
+_TESTED_MOTORS = range(1, 9)
+
+
+class CopterCommands(Commands):
+    """Handlers of the commands of ArduPilot's ground stations."""
+
+    motion: CopterMotion
+
+    def __init__(
+        self,
+        pilot: Pilot,
+        fence: Fence,
+        missions: Missions,
+        needs: Needs,
+        book: ModeBook,
+        tasks: ModeTasks,
+        parameters: Parameters,
+        banner: tuple[str, ...],
+    ) -> None:
+        super().__init__(pilot, fence, missions, needs, book)
+        self._parameters, self._banner = parameters, banner
+        self.motion = CopterMotion(
+            pilot, fence, needs, self.modes, lambda: tasks.guided(self._guided_settings), self._circle
+        )
+        self.modes.enters[CIRCLE] = self.motion.circle
+        self.taken = self.motion.setpoint
+
+    def _guided_settings(self) -> GuidedSettings:
+        value = self._parameters
+        return GuidedSettings(
+            round(value["GUID_TIMEOUT"] * 1e6),
+            value["WP_YAW_BEHAVIOR"] != _YAW_STAYS,
+            bool(int(value["GUID_OPTIONS"]) & _BY_THRUST),
+            value["MOT_THST_HOVER"],
+        )
+
+    def _circle(self) -> tuple[float, float]:
+        radius_m = max(0.01 * self._parameters["CIRCLE_RADIUS"], 1.0)
+        return radius_m, radians(self._parameters["CIRCLE_RATE"]) * radius_m
+
+    def handlers(self) -> Mapping[int, Handler]:
+        done: Handler = lambda _: None  # noqa: E731
+        return {
+            **super().handlers(),
+            mav.MAV_CMD_NAV_VTOL_LAND: lambda _: self.select(Mode.LAND),
+            mav.MAV_CMD_DO_FENCE_ENABLE: self._enable_fence,
+            mav.MAV_CMD_DO_SET_SERVO: self._set_servo,
+            mav.MAV_CMD_DO_SET_RELAY: done,
+            mav.MAV_CMD_DO_REPEAT_SERVO: done,
+            mav.MAV_CMD_DO_REPEAT_RELAY: done,
+            mav.MAV_CMD_DO_MOTOR_TEST: self._test_motors,
+            mav.MAV_CMD_DO_SET_ROI: done,
+            mav.MAV_CMD_DO_SET_ROI_LOCATION: done,
+            mav.MAV_CMD_DO_SET_ROI_NONE: done,
+            mav.MAV_CMD_DO_MOUNT_CONTROL: done,
+            mav.MAV_CMD_DO_MOUNT_CONFIGURE: done,
+            mav.MAV_CMD_DO_DIGICAM_CONTROL: done,
+            mav.MAV_CMD_DO_GRIPPER: done,
+            DO_AUX_FUNCTION: done,
+            DO_SEND_BANNER: self._send_banner,
+        }
+
+    def select(self, mode: Mode) -> Refusal | None:
+        return self.modes.command(mode)
+
+    def _arm_disarm(self, command: ReceivedCommand) -> Refusal | None:
+        if command.p1 == 1.0 and command.p2 in _ARM_FORCE:
+            command = command._replace(p2=FORCE_MAGIC)
+        refusal = super()._arm_disarm(command)
+        return refusal and refusal._replace(result=FAILED)
+
+    def _start_mission(self, command: ReceivedCommand) -> Refusal | None:
+        if command.p1 not in (0.0,) or (command.p2 != 0.0 and not isnan(command.p2)):
+            return Refusal("mission start: parameters 1 and 2 must be 0", DENIED)
+        refusal = None if self.modes.shown.number == AUTO else self.modes.select(AUTO)
+        if refusal is None and self._pilot.state.armed:
+            refusal = self.modes.start()
+        return refusal and refusal._replace(result=FAILED)
+
+    def _pause_or_go_on(self, command: ReceivedCommand) -> Refusal | None:
+        if command.p1 not in (0.0, 1.0):
+            return Refusal(f"pause: {command.p1:g} is not 0, to pause, or 1, to go on", DENIED)
+        pauses, task = command.p1 == 0.0, self.motion.task
+        if self.modes.shown.number == AUTO:
+            return self.modes.fly(Mode.HOLD) if pauses else self.modes.start()
+        if not self.motion.guided:
+            return Refusal("pause: only in AUTO and GUIDED", FAILED)
+        if task is not None:
+            task.paused = pauses
+        return None
+
+    def _change_speed(self, command: ReceivedCommand) -> Refusal | None:
+        kind = _GROUND_SPEED if command.p1 in (0.0, _GROUND_SPEED) or isnan(command.p1) else command.p1
+        if not command.p2 > 0.0:
+            return Refusal(f"speed: {command.p2:g} m/s is not above 0", DENIED)
+        names = {_CLIMB: "WPNAV_SPEED_UP", _DESCENT: "WPNAV_SPEED_DN"}
+        if kind in names:
+            refused = isinstance(self._parameters.propose(names[kind], 100.0 * command.p2), ParamError)
+            return Refusal(f"speed: {command.p2:g} m/s is out of range", DENIED) if refused else None
+        if kind != _GROUND_SPEED:
+            return Refusal(f"speed: type {kind:g} is not 0 to 3", DENIED)
+        self._pilot.speed_m_s = command.p2
+        return None
+
+    def _terminate(self, command: ReceivedCommand) -> Refusal | None:
+        return super()._terminate(command) if command.p1 > 0.5 else Refusal("termination: 1 terminates", FAILED)
+
+    def _check(self, command: ReceivedCommand) -> Refusal | None:
+        """Report each failed check; accepted also with failures."""
+        del command
+        self._judge_fence()
+        for reason in self._pilot.readiness.refusals():
+            self._pilot.say(CRITICAL, f"PreArm: {reason}")
+        return None
+
+    def _enable_fence(self, command: ReceivedCommand) -> Refusal | None:
+        if command.p1 not in (0.0, 1.0, 2.0):
+            return Refusal(f"fence: {command.p1:g} is not 0 to 2", FAILED)
+        self._parameters.propose("FENCE_ENABLE", int(command.p1 == 1.0))
+        return None
+
+    def _send_banner(self, command: ReceivedCommand) -> Refusal | None:
+        del command
+        for text in self._banner:
+            self._pilot.say(INFO, text)
+        return None
+
+    def _set_servo(self, command: ReceivedCommand) -> Refusal | None:
+        return None if command.p1 >= 1.0 else Refusal(f"servo: {command.p1:g} is not 1 or more", FAILED)
+
+    def _test_motors(self, command: ReceivedCommand) -> Refusal | None:
+        if self._pilot.state.armed:
+            return Refusal("Motor Test: vehicle not landed", FAILED)
+        if command.p1 not in _TESTED_MOTORS:
+            return Refusal(f"Motor Test: motor {command.p1:g} is not 1 to 8", FAILED)
+        self._pilot.say(INFO, "starting motor test")
+        self._pilot.say(INFO, "finished motor test")
+        return None

@@ -1,0 +1,130 @@
+"""Flight modes as clients see them: the number and name of HEARTBEAT, and the modes of the vehicle that fly each.
+
+An identity has a `ModeBook`. PX4's shows every mode of the vehicle as itself; another one may show several modes of the
+vehicle as one, such as ArduPilot's GUIDED, which takes off, flies to places and holds.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from colibri.autopilot.commander.rules.modes import MANUAL, MODES, Mode, State, custom_mode, mode_of, mode_of_custom
+from colibri.mavlink.services.command import UNSUPPORTED
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
+
+CUSTOM: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+STABILIZED: int = CUSTOM | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
+_BY_STICKS: int = STABILIZED | mav.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+_AUTO: int = STABILIZED | mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUIDED_ENABLED
+
+
+class ShownMode(NamedTuple):
+    """A flight mode of an identity.
+
+    Attributes:
+        number: HEARTBEAT.custom_mode.
+        flies: Mode of the vehicle that a selection begins; None: the mode is refused by name.
+        covers: Modes of the vehicle that are shown as this one once it is selected.
+        to_arm: Whether clients may arm in it.
+        guided: Whether the vehicle controls its position.
+        waits: Whether a standing vehicle holds until it is told to start.
+        standard: MAV_STANDARD_MODE or 0.
+    """
+
+    number: int
+    name: str
+    flies: Mode | None = None
+    covers: frozenset[Mode] = frozenset()
+    to_arm: bool = True
+    guided: bool = True
+    waits: bool = False
+    standard: int = 0
+    selectable: bool = True
+
+
+BaseModes = tuple[int, int]
+"""MAV_MODE_FLAG bits but the armed one: without sticks, and with them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeBook:
+    """The flight modes of an identity.
+
+    Attributes:
+        first: Number at the start.
+        chosen: Number selected by a command for a mode of the vehicle, or shown for one that nobody selected.
+        saved: Number shown for a failsafe's mode.
+        resumed: Number shown where a flight begins in the air.
+        by_command: Returns the number of DO_SET_MODE's parameters 1 to 3, or a refusal.
+        by_message: Returns the number of SET_MODE's base and custom mode, or a refusal.
+        unknown: Returns the refusal of an unknown number, with how the client wrote it.
+        refusal: Returns the refusal of a known mode with its reason.
+        unarmable: Returns the refusal to arm in a mode.
+        base_modes: Returns HEARTBEAT.base_mode of a mode, given the vehicle's state and its number of flights.
+    """
+
+    modes: tuple[ShownMode, ...]
+    first: int
+    chosen: Mapping[Mode, int]
+    saved: Mapping[Mode, int]
+    resumed: Mapping[Mode, int]
+    by_command: Callable[[float, float, float], tuple[int, str] | Refusal]
+    by_message: Callable[[int, int], tuple[int, str] | Refusal]
+    unknown: Callable[[str], Refusal]
+    refusal: Callable[[ShownMode, Refusal], Refusal]
+    unarmable: Callable[[ShownMode], Refusal]
+    base_modes: Callable[[ShownMode, State, int], BaseModes]
+
+    @property
+    def numbers(self) -> dict[int, ShownMode]:
+        return {mode.number: mode for mode in self.modes}
+
+    def listed(self) -> Iterable[ShownMode]:
+        """Return the modes that the vehicle flies."""
+        return (mode for mode in self.modes if mode.flies is not None)
+
+
+def _by_command(p1: float, p2: float, p3: float) -> tuple[int, str] | Refusal:
+    numbers = (p1, p2, p3)
+    if not all(0.0 <= number < 256.0 and number == int(number) for number in numbers):
+        return Refusal("mode refused: {:g} {:g} {:g} is not a PX4 base, main and sub mode".format(*numbers))
+    base, main, sub = map(int, numbers)
+    if not base & CUSTOM:
+        return Refusal(f"mode refused: base mode {base} has no custom mode", UNSUPPORTED)
+    mode = mode_of(main, sub)
+    return -1 if mode is None else custom_mode(mode), f"{main} {sub}"
+
+
+def _by_message(base_mode: int, number: int) -> tuple[int, str]:
+    mode = mode_of_custom(number) if base_mode & CUSTOM else None
+    return -1 if mode is None else custom_mode(mode), f"{base_mode} {number}"
+
+
+def _base_modes(shown: ShownMode, _state: State, _flights: int) -> BaseModes:
+    return _AUTO, _BY_STICKS if shown.flies in MANUAL else _AUTO
+
+
+PX4_MODES = ModeBook(
+    modes=tuple(
+        ShownMode(
+            custom_mode(row.mode),
+            row.mode.title(),
+            row.mode,
+            frozenset((row.mode,)),
+            standard=row.standard,
+            selectable=row.selectable,
+        )
+        for row in MODES
+    ),
+    first=custom_mode(Mode.HOLD),
+    chosen={mode: custom_mode(mode) for mode in Mode},
+    saved={mode: custom_mode(mode) for mode in Mode},
+    resumed={mode: custom_mode(mode) for mode in Mode},
+    by_command=_by_command,
+    by_message=_by_message,
+    unknown=lambda said: Refusal(f"mode refused: {said} is no mode of this vehicle", UNSUPPORTED),
+    refusal=lambda _, refusal: refusal,
+    unarmable=lambda mode: Refusal(f"Arming denied in {mode.name}: choose another mode first"),
+    base_modes=_base_modes,
+)

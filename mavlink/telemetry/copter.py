@@ -1,0 +1,136 @@
+"""Messages that ArduPilot sends beside the common ones.
+
+Source: ArduPilot's GCS_Common.cpp and ardupilotmega.xml. Numbers of its own filters and processor have plain values.
+"""
+
+from math import degrees, hypot, isfinite
+
+from colibri.common.compiled_rotations import euler_from_quaternion
+from colibri.common.kernels import atan2
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry import sensors
+from colibri.mavlink.telemetry.encoder import (
+    Encoder,
+    boot_ms,
+    degrees_e7,
+    fitted,
+    in_body_frd,
+    place_of,
+    rate_frd,
+    yaw_ned,
+)
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
+from colibri.mavlink.telemetry.status import ESTIMATED
+from colibri.mavlink.wire.dialect import mav
+
+GRAVITY_M_S2 = 9.81
+_FREE_BYTES = 2**17
+_SERVO_MV, _BOARD_MV = 0, 5000
+_NO_RSSI = 255
+_CHANNELS = 18
+_ATTITUDE, _VELOCITY, _VERTICAL, _PLACE = 1, 2 | 4, 32, 8 | 16 | 256 | 512
+_CONSTANT_POSITION, _UNINITIALISED = 128, 1024
+_ESTIMATOR = {1: _ATTITUDE, 2: 2, 4: 4, 8: 8 | 256, 16: 16 | 512, 32: 32}
+"""Flags of EKF_STATUS_REPORT by those of ESTIMATOR_STATUS."""
+
+
+def ekf_status_report(s: TelemetrySnapshot) -> Fields:
+    """EKF_STATUS_REPORT (193): flags, and test ratios of velocity, position, height, compass, terrain."""
+    flags = ESTIMATED if s.estimator is None else s.estimator.flags
+    if not all(map(isfinite, (*s.position_enu_m, *s.attitude))):
+        return (_UNINITIALISED, *(0.0,) * 5)
+    report = sum(bits for flag, bits in _ESTIMATOR.items() if flags & flag)
+    if not s.gps_ok or not report & 16:
+        report = (report & ~_PLACE & ~2) | _CONSTANT_POSITION
+    ratios = (0.05, 0.05, 0.05, 0.05) if s.estimator is None else (*s.estimator.ratios[:3], s.estimator.ratios[3])
+    return (report, *(min(ratio, 1.0) if isfinite(ratio) else 0.0 for ratio in ratios), 0.0)
+
+
+def ahrs(s: TelemetrySnapshot) -> Fields:
+    """AHRS (163)."""
+    del s
+    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.002, 0.002)
+
+
+def ahrs2(s: TelemetrySnapshot) -> Fields:
+    """AHRS2 (178): a second attitude and place, here the first; rad, m above the sea, degE7."""
+    roll, pitch, yaw = _angles_frd(s)
+    place = place_of(s)
+    return (roll, pitch, yaw, place.altitude_m, *degrees_e7(place))
+
+
+def simstate(s: TelemetrySnapshot) -> Fields:
+    """SIMSTATE (164): attitude, specific force, rates and place; rad, m/s2, rad/s, degE7."""
+    east, north, up = s.acceleration_enu_m_s2
+    force = in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2))
+    return (*_angles_frd(s), *force, *rate_frd(s), *degrees_e7(place_of(s)))
+
+
+def meminfo(s: TelemetrySnapshot) -> Fields:
+    """MEMINFO (152)."""
+    del s
+    return (0, 2**16 - 1)
+
+
+def power_status(s: TelemetrySnapshot) -> Fields:
+    """POWER_STATUS (125): mV of board and servo rail."""
+    del s
+    return (_BOARD_MV, _SERVO_MV, 0)
+
+
+def wind(s: TelemetrySnapshot) -> Fields | None:
+    """WIND (168): where it blows from, degrees; m/s. In the air alone; zero until it is estimated."""
+    if s.landed_state == mav.MAV_LANDED_STATE_ON_GROUND:
+        return None
+    east, north, up = s.wind_enu_m_s
+    if not all(map(isfinite, (east, north, up))):
+        return (0.0, 0.0, 0.0)
+    return (degrees(atan2(-east, -north)), hypot(east, north), -up)
+
+
+def fence_status(s: TelemetrySnapshot) -> Fields | None:
+    """FENCE_STATUS (162): breach, its count, type and time, ms; with a fence alone."""
+    if not s.fence_enabled:
+        return None
+    return (int(s.fence_breached), s.fence_breaches, s.fence_breach_type, s.fence_breached_us // 1000)
+
+
+def rc_channels(s: TelemetrySnapshot) -> Fields:
+    """RC_CHANNELS (65): the radio's channels, us."""
+    channels = s.channels
+    return (boot_ms(s), len(channels), *channels, *(0,) * (_CHANNELS - len(channels)), _NO_RSSI)
+
+
+def rc_channels_raw(s: TelemetrySnapshot) -> Fields:
+    """RC_CHANNELS_RAW (35): the first eight channels, us."""
+    return (boot_ms(s), 0, *(*s.channels, *(0,) * 8)[:8], _NO_RSSI)
+
+
+def _angles_frd(s: TelemetrySnapshot) -> tuple[float, float, float]:
+    roll, pitch, yaw = euler_from_quaternion(s.attitude)
+    return (roll, -pitch, yaw_ned(yaw))
+
+
+def _second(s: TelemetrySnapshot) -> Fields:
+    return sensors.scaled_imu(s)
+
+
+_ENCODERS = {
+    "EKF_STATUS_REPORT": ekf_status_report,
+    "AHRS": ahrs,
+    "AHRS2": ahrs2,
+    "SIMSTATE": simstate,
+    "MEMINFO": meminfo,
+    "POWER_STATUS": power_status,
+    "WIND": wind,
+    "FENCE_STATUS": fence_status,
+    "RC_CHANNELS": rc_channels,
+    "RC_CHANNELS_RAW": rc_channels_raw,
+    "SCALED_IMU2": _second,
+    "SCALED_IMU3": _second,
+}
+
+
+def copter_telemetry() -> dict[str, Encoder]:
+    """Return the encoder of each message by name; an encoder never raises."""
+    return {name: fitted(name, encoder) for name, encoder in _ENCODERS.items()}
