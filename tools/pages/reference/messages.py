@@ -58,7 +58,7 @@ def taken() -> dict[str, str]:
     for info in pkgutil.walk_packages(mavlink_package.__path__, f"{mavlink_package.__name__}."):
         module = import_module(info.name)
         for _, kind in getmembers(module, isclass):
-            handles = getattr(kind, "handles", None)
+            handles = vars(kind).get("handles")
             if kind.__module__ == module.__name__ and isinstance(handles, frozenset):
                 found |= dict.fromkeys(handles, (getdoc(kind) or "").partition("\n\n")[0].replace("\n", " "))
     nowhere = MissionVehicle(*([lambda *_: None] * len(MissionVehicle._fields)))  # type: ignore[arg-type]
