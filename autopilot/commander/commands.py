@@ -8,6 +8,7 @@ from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
 from colibri.autopilot.commander.motion_commands import MotionCommands, denied
 from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.common.earth.geodesy import Geodetic
@@ -25,7 +26,12 @@ _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 
 
 class Commands:
-    """Handlers of the commands of ground stations; `taken` takes setpoints where a mode flies them by itself."""
+    """Handlers of the commands of ground stations.
+
+    Attributes:
+        taken: Takes setpoints, where a mode flies them by itself.
+        exempt: Returns conditions of failsafes without effect in this mode; the radio is then needed in every mode.
+    """
 
     def __init__(
         self, pilot: Pilot, fence: Fence, missions: Missions, needs: Needs, book: ModeBook = PX4_MODES
@@ -35,6 +41,7 @@ class Commands:
         self._home = pilot.home
         self.modes = ModeSelection(book, pilot, needs)
         self.taken: Callable[[OffboardSetpoint | None], None] | None = None
+        self.exempt: Callable[[], frozenset[Condition]] | None = None
         self.motion = MotionCommands(pilot, fence, needs)
 
     def handlers(self) -> Mapping[int, Handler]:

@@ -3,16 +3,17 @@
 Source: ArduCopter's GCS_MAVLink_Copter.cpp and GCS_Common.cpp, 4.6.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import isnan, radians
 
 from colibri.autopilot.commander.commands import FORCE_MAGIC, Commands
-from colibri.autopilot.commander.copter_motion import AUTO, CIRCLE, CopterMotion
+from colibri.autopilot.commander.copter_motion import ALT_HOLD, AUTO, CIRCLE, LOITER, POSHOLD, CopterMotion
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_selection import Needs
 from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.rules.failsafe_table import Condition
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.commander.rules.shown_modes import ModeBook
 from colibri.autopilot.guidance.tasks.guided import GuidedSettings
@@ -25,6 +26,20 @@ from colibri.mavlink.wire.refusal import Refusal
 DO_AUX_FUNCTION, DO_SEND_BANNER = 218, 42428
 """Of the dialect ardupilotmega."""
 _BY_THRUST, _YAW_STAYS = 8, 0
+_MAX_SPIN = 0.3
+_ALT_MAX, _CIRCLE = 1, 2
+_AUTO_BY_RADIO, _AUTO_BY_STATION, _GUIDED_BY_RADIO, _LANDING, _PILOT_BY_STATION = 1, 2, 4, 8, 16
+"""FS_OPTIONS."""
+LAND = 9
+_BY_PILOT = (0, ALT_HOLD, LOITER, POSHOLD)
+_EXEMPT = {
+    (radio, station): frozenset(
+        condition for condition, acts in ((Condition.STICKS_LOST, radio), (Condition.STATION_LOST, station)) if not acts
+    )
+    for radio in (False, True)
+    for station in (False, True)
+}
+"""Conditions without effect, by whether losses of radio and ground station act."""
 _ARM_FORCE = (FORCE_MAGIC, 2989)
 _GROUND_SPEED, _CLIMB, _DESCENT = 1.0, 2.0, 3.0
 _MAX_TAG = 65535
@@ -53,7 +68,9 @@ class CopterCommands(Commands):
             pilot, fence, needs, self.modes, lambda: tasks.guided(self._guided_settings), self._circle
         )
         self.modes.enters[CIRCLE] = self.motion.circle
-        self.taken = self.motion.setpoint
+        self.taken, self.exempt = self.motion.setpoint, self._exempt
+        pilot.readiness.further = self._prearm
+        self.modes.select(int(parameters["INITIAL_MODE"]))
 
     def _guided_settings(self) -> GuidedSettings:
         value = self._parameters
@@ -67,6 +84,45 @@ class CopterCommands(Commands):
     def _circle(self) -> tuple[float, float]:
         radius_m = max(0.01 * self._parameters["CIRCLE_RADIUS"], 1.0)
         return radius_m, radians(self._parameters["CIRCLE_RATE"]) * radius_m
+
+    def _exempt(self) -> frozenset[Condition]:
+        """Return the losses without effect, by FS_OPTIONS and the FS_*_ENABLE: events.cpp."""
+        value, number = self._parameters, self.modes.shown.number
+        options, radio, station = int(value["FS_OPTIONS"]), bool(value["FS_THR_ENABLE"]), True
+        if number == AUTO:
+            radio, station = radio and not options & _AUTO_BY_RADIO, not options & _AUTO_BY_STATION
+        elif self.motion.guided:
+            radio = radio and not options & _GUIDED_BY_RADIO
+        elif number == LAND and options & _LANDING:
+            radio = station = False
+        elif number in _BY_PILOT and options & _PILOT_BY_STATION:
+            station = False
+        return _EXEMPT[radio, station]
+
+    def _prearm(self) -> Iterator[str]:
+        """Yield the reasons of ArduCopter's own checks against arming."""
+        value = self._parameters
+        if not value["ARMING_CHECK"]:
+            return
+        if value["MOT_PWM_MIN"] >= value["MOT_PWM_MAX"]:
+            yield "Motors: Check MOT_PWM_MIN and MOT_PWM_MAX"
+        if value["MOT_SPIN_MIN"] > _MAX_SPIN:
+            yield f"Motors: MOT_SPIN_MIN too high {value['MOT_SPIN_MIN']:.2f} > {_MAX_SPIN:.1f}"
+        if value["MOT_SPIN_ARM"] > value["MOT_SPIN_MIN"]:
+            yield "Motors: MOT_SPIN_ARM > MOT_SPIN_MIN"
+        if self.modes.shown.number == AUTO and not self._missions.total:
+            yield "Mode requires mission"
+        channels = self._pilot.sensed.steered.channels
+        if self._pilot.sensed.now_us and not channels:
+            yield "RC not found"
+        elif channels and value["FS_THR_ENABLE"] and channels[2] < value["FS_THR_VALUE"]:
+            yield "Throttle below failsafe"
+        if value["FENCE_ENABLE"]:
+            kinds = int(value["FENCE_TYPE"])
+            if kinds & _CIRCLE and value["FENCE_RADIUS"] < 0.0:
+                yield "Invalid Circle FENCE_RADIUS value"
+            if kinds & _ALT_MAX and value["FENCE_ALT_MAX"] < 0.0:
+                yield "Invalid FENCE_ALT_MAX value"
 
     def handlers(self) -> Mapping[int, Handler]:
         done: Handler = lambda _: None  # noqa: E731
@@ -87,6 +143,7 @@ class CopterCommands(Commands):
             mav.MAV_CMD_DO_DIGICAM_CONTROL: done,
             mav.MAV_CMD_DO_GRIPPER: done,
             DO_AUX_FUNCTION: done,
+            mav.MAV_CMD_DO_JUMP_TAG: self._jump_to_tag,
             DO_SEND_BANNER: self._send_banner,
         }
 
@@ -154,6 +211,11 @@ class CopterCommands(Commands):
         for text in self._banner:
             self._pilot.say(INFO, text)
         return None
+
+    def _jump_to_tag(self, command: ReceivedCommand) -> Refusal | None:
+        """Refuse every tag: missions have none."""
+        valid = 0.0 <= command.p1 <= _MAX_TAG
+        return Refusal(f"mission: there is no tag {command.p1:g}", FAILED if valid else DENIED)
 
     def _set_servo(self, command: ReceivedCommand) -> Refusal | None:
         return None if command.p1 >= 1.0 else Refusal(f"servo: {command.p1:g} is not 1 or more", FAILED)

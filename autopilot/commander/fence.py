@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import chain
+from math import inf
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from colibri.autopilot.guidance.mission.geofence import EDGE_M, OUTSIDE, AroundH
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.budget import Budget
+from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 CHECKED_AT_ONCE = 30_000
@@ -30,10 +32,15 @@ class Fence:
         self._geofence = Geofence((), home.origin)
         self._breach: Refusal | None = None
         self.against_arming: Refusal | None = None
+        self.breaches = self.breach_type = self.breached_us = 0  # how many, FENCE_BREACH and time of the last one
         self._breach_due_us, self._arming_margin_m = 0, 0.0
+        self.above_floor = False  # the floor holds once it has been climbed over, and not for landings
 
     def adopt(self, behaviour: Behaviour) -> None:
+        changes = behaviour.uploaded_fence is not self._behaviour.uploaded_fence
         self._behaviour = behaviour
+        if changes:
+            self.rebuild()
 
     def load(self, items: Sequence[MissionItem]) -> None:
         self._items = tuple(items)
@@ -41,22 +48,32 @@ class Fence:
 
     def rebuild(self) -> None:
         self.budget.spend(_ITEM_US * len(self._items))
-        self._geofence = Geofence(self._items, self._home.origin)
+        self._geofence = Geofence(self._items if self.loaded else (), self._home.origin)
         self._breach, self._breach_due_us = None, 0
 
     @property
     def loaded(self) -> bool:
-        return bool(self._items)
+        return bool(self._items) and self._behaviour.uploaded_fence
 
     @property
     def exists(self) -> bool:
         behaviour = self._behaviour
-        return self.loaded or behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
+        bounded = behaviour.max_distance_m > 0.0 or behaviour.max_height_m > 0.0
+        return self.loaded or bounded or behaviour.floor_m > -inf
 
     @property
     def _around_home(self) -> AroundHome:
         behaviour = self._behaviour
-        return AroundHome(self._home.position_enu_m, behaviour.max_distance_m, behaviour.max_height_m)
+        return AroundHome(self._home.position_enu_m, behaviour.max_distance_m, behaviour.max_height_m, self.floor_m)
+
+    @property
+    def floor_m(self) -> float:
+        """Return the floor above home, m, while it holds."""
+        return self._behaviour.floor_m if self.above_floor else -inf
+
+    def watch_floor(self, height_m: float, *, lands: bool) -> None:
+        """Take in the height above home."""
+        self.above_floor = not lands and (self.above_floor or height_m > self._behaviour.floor_m)
 
     def refusal(self, place: Vector) -> Refusal | None:
         return self._geofence.refusal(place) or self._around_home.refusal(place)
@@ -90,9 +107,19 @@ class Fence:
             self._breach = self.against_arming = None
         elif now_us >= self._breach_due_us:
             self._breach_due_us, self._arming_margin_m = now_us + _LOOK_EVERY_US, margin_m
-            self._breach = self.refusal(place)
+            before, self._breach = self._breach, self.refusal(place)
+            if self._breach is not None and before is None:
+                self._note(place, now_us)
             self.against_arming = self._breach or self.arming_refusal(place)
         return self._breach
+
+    def _note(self, place: Vector, now_us: int) -> None:
+        up_m, behaviour = place[2] - self._home.position_enu_m[2], self._behaviour
+        too_high = 0.0 < behaviour.max_height_m < up_m
+        kind = mav.FENCE_BREACH_MAXALT if too_high else mav.FENCE_BREACH_BOUNDARY
+        self.breaches += 1
+        self.breach_type = int(mav.FENCE_BREACH_MINALT if up_m < self.floor_m else kind)
+        self.breached_us = now_us
 
     def arming_refusal(self, place: Vector) -> Refusal | None:
         """Check a position by the fence of this moment, also in the frame in which it is loaded."""

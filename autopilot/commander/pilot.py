@@ -202,6 +202,7 @@ class Pilot:
             self.ground.standing,
             self.ground.height_m,
             blind=self.saving is Action.DESCEND or not position_known,
+            home_yaw_rad=self.home.yaw_rad,
         )
 
     def warn(self, text: str) -> None:

@@ -14,6 +14,7 @@ from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.hil.world_changes import WorldChange
 
 if TYPE_CHECKING:
     from colibri.mavlink.node.hub import Outgoing
@@ -85,7 +86,7 @@ class Stages(Protocol):
     def actuate(self, now_us: int) -> ActuatorCommand:
         """Return the command to send."""
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Fault | WorldChange, ...]:
         """Return the faults to request from the plant."""
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None:

@@ -23,6 +23,7 @@ from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import NOTHING, PlantBattery, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
@@ -170,7 +171,7 @@ class Copter:
     def actuate(self, now_us: int) -> ActuatorCommand:
         return ActuatorCommand(now_us, self.parts.actuation.send(now_us), armed=self._flying.armed)
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Fault | WorldChange, ...]:
         return self.guard(table.FAULTS, self.stations.failures.take, tuple)
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None:

@@ -102,6 +102,7 @@ def parts_of(
         delay.declare(profile.delay_s if flies_by.delay_s < 0.0 else flies_by.delay_s)
 
     obey_delay(flies_by)
+    battery = BatteryMonitor(assumed)
     trial = VehicleTrial(loop, rotor_loss, planned_at)
     tuning = Retuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial, budget)
     with nullcontext() if values else suppress(ImpossibleError):  # compiles what a change in flight needs
@@ -110,7 +111,7 @@ def parts_of(
     snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)
     leads = () if attitude is None else (attitude,)
     subscribers = Subscribers(
-        parameters=(supervisor.adopt,),
+        parameters=(supervisor.adopt, battery.adopt),
         behaviour=(pilot.adopt, missions.adopt, rotor_loss.obey, obey_delay, *(part.obey for part in leads)),
         law=(loop.adopt,),
         vehicle=(
@@ -133,7 +134,7 @@ def parts_of(
         StateSource(estimator, loop.frame_interval_us),
         actuation,
         rotor_loss,
-        BatteryMonitor(assumed),
+        battery,
         tasks,
         pilot,
         supervisor,

@@ -10,6 +10,7 @@ from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ROTORS, ActuatorCommand
+from colibri.mavlink.hil.world_changes import WorldChange
 
 MISSED_US = 100_000
 """How long frames may be missing while the model of the rotors still holds, more or less."""
@@ -31,7 +32,7 @@ class Step(NamedTuple):
     decision: Decision | None
     duration_s: float
     estimate: Estimate | None = None
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[Fault | WorldChange, ...] = ()
     known: bool = True
     delay_us: int = 0
     frame: Frame | None = None

@@ -2,13 +2,16 @@
 
 from colibri.autopilot.commander.pilot import Sensed
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
-from colibri.autopilot.commander.rules.failsafe_table import Action
+from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
+from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.core.defence import table
 from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, ClientInputs
 
 _EVER_US = 10**15
+_LANDS = (Mode.LAND, Mode.RETURN)
+_NOTHING: frozenset[Condition] = frozenset()
 _KNOWN_TILT_RAD, _CATCHING_US = 0.035, 3_000_000
 """A vehicle caught in a fall drifts until its tilt is known so well, or for so long."""
 
@@ -84,6 +87,10 @@ class Supervision:
 
     def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
         parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
+        fence = stations.fence if stations.fence.exists else None
+        if fence is not None:
+            height_m = state.position_enu_m[2] - pilot.home.position_enu_m[2]
+            fence.watch_floor(height_m, lands=pilot.ground.standing or pilot.state.mode in _LANDS)
         sticks = stations.manual.latest(now_us, _EVER_US)
         decision = parts.actuation.decision
         return FailsafeInputs(
@@ -98,11 +105,13 @@ class Supervision:
             listening_us=self._listening_us,
             station_us=stations.station_us,
             battery=parts.battery.state(),
-            fence=stations.fence.margin_m if stations.fence.exists else None,
+            fence=None if fence is None else fence.margin_m,
             decided=None if decision is None else decision.diagnostics,
             late=pilot.behaviour.solve_time_s * 1e6 > parts.loop.control_interval_us,
             rotor_lost=parts.rotor_loss.landing_for,
             pace=pilot.behaviour.limits,
+            needs_radio=stations.exempt is not None,
+            exempt=_NOTHING if stations.exempt is None else stations.exempt(),
         )
 
 

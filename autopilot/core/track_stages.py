@@ -19,6 +19,7 @@ from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.plant.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class TrackStages:
     def actuate(self, now_us: int) -> ActuatorCommand:
         return ActuatorCommand(now_us, self.loop.controls, armed=True)
 
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[Fault | WorldChange, ...]:
         return ()
 
     def sampled(self, sample: ControlSample, duration_s: float) -> None: ...

@@ -7,12 +7,14 @@ import numpy as np
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, estimated
 from colibri.common.types import PerRotor
 from colibri.mavlink.hil.plant_status import PlantBattery
+from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState
 from colibri.plant.vehicle.description import Vehicle
 
 _CELL_V = 4.2
 _SECONDS_PER_HOUR = 3600.0
 _MIN_CURRENT_A = 0.01
+_VOLTAGE = "SIM_BATT_VOLTAGE"
 _SAG = 0.03
 """Tolerance between voltages, as a part of the full voltage: the model's rotors do not lag."""
 
@@ -34,6 +36,14 @@ class BatteryMonitor:
         self._is_reported = False
         self._sag_v = 0.0
         self.charge_ah = 0.0
+        self._simulated_v: float | None = None
+
+    def adopt(self, parameters: Parameters) -> None:
+        """Have the voltage of SIM_BATT_VOLTAGE, once that is set."""
+        if _VOLTAGE in parameters and parameters[_VOLTAGE] != parameters.default(_VOLTAGE):
+            self._simulated_v = float(parameters[_VOLTAGE])
+        elif self._simulated_v is not None:
+            self._simulated_v = None
 
     def receive(self, reported: PlantBattery) -> None:
         if not reported.exists:
@@ -66,7 +76,7 @@ class BatteryMonitor:
 
     @property
     def voltage_v(self) -> float:
-        return max(0.0, self._now[0] + self._sag_v)
+        return max(0.0, self._now[0] + self._sag_v) if self._simulated_v is None else self._simulated_v
 
     def state(self, charge_state: int = CHARGE_OK) -> BatteryState | None:
         if self.battery is None:

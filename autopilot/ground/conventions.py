@@ -12,6 +12,7 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
+from colibri.autopilot.ground.fault_injection import Failures
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.service import Service
@@ -44,6 +45,9 @@ class Served(Protocol):
     parameters: Parameters
     needs: ModeNeeds
     streams: StreamService
+    failures: Failures
+    pilot: Pilot
+    banner: tuple[str, ...]
 
     def say(self, severity: int, text: str) -> None: ...
 

@@ -3,6 +3,7 @@
 from colibri.mavlink.hil.faults import Equipment, Fault, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
+from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.services.command import FAILED, PENDING, UNSUPPORTED, ReceivedCommand
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
 from colibri.mavlink.wire.refusal import Refusal
@@ -17,7 +18,7 @@ class Failures:
     def __init__(self, feedback: Feedback, *, relays: bool) -> None:
         self._relays = relays
         self._parts = [part for part in Equipment if part is not Equipment.SENSORS or feedback is Feedback.SENSORS]
-        self._to_send: list[Fault] = []
+        self._to_send: list[Fault | WorldChange] = []
         self._pending: tuple[Fault, ReceivedCommand] | None = None
 
     def inject(self, command: ReceivedCommand, *, enabled: bool) -> Refusal | None:
@@ -35,7 +36,17 @@ class Failures:
         self._pending = (judgement, command)
         return PENDING
 
-    def take(self) -> tuple[Fault, ...]:
+    def request(self, asked: Fault | WorldChange) -> Refusal | None:
+        """Have the plant change without an answer."""
+        if not self._relays:
+            return Refusal("this simulator does not change", UNSUPPORTED)
+        judgement = judged(asked, self._parts) if isinstance(asked, Fault) else asked
+        if isinstance(judgement, Refusal):
+            return judgement
+        self._to_send.append(judgement)
+        return None
+
+    def take(self) -> tuple[Fault | WorldChange, ...]:
         if not self._to_send:
             return ()
         faults, self._to_send = tuple(self._to_send), []

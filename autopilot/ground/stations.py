@@ -118,8 +118,9 @@ class Stations:
         budget: Budget,
     ) -> None:
         wire, streams = conventions.wire, conventions.streams
-        self._conventions, self._lines, self._pilot, self._guard = conventions, lines, pilot, defence.guard
+        self._conventions, self._lines, self.pilot, self._guard = conventions, lines, pilot, defence.guard
         self._text, self.reports = StatusText(), settings.reports
+        self.banner = conventions.banner
         self._said: deque[Line] = deque(maxlen=MAX_SAID)
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.offboard = Offboard(self._text, conventions.local_frames)
@@ -134,6 +135,7 @@ class Stations:
         book = conventions.modes
         commands = conventions.commands(Commanded(pilot, fence, missions, self.needs, tasks, parameters, book))
         self.modes, self.offboard.taken = commands.modes, commands.taken
+        self.exempt, self.select_mode = commands.exempt, commands.modes.select
         vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
         if wire.home_first:
             vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)
@@ -197,7 +199,7 @@ class Stations:
         self._heartbeat.station_us = now_us
 
     def update(self, snapshot: TelemetrySnapshot) -> None:
-        vehicle = self._pilot.sensed.vehicle
+        vehicle = self.pilot.sensed.vehicle
         assert vehicle is not None, "the vehicle has been seen"
         self.snapshot = snapshot
         self._heartbeat.update(snapshot)
@@ -208,7 +210,7 @@ class Stations:
     def go_on(self) -> None:
         """Send at least the mode if a snapshot fails."""
         self.modes.update()
-        self._heartbeat.go_on(self.modes.shown.number, armed=self._pilot.state.armed)
+        self._heartbeat.go_on(self.modes.shown.number, armed=self.pilot.state.armed)
 
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
         self.needs.at(now_us)
@@ -228,7 +230,7 @@ class Stations:
         return self.take_outbox()
 
     def _log_flight(self, said: list[Line], now_us: int) -> None:
-        self.log.update(self.snapshot, said, now_us, armed=self._pilot.state.armed)
+        self.log.update(self.snapshot, said, now_us, armed=self.pilot.state.armed)
 
     def _poll_hub(self, now_us: int) -> None:
         for severity, text in self._lines.take():
@@ -287,7 +289,7 @@ class Stations:
             **self.system.handlers(),
             mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.plans.do_set_mission_current,
             mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
-                command, enabled=self._pilot.behaviour.inject_failures
+                command, enabled=self.pilot.behaviour.inject_failures
             ),
         }
 

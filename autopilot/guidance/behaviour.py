@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import radians
+from math import inf, radians
 
 from colibri.autopilot.guidance.integrator_chain import Limits
 
@@ -14,9 +14,10 @@ _STICK_YAW_RATE_RAD_S = radians(120.0)
 class Behaviour:
     """Numbers of the vehicle's behaviour, described in `parameters/behaviour.py`; 0 switches a limit or disarming off.
 
-    `delay_s` of commands is compensated; negative: the profile's, or measured. A return waits `return_delay_s` above
-    home and ends `return_final_m` above it; `return_cone` limits its climb near home. Landings are slow below
-    `land_slow_below_m`, and above it as fast as `land_high_m_s`.
+    `delay_s` of commands is compensated; negative: the profile's, or measured. The numbers from `return_delay_s` on are
+    set by an identity's parameters (`parameters/behaviour.py`): a return waits above home for `return_delay_s`, ends
+    `return_final_m` above it, climbs less near home by `return_cone`, and faces its way with `return_faces`; landings
+    are slow below `land_slow_below_m`.
     """
 
     limits: Limits = _LIMITS
@@ -50,8 +51,14 @@ class Behaviour:
     return_final_m: float = 0.0
     return_cone: float = 0.0
     return_speed_m_s: float = 0.0
+    return_climb_m: float = 0.0
+    return_faces: bool = True
     land_high_m_s: float = 0.0
     land_slow_below_m: float = 0.0
+    stick_climb_m_s: float = 0.0
+    stick_sink_m_s: float = 0.0
+    uploaded_fence: bool = True
+    floor_m: float = -inf
 
 
 @lru_cache(maxsize=8)

@@ -1,18 +1,51 @@
-"""Services of ArduCopter beside the common ones: greeting, version, pre-arm texts, mode switch."""
+"""Services of ArduCopter beside the common ones: texts, version, stream rates, switches of the radio, simulation."""
 
 from collections.abc import Iterable, Sequence
+from math import cos, radians
 
 from colibri.autopilot.ground.conventions import Served
+from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG, Fault
+from colibri.mavlink.hil.world_changes import PaceChange, WindChange, WorldChange
 from colibri.mavlink.node.service import Peer, Send, Service, to
-from colibri.mavlink.services.statustext import CRITICAL, INFO
-from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.parameters.store import Parameters
+from colibri.mavlink.services.statustext import CRITICAL, INFO, WARNING
+from colibri.mavlink.wire.dialect import Message, mav
 
 _KNOWN_BY = frozenset({"HEARTBEAT", "REQUEST_DATA_STREAM", "PARAM_REQUEST_LIST", "COMMAND_LONG"})
 _USING_GPS = ("EKF3 IMU0 origin set", "EKF3 IMU0 is using GPS")
 _PREARM_EVERY_US = 30_000_000
 _SWITCHES_US = (1230, 1360, 1490, 1620, 1749)
 """Upper ends of the first five positions of the mode switch."""
-_CHANNEL_US = (800, 2200)
+_LOW_US, _HIGH_US, _CHANNEL_US = 1200, 1800, (800, 2200)
+_THROTTLE, _YAW, _DOWN_US, _RIGHT_US, _LEFT_US, _HELD_US = 2, 3, 1050, 1900, 1100, 2_000_000
+_ARMS, _DISARMS = 1, 2
+_MODE_OPTIONS = {
+    4: 6,
+    16: 3,
+    18: 9,
+    33: 17,
+    52: 1,
+    55: 4,
+    56: 5,
+    57: 23,
+    68: 0,
+    69: 16,
+    70: 2,
+    72: 7,
+}
+"""Mode number by RCn_OPTION."""
+_FENCE_OPTION, _ARM_OPTIONS = 11, (41, 153)
+_M_PER_DEG = 111_319.5
+_STREAMS = {
+    "RAW_SENS": mav.MAV_DATA_STREAM_RAW_SENSORS,
+    "EXT_STAT": mav.MAV_DATA_STREAM_EXTENDED_STATUS,
+    "RC_CHAN": mav.MAV_DATA_STREAM_RC_CHANNELS,
+    "POSITION": mav.MAV_DATA_STREAM_POSITION,
+    "EXTRA1": mav.MAV_DATA_STREAM_EXTRA1,
+    "EXTRA2": mav.MAV_DATA_STREAM_EXTRA2,
+    "EXTRA3": mav.MAV_DATA_STREAM_EXTRA3,
+}
+"""MAV_DATA_STREAM by the end of SR0_*."""
 
 
 class Greeter:
@@ -33,11 +66,14 @@ class Greeter:
         self._met = {peer for peer in self._met if peer.channel != channel}
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        del message, now_us
+        del now_us
+        texts: tuple[str, ...] = ()
+        if message.name == "PARAM_REQUEST_LIST":
+            texts = self._served.banner
         if peer not in self._met:
             self._met.add(peer)
             self._new.append(peer.channel)
-        return ()
+        return [_text(text, peer.channel) for text in texts]
 
     def poll(self, now_us: int) -> Iterable[Send]:
         del now_us
@@ -45,7 +81,11 @@ class Greeter:
         if not self._new or snapshot is None or not snapshot.gps_ok:
             return ()
         channels, self._new = dict.fromkeys(self._new), []
-        return [Send("STATUSTEXT", (INFO, text.encode(), 0, 0), channel) for channel in channels for text in _USING_GPS]
+        return [_text(text, channel) for channel in channels for text in _USING_GPS]
+
+
+def _text(text: str, channel: int) -> Send:
+    return Send("STATUSTEXT", (INFO, text.encode(), 0, 0), channel)
 
 
 class VersionRequests:
@@ -61,45 +101,217 @@ class VersionRequests:
         return [to(peer, "AUTOPILOT_VERSION", *self._version)]
 
 
-class Watch:
-    """Says why the vehicle cannot arm, and selects the mode of the mode switch when it moves."""
+class StreamRates:
+    """Keeps requested rates in SR0_*, and streams by them on every channel once they are set."""
+
+    handles = frozenset({"REQUEST_DATA_STREAM"})
+
+    def __init__(self, served: Served) -> None:
+        self._served = served
+        self._revision, self._rates = -1, dict.fromkeys(_STREAMS, 0)
+        self._new: list[int] = []
+
+    def opened(self, channel: int, now_us: int) -> None:
+        del now_us
+        self._new.append(channel)
+
+    def closed(self, channel: int) -> None:
+        """The schedule forgets the channel by itself."""
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        del peer, now_us
+        fields = message.fields
+        rate = min(fields.req_message_rate, 50) if fields.start_stop else 0
+        for name, number in _STREAMS.items():
+            if fields.req_stream_id in (number, mav.MAV_DATA_STREAM_ALL):
+                self._rates[name] = rate
+                self._served.parameters.propose(f"SR0_{name}", rate)
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        served = self._served
+        for channel in self._new:
+            for name, number in _STREAMS.items():
+                if self._rates[name]:
+                    served.streams.set_group(channel, number, self._rates[name], now_us)
+        self._new.clear()
+        if served.parameters.revision != self._revision:
+            self._revision = served.parameters.revision
+            for name, number in _STREAMS.items():
+                rate = int(served.parameters[f"SR0_{name}"])
+                if rate != self._rates[name]:
+                    self._rates[name] = rate
+                    for channel in served.streams.channels:
+                        served.streams.set_group(channel, number, rate, now_us)
+        return ()
+
+
+class PreArm:
+    """Says twice a minute why the vehicle cannot arm."""
 
     handles = frozenset[str]()
 
     def __init__(self, served: Served) -> None:
         self._served = served
-        self._prearm_us = _PREARM_EVERY_US
-        self._position: int | None = None
+        self._due_us = _PREARM_EVERY_US
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         del message, peer, now_us
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        served = self._served
-        snapshot = served.snapshot
-        if snapshot is None:
-            return ()
-        self._switch(snapshot.channels)
-        if now_us >= self._prearm_us:
-            self._prearm_us = now_us + _PREARM_EVERY_US
+        snapshot = self._served.snapshot
+        if snapshot is not None and now_us >= self._due_us:
+            self._due_us = now_us + _PREARM_EVERY_US
             if not snapshot.armed:
-                for reason in served.needs.refusals():
-                    served.say(CRITICAL, f"PreArm: {reason}")
+                for reason in self._served.needs.refusals():
+                    self._served.say(CRITICAL, f"PreArm: {reason}")
         return ()
 
-    def _switch(self, channels: tuple[int, ...]) -> None:
+
+class Switches:
+    """Modes by the mode switch and by switches with a function, and arming by the yaw stick."""
+
+    handles = frozenset[str]()
+
+    def __init__(self, served: Served) -> None:
+        self._served = served
+        self._channels: tuple[int, ...] = ()
+        self._position: int | None = None
+        self._high: dict[int, bool] = {}
+        self._stick, self._since_us = 0, 0
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        del message, peer, now_us
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        snapshot = self._served.snapshot
+        if snapshot is None or not snapshot.channels:
+            return ()
+        channels = snapshot.channels
+        if channels != self._channels:
+            self._channels = channels
+            self._switch(channels, armed=snapshot.armed)
+            for number in range(6, len(channels) + 1):
+                self._function(number, channels[number - 1])
+        self._rudder(channels, now_us, armed=snapshot.armed, manual=snapshot.custom_mode == 0)
+        return ()
+
+    def _switch(self, channels: tuple[int, ...], *, armed: bool) -> None:
         number = int(self._served.parameters["FLTMODE_CH"])
         low, high = _CHANNEL_US
         if not 0 < number <= len(channels) or not low < channels[number - 1] < high:
             return
         position = sum(channels[number - 1] > end for end in _SWITCHES_US)
         before, self._position = self._position, position
-        if before is not None and before != position:
-            refusal = self._served.modes.select(int(self._served.parameters[f"FLTMODE{position + 1}"]))
-            if refusal is not None:
-                self._served.say(CRITICAL, refusal.reason)
+        if before != position and not (before is None and armed):
+            self._select(int(self._served.parameters[f"FLTMODE{position + 1}"]))
+
+    def _select(self, number: int) -> None:
+        refusal = self._served.modes.select(number)
+        if refusal is not None:
+            self._served.say(WARNING, refusal.reason)
+
+    def _function(self, number: int, value: int) -> None:
+        option = int(self._served.parameters[f"RC{number}_OPTION"]) if number <= 16 else 0
+        high = value > _HIGH_US
+        if not option or not (high or value < _LOW_US) or self._high.get(number) is high:
+            return
+        before, self._high[number] = self._high.get(number), high
+        if before is None and not high:
+            return
+        mode = _MODE_OPTIONS.get(option)
+        if mode is not None:
+            position = self._position or 0
+            self._select(mode if high else int(self._served.parameters[f"FLTMODE{position + 1}"]))
+        elif option == _FENCE_OPTION:
+            self._served.parameters.propose("FENCE_ENABLE", int(high))
+        elif option in _ARM_OPTIONS:
+            self._arm(high)
+
+    def _arm(self, arms: bool) -> None:
+        refusal = self._served.modes.arm(force=False) if arms else self._served.pilot.disarm()
+        if refusal is not None:
+            self._served.say(CRITICAL, refusal.reason)
+
+    def _rudder(self, channels: tuple[int, ...], now_us: int, *, armed: bool, manual: bool) -> None:
+        """Arm after two seconds of yaw right with the throttle down, disarm after two to the left."""
+        down, yaw = channels[_THROTTLE] <= _DOWN_US, channels[_YAW]
+        stick = 0 if not down else 1 if yaw >= _RIGHT_US else -1 if yaw <= _LEFT_US else 0
+        if stick != self._stick:
+            self._stick, self._since_us = stick, now_us
+        elif stick and now_us - self._since_us >= _HELD_US:
+            self._since_us = now_us
+            allowed = int(self._served.parameters["ARMING_RUDDER"])
+            if stick > 0 and not armed and allowed >= _ARMS:
+                self._arm(True)
+            elif stick < 0 and armed and allowed >= _DISARMS:
+                self._served.pilot.disarm(force=manual)
+
+
+class Simulation:
+    """Changes of the simulated world by SIM_*."""
+
+    handles = frozenset[str]()
+
+    def __init__(self, served: Served) -> None:
+        self._served = served
+        self._revision = served.parameters.revision
+        self._flown = dict(_WORLD_AT_REST)
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        del message, peer, now_us
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        del now_us
+        served = self._served
+        if served.parameters.revision == self._revision or served.snapshot is None:
+            return ()
+        self._revision = served.parameters.revision
+        wanted = _world(served.parameters, served.snapshot.origin.latitude_deg)
+        for part, change in wanted.items():
+            if self._flown.get(part) != change:
+                refusal = served.failures.request(change)
+                if refusal is not None and not self._flown.get(part):
+                    served.say(WARNING, f"SIM_{part}: {refusal.reason}")
+        self._flown = wanted
+        return ()
+
+
+def _world(values: Parameters, latitude_deg: float) -> dict[str, Fault | WorldChange]:
+    """Return the wanted change of each part of the world."""
+    jump = (
+        values["SIM_GPS1_GLTCH_Y"] * _M_PER_DEG * cos(radians(latitude_deg)),
+        values["SIM_GPS1_GLTCH_X"] * _M_PER_DEG,
+        values["SIM_GPS1_GLTCH_Z"],
+        0.0,
+    )
+    gps = Fault(GPS, WRONG, values=jump) if any(jump) else Fault(GPS, OK)
+    found: dict[str, Fault | WorldChange] = {
+        "SPEEDUP": PaceChange(values["SIM_SPEEDUP"]),
+        "WIND": WindChange(values["SIM_WIND_SPD"], values["SIM_WIND_DIR"]),
+        "GPS1": gps if values["SIM_GPS1_ENABLE"] else Fault(GPS, OFF),
+    }
+    failed, share = int(values["SIM_ENGINE_FAIL"]), values["SIM_ENGINE_MUL"]
+    for motor in range(_MOTORS):
+        weak = failed >> motor & 1 and share < 1.0
+        kind = OK if not weak else WRONG if share > 0.0 else OFF
+        numbers = (share, 0.0, 0.0, 0.0) if kind == WRONG else (0.0, 0.0, 0.0, 0.0)
+        found[f"ENGINE_{motor + 1}"] = Fault(MOTOR, kind, motor + 1, numbers)
+    return found
+
+
+_MOTORS = 4
+_WORLD_AT_REST: dict[str, Fault | WorldChange] = {
+    "SPEEDUP": PaceChange(1.0),
+    "WIND": WindChange(0.0, 180.0),
+    "GPS1": Fault(GPS, OK),
+    **{f"ENGINE_{motor + 1}": Fault(MOTOR, OK, motor + 1) for motor in range(_MOTORS)},
+}
 
 
 def copter_services(served: Served) -> Sequence[Service]:
-    return (Greeter(served), VersionRequests(served), Watch(served))
+    kinds = (Greeter, VersionRequests, StreamRates, PreArm, Switches, Simulation)
+    return [kind(served) for kind in kinds]

@@ -1,7 +1,8 @@
 """Parameters of the behaviour, under PX4's names where the meaning is the same."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import fields
-from math import radians
+from math import inf, radians
 from typing import Any, NamedTuple
 
 from colibri.autopilot.guidance.behaviour import Behaviour
@@ -145,15 +146,22 @@ ROWS = (
 )
 """One row for each number of `Behaviour` and `Limits`."""
 
-BY_IDENTITY = {
-    "RTL_LOIT_TIME": ("return_delay_s", 1e-3),
-    "RTL_ALT_FINAL": ("return_final_m", 0.01),
-    "RTL_CONE_SLOPE": ("return_cone", 1.0),
-    "RTL_SPEED": ("return_speed_m_s", 0.01),
-    "LAND_SPEED_HIGH": ("land_high_m_s", 0.01),
-    "LAND_ALT_LOW": ("land_slow_below_m", 0.01),
+_POLYGONS, _FLOOR, _FACES_HOME = 4, 8, (1, 3)
+BY_IDENTITY: Mapping[str, Callable[[Parameters], Any]] = {
+    "return_delay_s": lambda p: 1e-3 * p["RTL_LOIT_TIME"],
+    "return_final_m": lambda p: 0.01 * p["RTL_ALT_FINAL"],
+    "return_cone": lambda p: p["RTL_CONE_SLOPE"],
+    "return_speed_m_s": lambda p: 0.01 * p["RTL_SPEED"],
+    "return_climb_m": lambda p: 0.01 * p["RTL_CLIMB_MIN"],
+    "return_faces": lambda p: p["WP_YAW_BEHAVIOR"] in _FACES_HOME,
+    "land_high_m_s": lambda p: 0.01 * p["LAND_SPEED_HIGH"],
+    "land_slow_below_m": lambda p: 0.01 * p["LAND_ALT_LOW"],
+    "stick_climb_m_s": lambda p: 0.01 * p["PILOT_SPEED_UP"],
+    "stick_sink_m_s": lambda p: 0.01 * (p["PILOT_SPEED_DN"] or p["PILOT_SPEED_UP"]),
+    "uploaded_fence": lambda p: bool(p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _POLYGONS),
+    "floor_m": lambda p: p["FENCE_ALT_MIN"] if p["FENCE_ENABLE"] and int(p["FENCE_TYPE"]) & _FLOOR else -inf,
 }
-"""Fields that only an identity's parameters set, and their scale."""
+"""Fields that only ArduCopter's parameters set, where they are defined."""
 
 _ANSWERS = "Compatibility only, without effect."
 
@@ -176,9 +184,8 @@ def behaviour(parameters: Parameters) -> Behaviour:
             changed[row.field] = bool(value)
         else:
             changed[row.field] = value * row.scale if isinstance(value, float) else value
-    for name, (field, scale) in BY_IDENTITY.items():
-        if name in parameters:
-            changed[field] = parameters[name] * scale
+    if "RTL_LOIT_TIME" in parameters:
+        changed |= {field: value(parameters) for field, value in BY_IDENTITY.items()}
     limits = {field: changed.pop(field) for field in Limits._fields if field in changed}
     whole = {field.name: getattr(_BEHAVIOUR, field.name) for field in fields(Behaviour)}
     return Behaviour(**{**whole, **changed, "limits": _BEHAVIOUR.limits._replace(**limits)})

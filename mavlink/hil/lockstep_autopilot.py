@@ -23,6 +23,7 @@ from colibri.mavlink.hil.state import (
     encode_actuators,
     read_state,
 )
+from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 
@@ -103,10 +104,11 @@ class AutopilotEnd:
         """Count an answer that was not encoded, so that later ones are numbered as if it had been."""
         self._codec.skip(1)
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         answer = encode_actuators(self._codec, command)
         for fault in faults:
-            answer += encode_fault(self._codec, fault, self._plant)
+            encode = encode_fault if isinstance(fault, Fault) else encode_change
+            answer += encode(self._codec, fault, self._plant)  # type: ignore[arg-type]
         if command.time_us % HEARTBEAT_EVERY_US == 0:
             answer += self._heartbeat(command.armed)
         self._answer = answer

@@ -38,11 +38,11 @@ from colibri.mavlink.hil.state import (
     encode_state,
     read_actuators,
 )
-from colibri.mavlink.hil.world_changes import PAYLOAD, WIND, WorldChange, decode_change
+from colibri.mavlink.hil.world_changes import PACE, PAYLOAD, WIND, WorldChange, decode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 
-_WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD})
+_WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD, PACE})
 
 
 class PlantDatagram(NamedTuple):

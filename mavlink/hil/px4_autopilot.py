@@ -17,6 +17,7 @@ from colibri.mavlink.hil.lockstep import encode_heartbeat
 from colibri.mavlink.hil.plant_status import ReceivedFrame
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
+from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
@@ -60,7 +61,7 @@ class FlierEnd:
                 self.dropped["unexpected"] += 1
         return None if frame is None else ReceivedFrame(frame)
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         assert not faults, "whoever flies a simulator refuses them"
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed

@@ -95,14 +95,20 @@ class StreamService:
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         fields = message.fields
-        groups, number = self._streams.groups, fields.req_stream_id
-        every = number == mav.MAV_DATA_STREAM_ALL
+        self.set_group(peer.channel, fields.req_stream_id, fields.req_message_rate if fields.start_stop else 0, now_us)
+        return ()
+
+    @property
+    def channels(self) -> frozenset[int]:
+        return frozenset(self._open)
+
+    def set_group(self, channel: int, number: int, rate_hz: float, now_us: int) -> None:
+        """Send a group of MAV_DATA_STREAM on a channel at a rate; 0 stops it."""
+        groups, every = self._streams.groups, number == mav.MAV_DATA_STREAM_ALL
         names = [name for group in groups.values() for name in group] if every else groups.get(number, ())
-        rate_hz = fields.req_message_rate if fields.start_stop else 0
         interval_us = max(MIN_GROUP_INTERVAL_US, round(1e6 / rate_hz)) if rate_hz else None
         for name in names:
-            self._set(peer.channel, name, interval_us, now_us)
-        return ()
+            self._set(channel, name, interval_us, now_us)
 
     def poll(self, now_us: int) -> Iterable[Send]:
         self._now_us = now_us

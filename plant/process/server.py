@@ -1,6 +1,6 @@
 """The plant on a link: in lockstep, or at the pace of the wall clock, like hardware."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import isfinite
 from time import perf_counter, sleep
 from typing import Any
@@ -11,7 +11,7 @@ from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantDatagram, PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.mavlink.hil.world_changes import WorldChange
+from colibri.mavlink.hil.world_changes import PaceChange, WorldChange
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.physics.world import World, state_frame
 from colibri.plant.process.logs import PlantLogs
@@ -27,6 +27,13 @@ class FramePacer:
     def __init__(self, speed: float, now_s: float) -> None:
         self.speed = speed
         self._began_s = now_s
+
+    def change(self, asked: Iterable[Fault | WorldChange], time_us: int, now_s: float) -> None:
+        """Keep the last pace asked for from now on."""
+        for change in asked:
+            if isinstance(change, PaceChange) and isfinite(self.speed):
+                self.speed = change.speed
+                self._began_s = now_s - time_us / 1e6 / self.speed
 
     def due_s(self, time_us: int, now_s: float) -> float:
         due_s = self._began_s + time_us / 1e6 / self.speed
@@ -91,7 +98,10 @@ class Server:
         command = self._exchange(plant)
         if command is None:
             return False
-        plant.answer(command, self._end.take_faults())
+        asked = self._end.take_faults()
+        if asked:
+            pace.change(asked, plant.world.time_us, perf_counter())
+        plant.answer(command, asked)
         return True
 
     def _offer(self, plant: Plant) -> float:
@@ -215,6 +225,8 @@ class FreeServer(Server):
         waiting = ": the rotors are stopped, waiting for the autopilot"
         if self._silence.lasts(begin_us * 1e-6, self._missing, begin_us, waiting):
             plant.arrive(begin_us, ActuatorCommand(begin_us, (0.0,) * len(plant.world.rotor_speeds), armed=False))
+        if faults:
+            pace.change(faults, begin_us, due_s)
         plant.inject(faults)
         plant.go_on()
         return True

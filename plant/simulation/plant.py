@@ -9,7 +9,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, WorldChange
+from colibri.mavlink.hil.world_changes import PaceChange, PayloadChange, WindChange, WorldChange
 from colibri.plant.environment.weather import RecordedWind, Wind
 from colibri.plant.events import Event, changes_of, check_events
 from colibri.plant.physics.integrators import Integrator
@@ -109,6 +109,8 @@ class Plant:
             self._physics.blow(asked)
         elif isinstance(asked, PayloadChange):
             self._physics.carry(asked.mass_kg)
+        elif isinstance(asked, PaceChange):
+            pass  # of who steps the plant
         else:
             self.world, result = self.faults.inject(asked, self.world)
             return result

@@ -1,5 +1,7 @@
 """Readiness to arm: the arming checks and failures in flight."""
 
+from collections.abc import Callable, Iterable
+
 from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.mavlink.services.statustext import EMERGENCY
@@ -12,6 +14,7 @@ class Readiness:
     def __init__(self, lines: StatusQueue) -> None:
         self._lines = lines
         self._inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
+        self.further: Callable[[], Iterable[str]] | None = None  # reasons of an identity's own checks
         self.rotor_failed = self.error = ""
         self.descends = self._lands = False
 
@@ -22,11 +25,14 @@ class Readiness:
         self._inputs = self._inputs._replace(outside_fence=outside)
 
     def refusals(self) -> list[str]:
-        return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error))]
+        further = () if self.further is None else self.further()
+        return [*refusals(self._inputs), *filter(None, (self.rotor_failed, self.error)), *further]
 
     @property
     def may_arm(self) -> bool:
-        return not (self.rotor_failed or self.error) and next(refusals(self._inputs), None) is None
+        if self.rotor_failed or self.error or next(refusals(self._inputs), None) is not None:
+            return False
+        return self.further is None or not any(self.further())
 
     @property
     def only_lands(self) -> str:

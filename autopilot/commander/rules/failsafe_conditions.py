@@ -36,6 +36,8 @@ class FailsafeInputs(NamedTuple):
         decided: Diagnostics while the control law is active.
         late: Whether the declared solve time exceeds a control sample.
         rotor_lost: Index of a failed rotor for which the vehicle must land.
+        needs_radio: Whether the sticks are required in every mode.
+        exempt: Conditions without effect in this mode.
     """
 
     now_us: int
@@ -54,6 +56,8 @@ class FailsafeInputs(NamedTuple):
     late: bool
     rotor_lost: int | None
     pace: Pace
+    needs_radio: bool = False
+    exempt: frozenset[Condition] = frozenset()
 
 
 class Conditions:
@@ -80,6 +84,8 @@ class Conditions:
             for condition, lost in SENSORS.items():
                 if lost(inputs.estimate.health):
                     found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
+        for condition in inputs.exempt:
+            found.pop(condition, None)
         frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:
             found[Condition.ATTITUDE_LOST] = frozen_us
@@ -191,7 +197,7 @@ SENSORS: Mapping[Condition, Callable[[Health], bool]] = {
 
 
 def _sticks_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
-    if inputs.mode not in MANUAL and not held:
+    if inputs.mode not in MANUAL and not (held or inputs.needs_radio):
         return None
     return inputs.listening_us if inputs.sticks_us is None else inputs.sticks_us
 

@@ -155,6 +155,7 @@ class AroundHome(NamedTuple):
     home_enu_m: Vector
     max_distance_m: float
     max_height_m: float
+    floor_m: float = -inf
 
     def margin_m(self, position_enu_m: Vector) -> float:
         """Return the depth inside, m; negative outside."""
@@ -162,11 +163,14 @@ class AroundHome(NamedTuple):
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
         away_m = self.max_distance_m - hypot(east, north) if self.max_distance_m > 0.0 else inf
-        return min(away_m, self.max_height_m - up) if self.max_height_m > 0.0 else away_m
+        away_m = min(away_m, self.max_height_m - up) if self.max_height_m > 0.0 else away_m
+        return min(away_m, up - self.floor_m) if self.floor_m > -inf else away_m
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
         if self.margin_m(position_enu_m) >= -EDGE_M:
             return None
+        if position_enu_m[2] - self.home_enu_m[2] < self.floor_m:
+            return Refusal(f"less than {self.floor_m:g} m above home")
         too_high = 0.0 < self.max_height_m < position_enu_m[2] - self.home_enu_m[2]
         return Refusal(
             f"more than {self.max_height_m:g} m above home"

@@ -11,13 +11,15 @@ from colibri.common.types import Vector
 class GoTo(NamedTuple):
     """Fly to a place and stay; yaw None is along the way, speed None the cruise speed.
 
-    `turn` is the way to turn: 1 counter-clockwise, -1 clockwise, 0 the shorter one.
+    `turn` is the way to turn: 1 counter-clockwise, -1 clockwise, 0 the shorter one. The vehicle has arrived when it has
+    been there for `stay_s`.
     """
 
     position_enu_m: Vector
     yaw_rad: float | None = None
     speed_m_s: float | None = None
     turn: int = 0
+    stay_s: float = 0.0
 
 
 def turn_of(angle: float, way: float) -> int:

@@ -1,7 +1,7 @@
 """Flight tasks by position."""
 
 from collections.abc import Callable
-from math import dist, hypot, pi, radians, remainder, tau
+from math import dist, hypot, inf, pi, radians, remainder, tau
 from typing import TypeAlias
 
 from colibri.autopilot.control.interface import Pace
@@ -32,6 +32,8 @@ _REST_RAD_S = 0.05
 _FACING_RAD, _LEAD_RAD = radians(5.0), 0.5 * pi
 _BELOW_FENCE = 0.9
 """Part of the height fence that a return climbs to."""
+_LEAST_CLIMB_M = 2.5
+"""Climb of a return within a cone (RTL_ABS_MIN_CLIMB)."""
 _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
 """Descent speed per height, down to the landing speed at this height."""
 
@@ -48,10 +50,11 @@ class GoToTask:
         self._target = still_target(self._place, self._yaw_rad, context.samples)
         there = abs(remainder(self._yaw_rad - context.yaw_rad, tau)) < _FACING_RAD
         self._turn = 0 if there else order.turn
+        self._stay_s, self._since_us = order.stay_s, -1
 
     @property
     def order(self) -> GoTo:
-        return GoTo(self._place, self._yaw_rad, self._speed_m_s, self._turn)
+        return GoTo(self._place, self._yaw_rad, self._speed_m_s, self._turn, self._stay_s)
 
     def update(self, context: TaskContext) -> PositionMotion:
         limits = context.behaviour.limits
@@ -67,7 +70,12 @@ class GoToTask:
         return still_target(self._place, context.yaw_rad + self._turn * _LEAD_RAD, context.samples)
 
     def arrived(self, context: TaskContext) -> bool:
-        return dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
+        there = dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
+        if not self._stay_s or not there:
+            return there
+        if self._since_us < 0:
+            self._since_us = context.now_us
+        return context.now_us - self._since_us >= self._stay_s * 1e6
 
 
 class HoldTask:
@@ -149,8 +157,12 @@ class LandTask(EndlessTask):
 
 
 def sinking_m_s(context: TaskContext) -> float:
-    flare = _FLARE_1_S * (context.place[2] - context.home_enu_m[2] - _FLARE_ABOVE_M)
-    return min(max(flare, context.behaviour.land_speed_m_s), context.behaviour.limits.sink_m_s)
+    behaviour, above_m = context.behaviour, context.place[2] - context.home_enu_m[2]
+    if behaviour.land_slow_below_m > 0.0:
+        fast_m_s = behaviour.land_high_m_s or behaviour.limits.sink_m_s
+        return fast_m_s if above_m > behaviour.land_slow_below_m else behaviour.land_speed_m_s
+    flare = _FLARE_1_S * (above_m - _FLARE_ABOVE_M)
+    return min(max(flare, behaviour.land_speed_m_s), behaviour.limits.sink_m_s)
 
 
 class TaskSequence:
@@ -227,6 +239,8 @@ def homeward(context: TaskContext, place: Vector) -> TaskSequence:
     """Climb if home or a rally point is far, fly there, land; of the fence only the height restricts a return."""
     x, y, z = place
     behaviour, home_m = context.behaviour, context.home_enu_m[2]
+    if behaviour.return_delay_s or behaviour.return_final_m or behaviour.return_cone:
+        return _homeward_in_steps(context, place)
     down = landing(Land((x, y, z)))
     if hypot(x - context.place[0], y - context.place[1]) <= behaviour.return_radius_m:
         return down
@@ -234,6 +248,30 @@ def homeward(context: TaskContext, place: Vector) -> TaskSequence:
     if behaviour.max_height_m > 0.0:
         high_m = min(high_m, home_m + _BELOW_FENCE * behaviour.max_height_m)
     return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), lambda _: down)
+
+
+def _homeward_in_steps(context: TaskContext, place: Vector) -> TaskSequence:
+    """Climb within a cone, fly home, wait there, land or stay: ArduCopter's mode_rtl.cpp."""
+    x, y, z = place
+    behaviour, (east, north, up) = context.behaviour, context.place
+    away_m, high_m = hypot(x - east, y - north), z + behaviour.return_height_m
+    high_m = max(high_m, up + behaviour.return_climb_m)
+    if behaviour.return_cone:
+        high_m = max(up, min(high_m, max(z + away_m * behaviour.return_cone, up + _LEAST_CLIMB_M)))
+    if behaviour.max_height_m > 0.0:
+        high_m = max(up, min(high_m, context.home_enu_m[2] + _BELOW_FENCE * behaviour.max_height_m))
+    speed = behaviour.return_speed_m_s or None
+    outward = atan2(y - north, x - east) if behaviour.return_faces and away_m > _ALONG_BEYOND_M else None
+    there, home_yaw = (x, y, high_m), context.home_yaw_rad
+    legs: list[Leg] = [
+        lambda begin: GoToTask(GoTo(there, begin.yaw_rad if outward is None else outward, speed), begin),
+        lambda begin: GoToTask(GoTo(there, home_yaw, speed, stay_s=behaviour.return_delay_s), begin),
+    ]
+    if behaviour.return_final_m > 0.0:
+        legs.append(lambda begin: GoToTask(GoTo((x, y, z + behaviour.return_final_m), home_yaw, stay_s=inf), begin))
+    else:
+        legs.append(lambda _: LandTask((x, y), home_yaw))
+    return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), *legs)
 
 
 def to_track(planner: Planner, duration_s: float) -> TaskSequence:

@@ -71,7 +71,10 @@ def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
 
 def stick_climb(sticks: Sticks, context: TaskContext) -> float:
     up = dead(2.0 * sticks.thrust - 1.0)
-    return up * (context.behaviour.limits.climb_m_s if up > 0.0 else context.behaviour.limits.sink_m_s)
+    behaviour = context.behaviour
+    if up > 0.0:
+        return up * (behaviour.stick_climb_m_s or behaviour.limits.climb_m_s)
+    return up * (behaviour.stick_sink_m_s or behaviour.limits.sink_m_s)
 
 
 def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:

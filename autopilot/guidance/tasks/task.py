@@ -45,6 +45,7 @@ class TaskContext(NamedTuple):
     standing: bool = False
     ground_m: float = 0.0
     blind: bool = False
+    home_yaw_rad: float = 0.0
 
     @property
     def yaw_rad(self) -> float:

@@ -124,7 +124,7 @@ def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
 @pytest.mark.parametrize("kind", [Behaviour, Limits])
 def test_every_number_of_the_behaviour_is_a_parameter(kind: Any) -> None:
     names = set(Limits._fields) if kind is Limits else {field.name for field in fields(Behaviour)} - {"limits"}
-    assert names <= {row.field for row in ROWS} | {field for field, _ in BY_IDENTITY.values()}
+    assert names <= {row.field for row in ROWS} | set(BY_IDENTITY)
 
 
 def test_behaviour_is_what_the_parameters_say() -> None:
