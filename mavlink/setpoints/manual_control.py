@@ -35,7 +35,11 @@ class Controls(NamedTuple):
 
 
 class Manual(StreamedService[Controls]):
-    """Keeps each client's latest sticks; `held` has the channels of a radio, us, if there is one."""
+    """Keeps each client's latest sticks.
+
+    Attributes:
+        held: Channels of a radio, us; empty without one.
+    """
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
