@@ -1,6 +1,6 @@
 """The conventions of an identity: one table, read by the services. The identities are in `autopilot/identities`."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -13,10 +13,11 @@ from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.shown_modes import PX4_MODES, ModeBook
 from colibri.autopilot.ground.fault_injection import Failures
+from colibri.autopilot.ground.onboard_log import ULOG, LogFormat
 from colibri.autopilot.ground.system_commands import SystemCommands
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.node.service import Service
-from colibri.mavlink.parameters.store import Parameter, Parameters
+from colibri.mavlink.parameters.store import Parameter, Parameters, Value
 from colibri.mavlink.services.identity import Identity
 from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES, Frame
 from colibri.mavlink.streaming.rates import PX4_STREAMS, Streams
@@ -72,6 +73,9 @@ class Conventions:
         radio: Channels of the radio without overrides, us; empty: sticks come by MAVLink alone.
         parameters: Makes the parameters from Colibri's own, with a system id.
         folder_suffix: Ending of the parameter file's name.
+        logs: Format of flight logs.
+        booted: Returns the saved parameters as they are after a start.
+        kept_plans: Returns the types of plans that a start does not clear.
         rewrite: Puts a status text into the program's words.
         banner: Status texts at the start, beside Colibri's own.
         describe: Returns the text of a mission item that begins.
@@ -86,6 +90,9 @@ class Conventions:
     radio: tuple[int, ...] = ()
     parameters: Callable[[Iterable[Parameter], int], Parameters] = lambda ours, _: Parameters(ours)
     folder_suffix: str = ""
+    logs: LogFormat = ULOG
+    booted: Callable[[dict[str, Value]], dict[str, Value]] = lambda values: values
+    kept_plans: Callable[[Parameters], Collection[int]] = lambda _: ()
     rewrite: Rewrite = str
     banner: tuple[str, ...] = ()
     describe: Callable[[int, MissionItem], str] | None = None

@@ -117,7 +117,7 @@ class Stations:
         defence: Guarding,
         budget: Budget,
     ) -> None:
-        wire, streams = conventions.wire, conventions.streams
+        wire, streams, logs = conventions.wire, conventions.streams, conventions.logs
         self._conventions, self._lines, self.pilot, self._guard = conventions, lines, pilot, defence.guard
         self._text, self.reports = StatusText(), settings.reports
         self.banner = conventions.banner
@@ -169,7 +169,7 @@ class Stations:
             self._follow,
             OriginService(setters, self._text, acknowledges_mode=wire.acknowledges_mode),
             Ftp(files, budget),
-            Logs(files, (LOGS,), lambda: self.log.name, budget),
+            Logs(files, (LOGS,), lambda: self.log.name, budget, suffix=logs.names.suffix, first_id=logs.first_id),
             Shell(self.system.shell(), budget),
             *further,
         )
@@ -184,8 +184,9 @@ class Stations:
             budget=budget,
         )
         self._logged: TelemetrySnapshot | None = None
-        logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, boot_unix_us=settings.boot_unix_us)
-        self.log = OnboardLog(logged, files)
+        program = self.banner[0] if self.banner else ""
+        logged = LoggedVehicle(vehicle_name, settings.system_id, parameters, program, settings.boot_unix_us)
+        self.log = OnboardLog(logged, files, logs)
 
     def use(self, channel: int, kind: str) -> None:
         self.streams.use(channel, kind)

@@ -4,15 +4,18 @@ Sources: ArduCopter's mode.h, GCS_Copter.cpp and GCS_MAVLink_Copter.cpp, 4.6. Mo
 refused by name.
 """
 
+from collections.abc import Collection
 from re import sub
 
 from colibri.autopilot.commander.copter_commands import CopterCommands
 from colibri.autopilot.commander.rules.modes import Mode, State
 from colibri.autopilot.commander.rules.shown_modes import CUSTOM, STABILIZED, BaseModes, ModeBook, ShownMode
 from colibri.autopilot.ground.conventions import Commanded, Conventions
-from colibri.autopilot.identities.copter_parameters import copter_parameters
+from colibri.autopilot.ground.onboard_log import DATAFLASH
+from colibri.autopilot.identities.copter_parameters import booted, copter_parameters
 from colibri.autopilot.identities.copter_services import copter_services
-from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
+from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import DENIED, FAILED, command_name
 from colibri.mavlink.services.identity import ARDUPILOT as WIRE
 from colibri.mavlink.setpoints.offboard import LOCAL_FRAMES
@@ -183,6 +186,11 @@ def _describe(seq: int, item: MissionItem) -> str:
     return f"Mission: {seq} {_ITEMS.get(item.command, command_name(item.command))}"
 
 
+def _kept_plans(parameters: Parameters) -> Collection[int]:
+    clears = int(parameters["MIS_OPTIONS"]) & 1
+    return (FENCE, RALLY) if clears else (MISSION, FENCE, RALLY)
+
+
 _BANNER = ("ArduCopter V4.6.0-dev (c0118121)", 4 * "c0118121", "Frame: QUAD/PLUS", "ArduPilot Ready")
 _ALONG_HEADING = LOCAL_FRAMES[mav.MAV_FRAME_BODY_OFFSET_NED]
 ARDUPILOT = Conventions(
@@ -199,6 +207,9 @@ ARDUPILOT = Conventions(
     radio=(1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800),
     parameters=copter_parameters,
     folder_suffix="-ardupilot",
+    logs=DATAFLASH,
+    booted=booted,
+    kept_plans=_kept_plans,
     rewrite=_rewrite,
     banner=_BANNER,
     describe=_describe,

@@ -97,6 +97,12 @@ def copter_parameters(ours: Iterable[Parameter], system_id: int) -> Parameters:
     )
 
 
+def booted(values: dict[str, Value]) -> dict[str, Value]:
+    """Return saved values with one start more."""
+    starts = values.get("STAT_BOOTCNT", 0) if values.get("STAT_RESET", 1) else 0
+    return {**values, "STAT_BOOTCNT": int(starts) % 32_767 + 1, "STAT_RESET": 1}
+
+
 class Links:
     """Changes that follow from others."""
 

@@ -231,7 +231,8 @@ class GroundService:
 
     def _new_autopilot(self, history: History | None) -> Autopilot[Copter]:
         spec = self._spec
-        self._values = self._state.parameters()
+        conventions = CONVENTIONS[spec.identity]
+        self._values = conventions.booted(self._state.parameters())
         self._past_bytes = b"" if history is None else to_bytes(history)
         settings = StationSettings(
             system_id=spec.system_id,
@@ -245,7 +246,7 @@ class GroundService:
             relays_faults=spec.simulator is None,
         )
         try:
-            return copter_autopilot(
+            autopilot = copter_autopilot(
                 self._profile,
                 self._vehicle,
                 settings,
@@ -257,6 +258,14 @@ class GroundService:
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error
+        parts = autopilot.stages.parts
+        kept = conventions.kept_plans(parts.parameters)
+        if kept:
+            self._state.save_parameters(parts.parameters)
+            for plan_type, items in self._state.plans().items():
+                if plan_type in kept and items:
+                    parts.stations.plans.load(plan_type, items)
+        return autopilot
 
     def _report(self, now_s: float) -> None:
         pilot = self.copter.pilot

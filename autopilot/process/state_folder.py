@@ -76,7 +76,7 @@ class StateFolder:
     def history(self) -> History | None:
         content = self._flight.newest() if self._flight else None
         kept = of_bytes(Checkpoint, content) if content else None
-        return None if kept is None else History(kept, self._read_plans())
+        return None if kept is None else History(kept, self.plans())
 
     def keep(self, record: Checkpoint) -> bool:
         """Save the flight's state; return whether it fitted."""
@@ -145,8 +145,9 @@ class StateFolder:
             if kept:
                 kept.close()
 
-    def _read_plans(self) -> dict[int, list[MissionItem]]:
-        assert self._path is not None, "called only where something is kept"
+    def plans(self) -> dict[int, list[MissionItem]]:
+        if self._path is None:
+            return {}
         try:
             content = read_bytes(self._path / PLANS)
         except OSError:

@@ -58,7 +58,7 @@ class Member:
 
 
 def sitl(spec: FleetSpec, *, quiet: bool) -> int:
-    note = _check(spec)
+    note = "\n".join(filter(None, (_check(spec), spec.connect())))
     instances = range(spec.instance, spec.instance + spec.count)
     fleet = [Member(it, number * spec.spacing, spec.links(it)) for number, it in enumerate(instances)]
     with ExitStack() as held:

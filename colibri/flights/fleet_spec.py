@@ -24,6 +24,15 @@ LINKS = {
 """Links of each identity."""
 
 
+CONNECT = {
+    "ardupilot": (
+        "connect: mavproxy.py --master=tcp:127.0.0.1:{tcp}; Mission Planner: TCP, 127.0.0.1, {tcp}; "
+        'dronekit.connect("tcp:127.0.0.1:{tcp}", wait_ready=True); QGroundControl by itself (UDP {ground})'
+    )
+}
+"""Line that says how clients connect, for identities whose clients must be told."""
+
+
 def ports(instance: int) -> dict[str, int]:
     return {"ground": GROUND_PORT, "sdk": SDK_PORT + instance, "tcp": TCP_PORT + 10 * instance}
 
@@ -58,6 +67,10 @@ class FleetSpec(VehiclesSpec, GroundSpec):
 
     def folder(self, instance: int) -> Path | None:
         return None if self.out is None else self.out / str(instance)
+
+    def connect(self) -> str:
+        """Return how clients connect; empty for links of the user's own, or where they do by themselves."""
+        return "" if self.gcs else CONNECT.get(self.identity, "").format(**ports(self.instance))
 
     def links(self, instance: int) -> list[str]:
         return list(self.gcs) or [link.format(**ports(instance)) for link in LINKS[self.identity]]
