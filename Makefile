@@ -11,7 +11,7 @@ COUNT := | awk '/^(Collecting|Processing) / { printf "  %d %s\n", ++n, $$2; fflu
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup fly test test-long lint test-clients test-peers test-view fuzz chaos random-flights scenarios \
-  scenarios-rough soak soak-clients kills golden verify-pythons bench docs pages lock clean
+  scenarios-rough soak soak-clients kills golden verify-pythons verify-bounds bench docs pages lock clean
 
 setup: .venv/.ready
 
@@ -19,6 +19,8 @@ setup: .venv/.ready
 .venv/.flies: requirements-fly.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "colibri needs Python 3.11 or later: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
+	@test -d colibri/autopilot || { echo "colibri needs symbolic links: git config core.symlinks true &&" \
+	  "git checkout -- colibri" >&2; exit 2; }
 	@echo "setting up .venv from requirements-fly.lock (once, about a minute)"
 	@$(PYTHON) -m venv --clear .venv
 	@$(BIN)/python $(PIP) --no-compile --no-deps --require-hashes -r requirements-fly.lock $(COUNT)
@@ -119,6 +121,17 @@ golden: setup
 # them in those, too, once they are there.
 verify-pythons: setup
 	$(BIN)/python -m tools.golden --pythons $(GOLDEN)
+
+# A flight with the lowest and with the newest versions that pyproject.toml allows, each in an environment of its own.
+# Needs uv; BOUNDS=lowest-direct tries one.
+BOUNDS ?= lowest-direct highest
+verify-bounds:
+	for bound in $(BOUNDS); do \
+	  uv venv --quiet --clear --python $(PYTHON) .venv-$$bound && \
+	  uv pip install --python .venv-$$bound/bin/python --resolution $$bound . && \
+	  uv pip check --python .venv-$$bound/bin/python && .venv-$$bound/bin/colibri doctor && \
+	  .venv-$$bound/bin/colibri fly spiral --out out/$$bound || exit 1; \
+	done
 
 # `colibri bench`, with RotorPy's flights beside its own where that is installed.
 bench: setup

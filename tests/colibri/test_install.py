@@ -73,6 +73,20 @@ def test_what_flies_is_locked_as_for_development() -> None:
     assert {Requirement(one).name for one in needed} <= {line.partition("==")[0] for line in flying}
 
 
+def test_a_checkout_without_links_is_not_built(tmp_path: Path) -> None:
+    for name in ("pyproject.toml", "README.md", "LICENSE", "tools/whole_checkout.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    (tmp_path / "colibri").mkdir()
+    (tmp_path / "colibri/autopilot").write_text("../autopilot")
+    done = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("colibri: colibri/autopilot must be a link")
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_no_file_is_loaded_under_two_names() -> None:
     command = [sys.executable, "-c", EVERY_MODULE, str(ROOT)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

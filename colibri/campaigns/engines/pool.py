@@ -48,7 +48,7 @@ class Pool:
     def __init__(self, workers: int | None = None) -> None:
         if getattr(current_process(), "_inheriting", False):  # a worker of a script without the guard loads it
             sys.exit(1)
-        self._workers = workers or len(os.sched_getaffinity(0))
+        self._workers = workers or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
 
     def each(
         self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
