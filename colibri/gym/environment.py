@@ -20,15 +20,25 @@ from colibri.gym.errors import GymError
 
 Values = NDArray[np.float32]
 _MAX_COUNT = 100_000
+_RENDER_MODES = ("human", "rgb_array")
 
 
 class QuadrotorEnv(gymnasium.Env[Values, Values]):
     """One vehicle; keywords, observations and rewards are in docs/gym.md."""
 
-    metadata = {"render_modes": []}  # noqa: RUF012 - declared by gymnasium
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012 - declared by gymnasium
 
     def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:
-        self.episodes = _episodes(1, render_mode, options)
+        if render_mode not in (None, *_RENDER_MODES):
+            raise GymError(unknown("render_mode", render_mode, _RENDER_MODES))
+        self.episodes = _episodes(1, options)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.episodes.interval_s)}
+        self.render_mode = render_mode
+        self._picture: Any = None
+        if render_mode is not None:
+            from colibri.gym import render  # loads Matplotlib
+
+            self._picture = {"human": render.LivePage, "rgb_array": render.Picture}[render_mode](self.episodes)
         self.observation_space, self.action_space = _spaces(self.episodes)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Values, dict[str, Any]]:
@@ -37,6 +47,8 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
         if options:
             raise GymError(f'options: none are known, not "{shown(options)}": distributions are the keyword draw')
         self.episodes.begin(0, self.np_random)
+        if self._picture is not None:
+            self._picture.begin()
         return self.episodes.observations[0].copy(), self.episodes.info()
 
     def step(self, action: Values) -> tuple[Values, float, bool, bool, dict[str, Any]]:
@@ -48,8 +60,22 @@ class QuadrotorEnv(gymnasium.Env[Values, Values]):
         if given.shape != self.action_space.shape:
             raise GymError(f"action must have the shape {self.action_space.shape}, not {given.shape}")
         rewards, terminated, truncated = episodes.step(given[None])
+        if self._picture is not None:
+            self._picture.step()
         seen: Values = episodes.observations[0].copy()
         return seen, float(rewards[0]), bool(terminated[0]), bool(truncated[0]), episodes.info()
+
+    def render(self) -> Any:
+        """Return the picture of `rgb_array`, (480, 640, 3); with `human` the page shows each step by itself."""
+        if self._picture is None:
+            raise GymError('render_mode "rgb_array" or "human" is required when the environment is made')
+        if not self.episodes.flying.any() and not self.episodes.at.any():
+            raise GymError("reset() is required: no episode is running")
+        return self._picture.draw()
+
+    def close(self) -> None:
+        if self._picture is not None:
+            self._picture.close()
 
     def snapshot(self) -> EpisodesSnapshot:
         """Keep the episode, with its random numbers."""
@@ -71,7 +97,9 @@ class QuadrotorVectorEnv(VectorEnv[Values, Values, Any]):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(self, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> None:
-        self.episodes = _episodes(_count(num_envs), render_mode, options)
+        if render_mode is not None:
+            raise GymError(f'render_mode must be None in a compiled vector, not "{shown(render_mode)}"')
+        self.episodes = _episodes(_count(num_envs), options)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = _spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -141,9 +169,7 @@ def _count(given: Any) -> int:
     return given
 
 
-def _episodes(count: int, render_mode: Any, options: dict[str, Any]) -> Episodes:
-    if render_mode is not None:
-        raise GymError(f'render_mode must be None, not "{shown(render_mode)}": nothing is drawn')
+def _episodes(count: int, options: dict[str, Any]) -> Episodes:
     piloted = options.get("action") in PILOTED
     names = [*signature(Episodes).parameters][1:]
     if piloted or not options.keys() <= {*names}:

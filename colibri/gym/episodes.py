@@ -152,9 +152,9 @@ class Episodes:
         self._fixed, self._draws = _read_draws({**drawn, **_mapping(draw)})
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
-        self._x = np.zeros((count, first.x.size))
+        self.x = np.zeros((count, first.x.size))
         self._last, self._older = np.zeros((count, self.size)), np.zeros((count, history - 1, self.size))
-        self._steps, self._passed = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+        self.steps, self._passed = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
         self._parameters = np.empty(count, dtype=first.parameters.dtype)
         self._mixers, self._scales = np.empty((count, rotors, 4)), np.empty((count, 9))
         self._chances: list[Generator | None] = [None] * count
@@ -168,12 +168,12 @@ class Episodes:
         self._chances[n] = chance
         self._begin(n, self._drawn({**self._fixed, **values}))
         self._older[n] = self._last[n]
-        self._steps[n] = self._passed[n] = 0
+        self.steps[n] = self._passed[n] = 0
         self.flying[n] = True
         self._observe(n)
 
     def _begin(self, n: int, begun: "Begun") -> None:
-        self._x[n], self._last[n] = begun.x, begun.action
+        self.x[n], self._last[n] = begun.x, begun.action
         self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
 
     def _observe(self, n: int) -> None:
@@ -183,11 +183,11 @@ class Episodes:
     @property
     def at(self) -> NDArray[np.int64]:
         """Rows of the references, (n,): the next gates, or the intervals flown."""
-        return self._passed if self.gate_m else self._steps
+        return self._passed if self.gate_m else self.steps
 
     def _seen(self, n: int) -> Array:
         """Return the state that a row observes."""
-        seen: Array = self._x[n]
+        seen: Array = self.x[n]
         return seen
 
     def step(self, given: Any) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -200,12 +200,12 @@ class Episodes:
             raise GymError(f"action must have the shape {self._last.shape}, not {actions.shape}")
         self._advance(actions)
         terminated = self._ends != 0
-        truncated = self.flying & (self._steps >= self.length) & ~terminated
+        truncated = self.flying & (self.steps >= self.length) & ~terminated
         rewards = self._rewards.copy()
         if self._reward is not None:
             now = self.reference[self.at, :6]
             seen = GymTransition(
-                self.observations.copy(), actions, self._x.copy(), now, rewards.copy(), terminated.copy()
+                self.observations.copy(), actions, self.x.copy(), now, rewards.copy(), terminated.copy()
             )
             own = np.asarray(self._reward(seen), dtype=np.float64)
             if own.shape != rewards.shape:
@@ -216,11 +216,11 @@ class Episodes:
 
     def _advance(self, actions: Array) -> None:
         kernels.advance(
-            self._x,
+            self.x,
             actions,
             self._last,
             self._older,
-            self._steps,
+            self.steps,
             self._passed,
             self.flying,
             self._parameters,
@@ -267,10 +267,10 @@ class Episodes:
 
     def _memory(self) -> tuple[Any, ...]:
         return (
-            self._x,
+            self.x,
             self._last,
             self._older,
-            self._steps,
+            self.steps,
             self._passed,
             self._parameters,
             self._mixers,

@@ -157,7 +157,7 @@ class PilotedEpisodes(Episodes):
 
     def _look(self) -> None:
         """Take in the true state."""
-        world, x = self._flight.plant.world, self._x[0]
+        world, x = self._flight.plant.world, self.x[0]
         x[:13], x[13:-1], x[-1] = world.state, world.rotor_speeds, world.charge_used_ah
 
     def _begin(self, n: int, begun: Begun) -> None:
@@ -183,7 +183,7 @@ class PilotedEpisodes(Episodes):
         self.reference[:, :3] -= shift
 
     def _seen(self, n: int) -> Array:
-        x: Array = self._x[n]
+        x: Array = self.x[n]
         known = self._flight.autopilot.stages.state_source.last
         if not self._estimates or known is None:
             return x
@@ -196,13 +196,13 @@ class PilotedEpisodes(Episodes):
         self._ends[0], self._rewards[0] = 0, 0.0
         if not self.flying[0]:
             return
-        self._steps[0] += 1
-        x, y, z = self._x[0, 6:9].tolist()
+        self.steps[0] += 1
+        x, y, z = self.x[0, 6:9].tolist()
         change = take(actions[0], self._last[0], self._older[0])
         self._ends[0], self._rewards[0] = kernels.BAD_ACTION, kernels.LOST
         if change >= 0.0:
             self._send(self._setpoint(self._last[0]))
-            until_us = self._begun_us + round(self._steps[0] * self.interval_s * 1e6)
+            until_us = self._begun_us + round(self.steps[0] * self.interval_s * 1e6)
             try:
                 while self._flight.time_us < until_us:
                     self._flight.step()
@@ -214,7 +214,7 @@ class PilotedEpisodes(Episodes):
         self._observe(0)
 
     def _judge(self, change: float, before: Vector) -> None:
-        x, k, limits = self._x[0], self.at[0], (self._limit_m, self._floor_m)
+        x, k, limits = self.x[0], self.at[0], (self._limit_m, self._floor_m)
         if self.gate_m:
             reward, end, self._passed[0] = kernels.judge_race(
                 x, before, change, self.reference, k, self.gate_m, *limits
@@ -234,7 +234,7 @@ class PilotedEpisodes(Episodes):
             vx, vy, vz, rate = (action * self._max_velocity).tolist()
             return PositionSetpoint(velocity_m_s=(vx, vy, vz), yaw_rate_rad_s=rate)
         offset = self._max_offset_m * action[:3]
-        now = self.reference[self._passed[0] if self.gate_m else self._steps[0] - 1]
+        now = self.reference[self._passed[0] if self.gate_m else self.steps[0] - 1]
         x, y, z = (now[:3] + offset).tolist()
         vx, vy, vz = (0.0, 0.0, 0.0) if self.gate_m else now[3:6].tolist()
         return PositionSetpoint((x, y, z), (vx, vy, vz), yaw_rad=d * np.pi)

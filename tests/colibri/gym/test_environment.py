@@ -2,9 +2,11 @@
 
 import sys
 import warnings
+from contextlib import closing
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import gymnasium
 import numpy as np
@@ -13,6 +15,8 @@ from gymnasium.utils.env_checker import check_env
 
 from colibri.common.errors import Error
 from colibri.gym import GymTransition, QuadrotorEnv, QuadrotorVectorEnv
+from colibri.mavlink.links.open import open_link
+from colibri.mavlink.wire.dialect import Codec
 from colibri.plant.vehicle.description import load_vehicle
 
 _DRAW: dict[str, Any] = {"wind": {"choice": ["5@270", "2@0"]}, "vehicle.body.mass_kg": {"uniform": [0.6, 0.7]}}
@@ -241,7 +245,7 @@ def test_reward_can_be_replaced() -> None:
         ({"reward": 3}, "reward must be a function"),
         ({"vehicle": "humingbird"}, "humingbird"),
         ({"track": "sprial"}, "sprial"),
-        ({"render_mode": "human"}, "render_mode must be None"),
+        ({"render_mode": "humn"}, 'unknown render_mode "humn" (did you mean "human"?)'),
         ({"history": 0}, "history must be a whole number from 1"),
         ({"observation": "estimate"}, 'keyword "observation" requires an action through the autopilot'),
         ({"action": "velocity", "observation": "truht"}, 'unknown observation "truht" (did you mean "truth"?)'),
@@ -270,6 +274,37 @@ def test_wrong_keywords_get_one_line(options: dict[str, Any], message: str) -> N
         QuadrotorEnv(**options)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("action", ["rotors", "velocity"])
+def test_pictures_show_the_flight(action: str) -> None:
+    env = QuadrotorEnv(action=action, render_mode="rgb_array", gates=[(0, 0, 2), (2, 0, 2)])
+    with pytest.raises(Error, match=r"reset\(\) is required"):
+        env.render()
+    env.reset(seed=1)
+    first = env.render()
+    env.step(np.ones(4, dtype=np.float32))
+    assert (first.shape, first.dtype) == ((480, 640, 3), np.uint8)
+    assert (env.render() != first).any()
+    with pytest.raises(Error, match="render_mode must be None in a compiled vector"):
+        gymnasium.make_vec("colibri/Hover-v0", 2, render_mode="rgb_array")
+
+
+def test_the_live_page_is_sent_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    started = []
+    monkeypatch.setattr("colibri.gym.render.subprocess.Popen", lambda command: started.append(command) or Mock())
+    env = QuadrotorEnv(render_mode="human")
+    with closing(open_link(started[0][-1])) as page:
+        env.reset(seed=1)
+        env.step(np.zeros(4, dtype=np.float32))
+        codec = Codec(255, 190)
+        messages = [message for datagram, _ in page.receive_now() for message in codec.decode(datagram)]
+    env.close()
+    places = [message.fields for message in messages if message.name == "LOCAL_POSITION_NED"]
+    x = env.episodes.x[0]
+    assert (places[-1].y, places[-1].x, places[-1].z) == pytest.approx((x[6], x[7], -x[8]))
+    assert messages[0].name == "HEARTBEAT"
+    assert len(messages) == 7
 
 
 def test_missing_gymnasium_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
