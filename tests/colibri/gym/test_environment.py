@@ -291,10 +291,10 @@ def test_pictures_show_the_flight(action: str) -> None:
 
 
 def test_the_live_page_is_sent_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    started = []
-    monkeypatch.setattr("colibri.gym.render.subprocess.Popen", lambda command: started.append(command) or Mock())
+    popen = Mock()
+    monkeypatch.setattr("colibri.gym.render.subprocess.Popen", popen)
     env = QuadrotorEnv(render_mode="human")
-    with closing(open_link(started[0][-1])) as page:
+    with closing(open_link(popen.call_args.args[0][-1])) as page:
         env.reset(seed=1)
         env.step(np.zeros(4, dtype=np.float32))
         codec = Codec(255, 190)
