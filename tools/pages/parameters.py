@@ -28,14 +28,15 @@ def _sections() -> Iterator[str]:
         yield f"## {group}\n"
         if group in _INTRODUCTIONS:
             yield f"{_INTRODUCTIONS[group]}\n"
-        yield markdown(("name", "default", "from", "to", "unit", "meaning"), list(map(_row, parameters)), names=6)
+        yield markdown(("name", "default", "range", "meaning"), list(map(_row, parameters)), names=4)
 
 
 def _row(p: Parameter) -> tuple[str, ...]:
     choices = "; ".join(f"{number} {meaning}" for number, meaning in p.values)
     notes = " ".join(filter(None, [p.description + ".", _KEY.sub(r"`\1`", p.details), choices and f"({choices})"]))
     notes += " Read only." if p.read_only else " After a restart." if p.reboot_required else ""
-    return (f"`{p.name}`", *(_number(p, value) for value in (p.default, p.minimum, p.maximum)), p.unit, notes)
+    default, least, most = (_number(p, value) for value in (p.default, p.minimum, p.maximum))
+    return (f"`{p.name}`", f"{default} {p.unit}".strip(), f"{least}…{most}", notes)
 
 
 def _number(parameter: Parameter, value: float) -> str:

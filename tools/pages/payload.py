@@ -21,8 +21,6 @@ _COLOURS = {"mass learned": "#0072B2", "mass not learned": "#D55E00"}
 
 
 class Laden(NamedTuple):
-    """A flight with the payload."""
-
     t: Array  # s, (n,)
     height_error_m: Array  # (n,)
     told: Array  # times, s, and reported masses, kg, (m, 2)

@@ -40,8 +40,6 @@ _FULL_TURN_DEG = 360.0
 
 
 class RotorLossCase(NamedTuple):
-    """Settings of the flights in a row."""
-
     name: str
     feedback: Feedback
     runs_down: bool = False  # with its motor; else the thrust is gone at once
@@ -50,8 +48,6 @@ class RotorLossCase(NamedTuple):
 
 
 class RotorLossFlight(NamedTuple):
-    """One flight."""
-
     seed: int  # of everything random; the rotor is seed mod 4
     noticed_s: float  # from the loss to its detection; nan without
     path: Array  # `COLUMNS`, one row a frame until the vehicle rests, (n, 11)

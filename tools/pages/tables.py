@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable
-from html import escape
 
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
@@ -31,8 +30,3 @@ def with_tables(page: str, tables: Iterable[str]) -> str:
     page = _TABLE.sub(newest, page)
     assert not ahead, f"the page has no table {ahead[0].partition(chr(10))[0]}"
     return page
-
-
-def code(text: str) -> str:
-    """Return a text as code in a table cell, also with bars."""
-    return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"

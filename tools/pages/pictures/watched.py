@@ -8,8 +8,6 @@ from colibri.view.snapshot import Chart, Snapshot, Surroundings, VehicleShape
 
 
 class Watching(Station):
-    """A station that feeds an `VehicleObserver`."""
-
     observer: VehicleObserver
 
     def add(self, message: Message) -> None:

@@ -1,5 +1,6 @@
 """`cli.md`: every command and option, from the parsers."""
 
+import re
 from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
 from collections.abc import Iterator
 from textwrap import dedent
@@ -8,7 +9,7 @@ from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
 from colibri.cli.shared.parser import parser_of
 from colibri.plant.__main__ import command_line as plant_command_line
-from tools.pages.tables import code, with_body
+from tools.pages.tables import with_body
 
 
 class _Listener(HelpFormatter):
@@ -41,10 +42,9 @@ def _page() -> Iterator[str]:
     for group, names in (*GROUPS.items(), ("the two processes of a flight", tuple(PROCESSES))):
         yield f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in names)
     yield ""
-    every = parsers()
-    of_fly = {row for _, row in _rows(every["fly"])}
-    for name, parser in every.items():
-        yield from _section(name, parser, of_fly if name != "fly" else set())
+    told: dict[str, tuple[str, str]] = {}
+    for name, parser in parsers().items():
+        yield from _section(name, parser, told)
 
 
 def _rows(parser: ArgumentParser) -> Iterator[tuple[str, str]]:
@@ -52,21 +52,33 @@ def _rows(parser: ArgumentParser) -> Iterator[tuple[str, str]]:
     for action in arguments_of(parser):
         if action.dest != "help":
             name = action.option_strings[0] if action.option_strings else action.dest
-            yield name, f"| {_names(action)} | {_help(action, parser)} |"
+            yield name, f"- `{_names(action)}`: {_help(action, parser)}"
 
 
-def _section(name: str, parser: ArgumentParser, of_fly: set[str]) -> Iterator[str]:
+def _split(row: str) -> tuple[str, str]:
+    """Return a row without its default, and that."""
+    default = re.search(r" \(default:? [^()]+\)", row)
+    return (row.replace(default[0], ""), default[0]) if default else (row, "")
+
+
+def _section(name: str, parser: ArgumentParser, told: dict[str, tuple[str, str]]) -> Iterator[str]:
+    """Yield the section of a command; `told` has the rows of those before it, with their commands and defaults."""
     does = COMMANDS[name].does if name in COMMANDS else PROCESSES[name]
     yield f"## colibri {name}\n"
     yield f"{does[0].upper()}{does[1:]}.\n"
     if name in COMMANDS:
         yield f"```sh\n{dedent(COMMANDS[name].examples).strip()}\n```\n"
-    yield "| | |\n|---|---|"
-    rows = list(_rows(parser))
-    yield from (row for _, row in rows if row not in of_fly)
+    shared: dict[str, list[str]] = {}
+    for option, row in _rows(parser):
+        plain, default = _split(row)
+        command, usual = told.setdefault(plain, (name, default))
+        if command == name:
+            yield row
+        else:
+            shared.setdefault(command, []).append(f"`{option}`{default if default != usual else ''}")
     yield ""
-    if shared := [f"`{option}`" for option, row in rows if row in of_fly]:
-        yield f"As in [`fly`](#colibri-fly): {', '.join(shared)}.\n"
+    if shared:
+        yield " ".join(f"As in [`{of}`](#colibri-{of}): {', '.join(same)}." for of, same in shared.items()) + "\n"
 
 
 def _names(action: Action) -> str:
@@ -76,13 +88,13 @@ def _names(action: Action) -> str:
     if values is None and action.nargs != 0:
         values = action.dest.upper()
     shown = " ".join(values) if isinstance(values, tuple) else str(values or "")
-    return code(" ".join(filter(None, [", ".join(action.option_strings), shown])))
+    return " ".join(filter(None, [", ".join(action.option_strings), shown]))
 
 
 def _help(action: Action, parser: ArgumentParser) -> str:
     values = {**vars(action), "prog": parser.prog}
     said = (action.help or "") % values
-    return " ".join(said.split()).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+    return " ".join(said.split()).replace("<", "&lt;").replace("*", "\\*")
 
 
 PAGES = {"cli.md": lambda page: with_body(page, _page(), first="- **", last="## Environment")}

@@ -31,20 +31,20 @@ _BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to"}
 
 
 def profiles() -> Iterator[str]:
-    said = _said("flight", profile_names(), profile_text)
-    yield from _sections(ProfileTables, "", said)
+    said, shown = _said("flight", profile_names(), profile_text), dict[Any, str]()
+    yield from _sections(ProfileTables, "", said, shown)
     for law, settings in LAWS.items():
-        yield from _sections(settings, f"controllers.{law}", said)
+        yield from _sections(settings, f"controllers.{law}", said, shown)
         if law in scaling.LAWS:
-            yield from _sections(scaling.LAWS[law][0], f"controllers.{law}.scaling", said)
+            yield from _sections(scaling.LAWS[law][0], f"controllers.{law}.scaling", said, shown)
 
 
 def vehicles() -> Iterator[str]:
-    return _sections(Vehicle, "", _said("hummingbird", vehicle_names(), vehicle_text))
+    return _sections(Vehicle, "", _said("hummingbird", vehicle_names(), vehicle_text), {})
 
 
 def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[str, tuple[str, str, str]]:
-    """Return value, comment and file of each dotted key: from `first`, or the first file that has it."""
+    """Return value, comment and file of each dotted key: of `first`, which is not named, or the first with it."""
     found: dict[str, tuple[str, str, str]] = {}
     for name in sorted(names, key=lambda name: name != first):
         table = key = ""
@@ -56,17 +56,21 @@ def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[s
                 if key in found:
                     key = ""
                 else:
-                    found[key] = (entry[2], entry[3] or "", name)
+                    found[key] = (entry[2], entry[3] or "", "" if name == first else f" ({name})")
             elif key and (more := _MORE.match(line)):
                 value, comment, where = found[key]
                 found[key] = (value, f"{comment} {more[1]}", where)
     return found
 
 
-def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> Iterator[str]:
+def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]], shown: dict[Any, str]) -> Iterator[str]:
     info = kinds.type_info(kind)
     assert isinstance(info, kinds.StructType)
     yield f"## `[{above}]`\n" if above else "## Top of the file\n"
+    if kind in shown:
+        yield f"The keys of `[{shown[kind]}]`.\n"
+        return
+    shown[kind] = above
     yield f"{_first_line(kind)}\n"
     notes, inner = _notes(kind), []
     rows = []
@@ -78,11 +82,11 @@ def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> I
         what = "a table, below" if table is not None else _what(field.type)
         value, comment, where = said.get(key, ("", "", ""))
         note = notes.get(field.name) or comment or (_first_line(table) if table is not None else "")
-        shown = f"`{value}` ({where})" if value else ""
-        rows.append((f"`{field.encode_name}`", what + _optional(field), cell(shown), cell(note)))
-    yield markdown(("key", "value", "example", "meaning"), rows, names=4)
+        example = f"; `{value}`{where}" if value else ""
+        rows.append((f"`{field.encode_name}`", cell(what + _optional(field) + example), cell(note)))
+    yield markdown(("key", "value; example", "meaning"), rows, names=3)
     for table, key in inner:
-        yield from _sections(table, key, said)
+        yield from _sections(table, key, said, shown)
 
 
 def _optional(field: kinds.Field) -> str:

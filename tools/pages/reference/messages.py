@@ -1,4 +1,4 @@
-"""Tables of `messages.md`: messages and commands of the vehicle."""
+"""Parts of `messages.md`: messages and commands of the vehicle."""
 
 import ast
 import pkgutil
@@ -18,19 +18,22 @@ from colibri.mavlink.streaming import service as streaming_service
 from colibri.mavlink.streaming.rates import DEFAULTS, GCS, HZ, SDK
 from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
 from colibri.mavlink.wire.dialect import mav
-from tools.pages.tables import cell, with_tables
+from tools.pages.tables import cell, with_body, with_tables
 
 _TELEMETRY = (attitude, controller, position, power, sensors, status)
 _HANDLERS = (commands, motion_commands, stations, streaming_service, standard_modes, system_commands)
 
 
 def tables() -> list[str]:
-    commands = [(f"`{command}`", str(getattr(mav, command))) for command in sorted(obeyed())]
     return [
         markdown(("message", "SDK", "GCS", "content"), list(_streamed()), names=4),
         markdown(("messages", "effect"), list(_taken()), names=2),
-        markdown(("command", "number"), commands, names=1),
     ]
+
+
+def _page(page: str) -> str:
+    commands = ", ".join(f"`{name.removeprefix('MAV_CMD_')}` {getattr(mav, name)}" for name in sorted(obeyed()))
+    return with_body(with_tables(page, tables()), (f"{commands}.", ""), first="`COMPONENT_ARM", last="## Positions")
 
 
 def _streamed() -> Iterator[tuple[str, ...]]:
@@ -80,4 +83,4 @@ def obeyed() -> set[str]:
     return found
 
 
-PAGES = {"messages.md": lambda page: with_tables(page, tables())}
+PAGES = {"messages.md": _page}
