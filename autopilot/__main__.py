@@ -15,7 +15,6 @@ from colibri.mavlink.links.startup import begin, report_compiling
 
 
 def command_line() -> ArgumentParser:
-    """Return the parser of the command line."""
     parser = ArgumentParser(
         prog="colibri autopilot",
         description="The autopilot: takes the vehicle's state, or what its sensors measure, from a plant and answers "

@@ -88,7 +88,6 @@ class LawSpec:
 
     @property
     def delay_s(self) -> float | None:
-        """The delay in seconds."""
         return None if self.delay is None else self.delay * 1e-3
 
     def load(self) -> tuple[Profile, Vehicle]:
@@ -132,8 +131,6 @@ class GroundSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class AutopilotSpec(LawSpec, GroundSpec, ProcessSpec):
-    """An autopilot as a process."""
-
     plant: Annotated[str, Option("the plant to call", "URL")] = DEFAULT_PLANT
     simulator: Annotated[
         str | None,

@@ -47,8 +47,6 @@ class Option(NamedTuple):
 
 
 class Field(NamedTuple):
-    """An option of a specification."""
-
     name: str
     kind: Any  # of the value, or of each of several; without None
     repeated: bool  # a tuple of values

@@ -42,7 +42,6 @@ class SolveTime:
         self._now, self._ready_us = controls, None
 
     def controls(self, now_us: int) -> PerRotor:
-        """Return the command that holds now."""
         if self._ready_us is not None and now_us >= self._ready_us:
             self._now, self._ready_us = self._next, None
         return self._now

@@ -104,7 +104,6 @@ class Checkpointer:
         self._parts = parts
 
     def record(self, time_us: int) -> Checkpoint:
-        """Return the flight as it is now."""
         parts, pilot = self._parts, self._parts.pilot
         return Checkpoint(
             self._fingerprint,

@@ -13,8 +13,6 @@ from colibri.mavlink.hil.state import StateFrame
 
 
 class Flying:
-    """Flies one vehicle, control sample after control sample."""
-
     def __init__(self, parts: Parts) -> None:
         self._parts, self._guard = parts, parts.defence.guard
         self._blind = False

@@ -17,8 +17,6 @@ _KNOWN_TILT_RAD, _CATCHING_US = 0.035, 3_000_000
 
 
 class Supervision:
-    """Supervises one vehicle."""
-
     def __init__(self, parts: Parts) -> None:
         self._parts, self._guard = parts, parts.defence.guard
         self._missed_us: int | None = None

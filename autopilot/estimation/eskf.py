@@ -68,8 +68,6 @@ _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
 
 class FilterRecord(NamedTuple):
-    """A filter as plain data."""
-
     x: Array
     P: Array
     kinds: list[KindRecord]

@@ -66,7 +66,6 @@ class Health(NamedTuple):
 
     @property
     def flags(self) -> int:
-        """ESTIMATOR_STATUS_FLAGS."""
         return _flags(self)
 
 

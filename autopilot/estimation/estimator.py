@@ -48,8 +48,6 @@ _NOTHING = InertialReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
 class EstimatorRecord(NamedTuple):
-    """State of an estimator for a restart."""
-
     time_us: int
     filter_us: int
     filter: FilterRecord

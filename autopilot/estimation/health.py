@@ -56,8 +56,6 @@ _NO_RATIOS = (0.0,) * len(Ratio)
 
 
 class HealthWatch:
-    """Reports changes of health."""
-
     def __init__(self) -> None:
         self._ill: frozenset[int] = frozenset()
 

@@ -38,8 +38,6 @@ _JERK, _JERK_SCALE = 3, 1e-2
 
 
 class Limits(NamedTuple):
-    """Limits of the approach to a target."""
-
     speed_m_s: float = 5.0
     climb_m_s: float = 3.0
     sink_m_s: float = 1.5

@@ -24,8 +24,6 @@ _CARRIED = 1e-2
 
 
 class BindingDerivative(IntEnum):
-    """Binding derivative of a target's axis."""
-
     POSITION = 0
     VELOCITY = 1
     ACCELERATION = 2

@@ -24,8 +24,6 @@ class ImpossibleError(AutopilotError):
 
 
 class Numbers:
-    """Parameters of a control law and a vehicle model."""
-
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
         self._profile = profile = profile.of(vehicle)
         self._vehicle = vehicle

@@ -30,8 +30,6 @@ _MAX_WORD_CHARS = 8
 
 
 class Number(NamedTuple):
-    """A number at a `path`, `scale` times its parameter."""
-
     name: str
     path: Path
     unit: str = ""

@@ -53,8 +53,6 @@ class ParameterTrial(Protocol):
 
 
 class Tuned(NamedTuple):
-    """A control law with its numbers."""
-
     profile: Profile
     vehicle: Vehicle
     controller: Controller[Any]

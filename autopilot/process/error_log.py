@@ -13,8 +13,6 @@ FILE = "errors.jsonl"
 
 
 class ErrorLog:
-    """The exceptions of one process."""
-
     def __init__(self, folder: Path | None, status: Status) -> None:
         self._path = None if folder is None else folder / FILE
         self._status = status

@@ -36,8 +36,6 @@ class GroundError(AutopilotError):
 
 
 class StateFolder:
-    """The folder of --state, if any."""
-
     def __init__(
         self,
         path: Path | None,

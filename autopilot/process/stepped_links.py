@@ -27,8 +27,6 @@ class Conductor(Protocol):
 
 
 class UdpConductor:
-    """A conductor in another process."""
-
     def __init__(self, link: UdpLink, ended: Callable[[], object]) -> None:
         self._link = link
         self._ended = ended

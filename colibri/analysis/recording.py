@@ -206,8 +206,6 @@ def rotor_names(plan: FlightPlan) -> tuple[str, ...]:
 
 
 class TableWriter:
-    """Writes the table of a flight as CSV."""
-
     def __init__(self, file: IO[bytes], plan: FlightPlan) -> None:
         self._file = file
         file.write((",".join(columns_of(plan)) + "\n").encode())

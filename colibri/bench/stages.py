@@ -46,8 +46,6 @@ _ECHO_ENDS_AFTER_S = 10.0
 
 
 class Stage(NamedTuple):
-    """A stage, and its method or function."""
-
     name: str
     owner: type | ModuleType
     method: str
@@ -72,8 +70,6 @@ EXCHANGE = "exchange"
 
 
 class StageTimes(NamedTuple):
-    """Times of each stage, some QPs, and the datagrams."""
-
     times_us: dict[str, list[float]]
     qps: list[Qp]
     frames: list[bytes]

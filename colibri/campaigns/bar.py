@@ -7,8 +7,6 @@ from colibri.campaigns.flights import FlightResult
 
 
 class FlightBar:
-    """Shows progress, rate, share lost and time left."""
-
     def __init__(self, title: str, flights: int, *, quiet: bool) -> None:
         from rich.console import Console
         from rich.markup import escape

@@ -63,8 +63,6 @@ class LogUniform(NamedTuple):
 
 
 class Normal(NamedTuple):
-    """Normal distribution."""
-
     mean: float
     deviation: float
 

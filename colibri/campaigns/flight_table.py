@@ -18,8 +18,6 @@ _QUANTILES = {"median": 0.5, "p05": 0.05, "p95": 0.95}
 
 
 class FlightTable:
-    """The results of a campaign's flights, in its order."""
-
     def __init__(self, campaign: Campaign, flown: Mapping[int, FlightResult], notes: Sequence[str] = ()) -> None:
         self.campaign = campaign
         self.notes = [*notes]
@@ -71,7 +69,6 @@ class FlightTable:
 
     @property
     def usual_metric(self) -> str:
-        """The metric that most flights have."""
         names = [metric.name for metric in self.campaign.metrics]
         known = [int(np.isfinite(self.metric(name)).sum()) for name in names]
         return names[int(np.argmax(known))]

@@ -35,8 +35,6 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
 class Verdict(StrEnum):
-    """The outcome of a flight."""
-
     FLOWN = "flown"
     LOST = "lost"
     """Flown to its end, but away from its track."""

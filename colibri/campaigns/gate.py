@@ -17,7 +17,6 @@ from colibri.common.process.lifecycle import EXIT_FAILED
 
 
 def with_limits(metrics: Iterable[Metric], limits: Iterable[ReportLimit]) -> tuple[Metric, ...]:
-    """Add the metrics that limits need."""
     kept = list(metrics)
     names = {metric.name for metric in kept}
     return (*kept, *(Metric(key) for key in dict.fromkeys(limit.key for limit in limits) if key not in names))

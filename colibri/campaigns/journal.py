@@ -22,8 +22,6 @@ IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
 
 
 class Journal:
-    """The open journal of a campaign."""
-
     def __init__(self, folder: Path, kept: dict[int, FlightResult], file: str = JOURNAL) -> None:
         self.kept = kept
         self._folder = folder

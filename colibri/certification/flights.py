@@ -31,8 +31,6 @@ class FlownErrors(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """Constants of a control interval."""
-
     commands: Array
     disturbance_n_m: Array
     inertia: Array
@@ -42,8 +40,6 @@ class Interval(NamedTuple):
 
 
 class BorderFlights(NamedTuple):
-    """Number and duration of flights."""
-
     flights: int
     duration_s: float
     seed: int

@@ -356,7 +356,6 @@ class Companion:
         return [self.peer.client.encode(name, *fields)]
 
     def _facts(self, now_us: int) -> dict[str, Any]:
-        """Return the facts before and in flight."""
         peer = self.peer
         return {
             "report": peer.report,

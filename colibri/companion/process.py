@@ -48,8 +48,6 @@ _SILENT_S = 3.0
 
 
 class CompanionFlight(NamedTuple):
-    """Inputs of a flight."""
-
     settings: CompanionSettings
     profile: Profile
     vehicle: Vehicle

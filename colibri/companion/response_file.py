@@ -17,8 +17,6 @@ Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
 
 
 class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Response of body rates to their commands."""
-
     time_constant_s: tuple[TimeConstant, TimeConstant, TimeConstant]
     latency_s: Latency
     thrust_lag_s: NotNegative

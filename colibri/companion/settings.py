@@ -11,8 +11,6 @@ from colibri.companion.vehicle_peer import LocalOrigin
 
 
 class SetpointKind(StrEnum):
-    """Kind of setpoint sent to the vehicle."""
-
     RATES = "rates"
     ATTITUDE = "attitude"
     VELOCITY = "velocity"

@@ -75,8 +75,6 @@ ROUNDING = 1e-6
 
 
 class TakeOffOrder(Enum):
-    """Order of the take-off commands."""
-
     COMMAND_THEN_ARM = "take-off, then arm: the height is above the sea"
     ARM_THEN_COMMAND = "guided mode, arm, take-off: the height is above home"
 

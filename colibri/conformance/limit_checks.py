@@ -20,8 +20,6 @@ Draw: TypeAlias = Callable[[np.random.Generator], dict[str, float]]
 
 
 class FlightKind(NamedTuple):
-    """Flights of one kind."""
-
     tried: str
     track: str
     draw: Draw

@@ -18,8 +18,6 @@ from colibri.plant.physics.world import Physics, World, starting_world, state_fr
 
 
 class LoopFlight:
-    """One flight of a control law in calm air."""
-
     def __init__(self, subject: Subject, plan: FlightPlan) -> None:
         self._subject, self._plan = subject, plan
         self._physics = Physics(plan.plant_vehicle, "rk4")

@@ -60,8 +60,6 @@ class FlownStep(NamedTuple):
 
 
 class FlownSteps(NamedTuple):
-    """Steps of a flight, and the law's failure."""
-
     steps: list[FlownStep]
     failure: str
     raised: BaseException | None

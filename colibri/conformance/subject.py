@@ -121,8 +121,6 @@ def _option(name: str, value: Any) -> str:
 
 
 class Result(StrEnum):
-    """Result of a trial."""
-
     OK = "ok"
     FAILED = "failed"
     NOT_APPLICABLE = "not applicable"

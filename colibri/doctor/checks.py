@@ -24,8 +24,6 @@ from colibri.mavlink.wire.dialect import Codec, mav
 
 
 class Severity(StrEnum):
-    """The meaning of a finding for a flight."""
-
     FINE = "fine"
     NOTE = "note"
     """Flights work, with a remark."""

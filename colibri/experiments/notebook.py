@@ -16,7 +16,6 @@ def table_html(title: str, rows: Iterable[Sequence[str]]) -> str:
 
 
 def figure_html(figure: "Figure") -> str:
-    """Return a figure as an embedded PNG."""
     png = BytesIO()
     figure.savefig(png, format="png", dpi=80)
     return f'<img src="data:image/png;base64,{b64encode(png.getvalue()).decode()}">'

@@ -62,7 +62,6 @@ class Record:
         self._hash = sha256()
 
     def add(self, instant: Instant) -> None:
-        """Record a frame."""
         began, command, custom_mode = instant.began, instant.command, instant.to_stations.custom_mode
         place, moves = began.position_enu_m, began.velocity_enu_m_s
         state = (*place, *moves, *began.attitude, *began.rate_flu_rad_s)

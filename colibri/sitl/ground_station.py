@@ -43,8 +43,6 @@ class RefusedError(SitlError):
 
 
 class SteppedVehicle(Stepped, Protocol):
-    """A vehicle in a flight that can be stepped."""
-
     @property
     def system(self) -> int: ...
 

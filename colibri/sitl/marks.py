@@ -50,7 +50,6 @@ def described(name: str) -> str:
 
 
 def setting_values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
-    """Return the options that a mark sets."""
     options = MARKS[mark.name].options
     return {options.get(name, name): value for name, value in arguments(mark, of).items()}
 

@@ -45,8 +45,6 @@ _SIZE_M = 4.0
 
 
 class Measure(NamedTuple):
-    """A column of a table."""
-
     heading: str
     cell: Callable[[Flown], str]
 

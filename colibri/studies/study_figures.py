@@ -34,8 +34,6 @@ _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
 
 class StudyResult(NamedTuple):
-    """A completed case."""
-
     row: tuple[str, ...]
     group: str
     flown: Flown

@@ -33,8 +33,6 @@ FIRST_SECONDS = (0.0, 5.0)
 
 
 class ThesisFlight(NamedTuple):
-    """A flight of the thesis."""
-
     name: str
     track: str
     controller: str
@@ -91,8 +89,6 @@ def figures(args: argparse.Namespace) -> int:
 
 
 class FigureJob(NamedTuple):
-    """A flight and its figures."""
-
     flight: ThesisFlight
     figures: tuple[ThesisFigure, ...]
     out: Path

@@ -29,8 +29,6 @@ IDENTITY = "tuning.json"
 
 
 class Watcher:
-    """Progress callbacks of a tuning."""
-
     def began(self, trials: int) -> None: ...
 
     def flown(self, flown: FlightResult) -> None: ...

@@ -39,8 +39,6 @@ class FinishedTrial(NamedTuple):
 
 
 class Begun(NamedTuple):
-    """A trial to fly."""
-
     number: int
     params: dict[str, Any]
     trial: "Trial"

@@ -86,8 +86,6 @@ def compare(tuning: Tuning, table: FlightTable) -> list[Compared]:
 
 
 class _Pairs:
-    """The flights of both profiles by combination and seed."""
-
     def __init__(self, table: FlightTable) -> None:
         self._campaign = table.campaign
         self._seeds = len(table.campaign.seeds)

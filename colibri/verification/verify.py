@@ -38,8 +38,6 @@ SEED = 7
 
 
 class CaseResult(NamedTuple):
-    """The result of a case."""
-
     name: str
     hashes: tuple[str, str, str]
     commands: int

@@ -28,7 +28,6 @@ _EDGES = 4
 
 
 def rotor_colour(part: float) -> Colour:
-    """Return the colour of a relative rotor speed."""
     if not isfinite(part):
         return IDLE_GREY
     levels, colours = zip(*_SCALE, strict=True)

@@ -15,8 +15,6 @@ S = TypeVar("S")
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessSpec:
-    """Identity and logs of a process."""
-
     system_id: Annotated[int, Option("MAVLink system", "ID", least=1, most=255)] = 1
     out: Annotated[Path | None, Option("write flight.ulg there", "DIR")] = None
     boot_unix_us: Annotated[

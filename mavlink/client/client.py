@@ -12,8 +12,7 @@ Theory
 ------
 MAVLink datagrams may be lost, duplicated and reordered. Requests (https://mavlink.io/en/services/) are repeated until
 the vehicle answers. So a `Conversation` has two inputs: `poll(now)` returns the current request when it is due, first
-at
-once and then after each silence; `receive(message)` reads an answer, which ends the conversation or moves it to its
+at once and then after each silence; `receive(message)` reads an answer, which ends the conversation or moves it to its
 next request. `receive` never sends, so duplicate answers cause one request only.
 
 An answer does not identify its request: a COMMAND_ACK has only the number of the command. Conversations with
@@ -47,8 +46,6 @@ Talk = TypeVar("Talk", bound=Conversation)
 
 
 class RemoteVehicle(NamedTuple):
-    """Identity of a vehicle."""
-
     system: int
     autopilot: int  # MAV_AUTOPILOT
     kind: int  # MAV_TYPE
@@ -75,8 +72,6 @@ class VehicleLost(NamedTuple):
 
 
 class ConversationEnded(NamedTuple):
-    """A conversation has its result."""
-
     conversation: Conversation
 
 

@@ -41,8 +41,6 @@ class Exchange(NamedTuple):
 
 
 class VehicleClock:
-    """Estimator of the vehicle's clock offset."""
-
     def __init__(self) -> None:
         self._exchanges: deque[Exchange] = deque(maxlen=round(WINDOW_US / _EVERY_US))
         self._next_us: int | None = None

@@ -19,8 +19,6 @@ _AT_ONCE = -(2**63)
 
 
 class Repeat(NamedTuple):
-    """Repetition of requests."""
-
     every_us: int = 500_000
     tries: int = 10  # without any answer
 

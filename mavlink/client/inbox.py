@@ -21,8 +21,6 @@ class Heard(dict[str, list[Any]]):
 
 
 class Inbox:
-    """The messages received from a vehicle."""
-
     def __init__(self, remembers: int = 20_000) -> None:
         self._remembers = remembers
         self.heard = Heard()  # fields by name, the latest last
@@ -47,7 +45,6 @@ class Inbox:
         self.texts.clear()
 
     def add(self, message: Message) -> None:
-        """Add a message of the vehicle."""
         name, fields = message.name, message.fields
         self.counts[name] += 1
         kept = self.heard[name]

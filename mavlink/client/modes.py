@@ -10,8 +10,6 @@ _CUSTOM = float(mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
 
 
 class FlightMode(NamedTuple):
-    """A flight mode, named as in ground stations."""
-
     name: str
     custom: int  # `custom_mode` of HEARTBEAT
     command: tuple[float, float, float]  # MAV_CMD_DO_SET_MODE's parameters 1 to 3

@@ -33,8 +33,6 @@ _LAYOUTS = {
 
 
 class Held(NamedTuple):
-    """A parameter of a vehicle."""
-
     value: Value
     kind: int  # MAV_PARAM_TYPE
 

@@ -26,8 +26,6 @@ _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 
 @dataclass
 class VehicleReport:
-    """The last reports of a vehicle."""
-
     autopilot: int = -1  # MAV_AUTOPILOT
     mode: int = -1  # `custom_mode`
     mode_reports_us: list[int] = field(default_factory=list)

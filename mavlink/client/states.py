@@ -29,8 +29,6 @@ class TimedState(NamedTuple):
 
 
 class StateAssembler:
-    """Assembler of states from messages."""
-
     def __init__(self) -> None:
         self._last_us = -1
         self._odometry_us: int | None = None

@@ -16,8 +16,6 @@ DATA_BYTES = 239
 
 
 class Opcode(IntEnum):
-    """Operation of a request, or type of an answer."""
-
     NONE = 0
     TERMINATE = 1
     RESET = 2
@@ -40,8 +38,6 @@ class Opcode(IntEnum):
 
 
 class FtpError(IntEnum):
-    """Reason of a refusal."""
-
     FAIL_ERRNO = 2
     INVALID_DATA_SIZE = 3
     INVALID_SESSION = 4
@@ -62,8 +58,6 @@ Key: TypeAlias = tuple[Peer, int]
 
 
 class Request(NamedTuple):
-    """A request of a client."""
-
     peer: Peer
     now_us: int
     payload: bytes

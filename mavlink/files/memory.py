@@ -8,8 +8,6 @@ DEFAULT_QUOTA = Quota(8 << 20, 1000)
 
 
 class MemoryFiles:
-    """Files in memory, see `Files`."""
-
     def __init__(self, quota: Quota = DEFAULT_QUOTA) -> None:
         self._quota = quota
         self._files: dict[Names, bytearray] = {}

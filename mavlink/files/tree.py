@@ -31,8 +31,6 @@ class FileRefusal(Enum):
 
 
 class Entry(NamedTuple):
-    """A file or folder in a folder."""
-
     name: str
     is_folder: bool
     size: int = 0  # bytes
@@ -40,8 +38,6 @@ class Entry(NamedTuple):
 
 
 class OpenFile(NamedTuple):
-    """A file open for reading."""
-
     size: int  # bytes when opened
     read: Callable[[int, int], bytes | FileRefusal]  # (offset, count) -> bytes, fewer at the end
 
@@ -54,8 +50,6 @@ class Quota(NamedTuple):
 
 
 class Files(Protocol):
-    """Files in folders."""
-
     def list(self, names: Names) -> list[Entry] | FileRefusal: ...
 
     def open(self, names: Names) -> OpenFile | FileRefusal: ...

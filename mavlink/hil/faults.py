@@ -42,8 +42,6 @@ _NOT_GIVEN: FaultValues = (0.0, 0.0, 0.0, 0.0)
 
 
 class Equipment(StrEnum):
-    """Equipment that a fault requires of the plant."""
-
     ROTORS = "rotors"
     BATTERY = "battery"
     SENSORS = "sensors"
@@ -51,8 +49,6 @@ class Equipment(StrEnum):
 
 
 class Fault(NamedTuple):
-    """A fault, or its end."""
-
     unit: int  # FAILURE_UNIT
     kind: int  # FAILURE_TYPE
     instance: int = ALL  # from 1
@@ -60,8 +56,6 @@ class Fault(NamedTuple):
 
 
 class Value(NamedTuple):
-    """The meaning of one of a fault's numbers."""
-
     name: str
     unit: str
     minimum: float

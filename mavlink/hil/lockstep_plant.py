@@ -46,8 +46,6 @@ _WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD, PACE})
 
 
 class PlantDatagram(NamedTuple):
-    """A datagram, as its frames, and its destination."""
-
     frames: tuple[bytes, ...]
     address: Address
 

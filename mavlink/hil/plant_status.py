@@ -16,8 +16,6 @@ _MAX_I32 = 2**31 - 1
 
 
 class PlantBattery(NamedTuple):
-    """The plant's battery."""
-
     voltage_v: float  # nan without a battery
     current_a: float
     used_ah: float  # since full
@@ -32,16 +30,12 @@ NO_BATTERY = PlantBattery(nan, 0.0, 0.0, 1.0)
 
 
 class FaultResult(NamedTuple):
-    """The result of a requested fault."""
-
     unit: int
     kind: int
     result: int
 
 
 class PlantStatus(NamedTuple):
-    """Status beside a frame."""
-
     battery: PlantBattery | None = None
     results: tuple[FaultResult, ...] = ()  # of faults in the previous answer
     delay_us: int | None = None  # from the last command's frame to its effect, if any
@@ -51,8 +45,6 @@ NOTHING = PlantStatus()
 
 
 class ReceivedFrame(NamedTuple):
-    """The next frame to answer, and the plant's status."""
-
     frame: Frame
     plant_status: PlantStatus = NOTHING
 

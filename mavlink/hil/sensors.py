@@ -50,16 +50,12 @@ class Updated:
 
 
 class FixType(IntEnum):
-    """GPS_FIX_TYPE of a simulated receiver."""
-
     NO_FIX = 1
     FIX_3D = 3
 
 
 @dataclass(frozen=True, slots=True)
 class GpsFix:
-    """A GPS fix."""
-
     time_us: int  # simulated time of sending
     fix_type: int  # `FixType`, or any number of a simulator
     place: Geodetic

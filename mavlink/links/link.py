@@ -50,8 +50,6 @@ class GroundLink(Protocol):
 
 
 class Endpoint:
-    """Common state of all links."""
-
     def __init__(self, url: str, target: Address | None) -> None:
         self.url = url
         self.target = target

@@ -37,8 +37,6 @@ _REASONS = {
 
 
 class SerialLink(Endpoint):
-    """A serial port."""
-
     target: Address
 
     def __init__(self, url: str, device: str, baud: int, clock: Callable[[], float] = perf_counter) -> None:

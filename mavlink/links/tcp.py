@@ -110,8 +110,6 @@ class Connection:
 
 
 class TcpServer(Endpoint):
-    """A server for several clients."""
-
     def __init__(self, sock: socket.socket, url: str) -> None:
         super().__init__(url, None)
         sock.setblocking(False)

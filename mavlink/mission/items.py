@@ -29,8 +29,6 @@ _INT32 = range(-(2**31), 2**31)
 
 
 class MissionItem(NamedTuple):
-    """An item of a plan, in wire units."""
-
     frame: int
     command: int
     autocontinue: int

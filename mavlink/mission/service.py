@@ -80,8 +80,6 @@ class Downloads:
 
 
 class MissionProgress(NamedTuple):
-    """Progress of the mission."""
-
     seq: int = 0
     state: int = mav.MISSION_STATE_NO_MISSION  # MISSION_STATE
     mode: int = 2  # 1 in mission mode, otherwise 2
@@ -91,8 +89,6 @@ Receiver: TypeAlias = Callable[[Any, Peer, int], Iterable[Send]]
 
 
 class MissionVehicle(NamedTuple):
-    """The service's interface to the vehicle."""
-
     load: Callable[[int, StoredPlan], None]  # (plan type, plan)
     progress: Callable[[], MissionProgress]  # called at every poll
     set_current: Callable[[int, bool], Refusal | None]  # (seq or -1 for the current, reset the counters)

@@ -4,8 +4,7 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 "Timeouts and Retries". Two choices follow PX4, because clients rely on them:
 
 - Requests are repeated every 250 ms for five seconds. The recommended five retries would let two of three uploads of
-500
-  items fail over a link that loses a fifth of the datagrams each way.
+  500 items fail over a link that loses a fifth of the datagrams each way.
 - Any MISSION_ACK ends MAVSDK's current transfer. So an unexpected one is never sent.
 """
 

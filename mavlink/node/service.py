@@ -30,8 +30,6 @@ def first_to_go(peers: Iterable[Peer]) -> Peer:
 
 
 class Send(NamedTuple):
-    """An outgoing message."""
-
     name: str
     fields: Fields
     channel: int | None = None  # `None` for all

@@ -84,8 +84,6 @@ LOCAL_FRAMES: dict[int, Frame] = {
 
 
 class Whereabouts(NamedTuple):
-    """References of setpoints."""
-
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0
     origin: Geodetic = DEFAULT_ORIGIN

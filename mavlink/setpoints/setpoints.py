@@ -47,8 +47,6 @@ OffboardSetpoint: TypeAlias = PositionSetpoint | AttitudeSetpoint
 
 
 class Sticks(NamedTuple):
-    """The sticks of a remote control."""
-
     pitch: float  # forward, -1..1
     roll: float  # right, -1..1
     thrust: float  # 0..1, centre 0.5

@@ -16,15 +16,11 @@ CHARGE_OK = 1
 
 
 class HomePosition(NamedTuple):
-    """The place of return."""
-
     position_enu_m: Vector
     yaw_rad: float  # counter-clockwise from east
 
 
 class BatteryState(NamedTuple):
-    """The estimated battery."""
-
     cells: int
     voltage_v: float
     current_a: float
@@ -60,8 +56,6 @@ class Forecast(NamedTuple):
 
 
 class SolverState(NamedTuple):
-    """Result of the control law's last decision."""
-
     status: int = -1  # `QpStatus`, 0 is solved; -1 without a QP
     fallback: int = -1  # `Fallback`; -1 without
     iterations: int = -1  # -1 if not reported
@@ -77,8 +71,6 @@ class SolverState(NamedTuple):
 
 
 class EstimatorState(NamedTuple):
-    """Quality of the estimate."""
-
     flags: int  # ESTIMATOR_STATUS_FLAGS
     ratios: tuple[float, ...]  # of tests, in the order of ESTIMATOR_STATUS; rejected above 1
     horizontal_accuracy_m: float
@@ -95,8 +87,6 @@ _PLUS = ((0.0, -0.5, 0.0, 0.5), (0.5, 0.0, -0.5, 0.0), (0.5, -0.5, 0.5, -0.5))
 
 
 class TelemetrySnapshot(NamedTuple):
-    """All values that telemetry sends."""
-
     time_us: int  # simulated, since the autopilot's start
     armed: bool = False
     base_mode: int = 0  # MAV_MODE_FLAG bits except the armed one

@@ -17,8 +17,6 @@ CONTENT_BYTES = _CHUNK.size
 
 
 class RecordKind(IntEnum):
-    """The kind of a record."""
-
     SETUP = 1
     """The autopilot's setup, as JSON."""
     DATAGRAM = 2
@@ -28,8 +26,6 @@ class RecordKind(IntEnum):
 
 
 class InputRecord(NamedTuple):
-    """A record, at the simulated time of its frame."""
-
     time_us: int
     kind: int
     content: bytes

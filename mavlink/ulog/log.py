@@ -22,8 +22,6 @@ RowEncoder: TypeAlias = Topic | Blocks
 
 
 class TopicReader(Protocol):
-    """A flight's log, by topic."""
-
     def blocks(self, topic: Topic) -> Iterator[Array]:
         """Yield a topic's rows in order, in blocks (n, columns), n > 0."""
         ...
@@ -105,8 +103,6 @@ class FileLog(TopicLog):
 
 
 class MemoryLog(TopicLog):
-    """A log in memory, as rows."""
-
     def __init__(self, *, for_viewers: bool = False) -> None:
         super().__init__()
         self.for_viewers = for_viewers

@@ -29,8 +29,6 @@ def sensing_numbers(time_us: int, sensed: SensorFrame, estimator: EstimatorState
 
 
 class SensingBlocks(Blocks):
-    """Encodes rows of `COLUMNS`."""
-
     def __init__(self) -> None:
         super().__init__(len(COLUMNS))
         self._records = Records(BLOCK_ROWS, topics.SENSORS, topics.ESTIMATOR)

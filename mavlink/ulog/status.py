@@ -27,8 +27,6 @@ _NAV_STATES = {
 
 
 class VehicleStatus(NamedTuple):
-    """The status of a vehicle."""
-
     armed: bool
     custom_mode: int  # in PX4's layout
     failsafe: bool = False

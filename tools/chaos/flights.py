@@ -25,8 +25,6 @@ _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 class ChaosOutcome(NamedTuple):
-    """Outcome of a flight."""
-
     outcome: str  # "flown on", "landed", "not reached", or the violated condition
     thrown: int  # number of exceptions
     said: str  # the first STATUSTEXT about them
@@ -75,8 +73,6 @@ SITUATIONS: dict[str, Callable[[Sitl], None]] = {
 
 
 class ChaosFlight:
-    """A flight with a thrower in it."""
-
     def __init__(self, flight: Sitl, situation: str, thrower: Thrower) -> None:
         self._flight, self._situation, self._thrower = flight, situation, thrower
         self._frames = 0

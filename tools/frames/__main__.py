@@ -23,8 +23,6 @@ FILES = 999
 
 
 class Timed:
-    """A flight whose frames are timed."""
-
     def __init__(self, flight: BareFlight) -> None:
         self.flight = flight
         self._frames_s = FrameTimes(flight.autopilot)

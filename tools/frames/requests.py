@@ -49,8 +49,6 @@ def load(flight: BareFlight, *, items: int = ITEMS, triangles: int = TRIANGLES) 
 
 
 class Sender:
-    """Encodes the messages of one ground station."""
-
     def __init__(self, flight: BareFlight) -> None:
         self.flight, self._codec = flight, Codec(255, 190)
 

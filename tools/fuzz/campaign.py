@@ -20,8 +20,6 @@ _EXIT_CODES = {"plant": 0, "autopilot": 130}
 
 
 class FuzzOutcome(NamedTuple):
-    """Outcome of a campaign."""
-
     sent: dict[tuple[str, str], int]  # bad datagrams by receiver and kind
     lost: int  # dropped by the kernel, because a receiver was too slow
     memory_mib: dict[str, tuple[float, float]]  # after a tenth of the flight and at its end

@@ -32,8 +32,6 @@ _PROFILE = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simul
 
 
 class BareFlight(Stepped, Steered):
-    """A vehicle and its clients."""
-
     system = SYSTEM
 
     def __init__(self, files: Files | None = None) -> None:

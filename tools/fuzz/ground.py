@@ -22,8 +22,6 @@ _FRAMES_A_SITUATION = 15
 
 
 class GroundOutcome(NamedTuple):
-    """Outcome of a campaign."""
-
     sent: dict[State, int]
     accepted: int
     kinds: int  # of commands accepted

@@ -22,8 +22,6 @@ class Job(NamedTuple):
 
 
 class JobResult(NamedTuple):
-    """Rows of the table, and failures."""
-
     lines: list[str]
     failures: list[str]
 

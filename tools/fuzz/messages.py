@@ -52,8 +52,6 @@ class Sent(NamedTuple):
 
 
 class Messages:
-    """Random messages."""
-
     def __init__(self, chance: random.Random, parameters: Sequence[str], commands: Sequence[int]) -> None:
         self.chance = chance
         self.parameters = tuple(parameters)

@@ -96,8 +96,6 @@ class VariationError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variation:
-    """Another computer."""
-
     name: str
     environment: Mapping[str, str] = field(default_factory=dict)  # additional variables of its processes
     needs: Sequence[str] = ()  # flags of the CPU, as in /proc/cpuinfo

@@ -30,8 +30,6 @@ _NEEDED = {"HEARTBEAT", "ATTITUDE_QUATERNION", "EXTENDED_SYS_STATE"}
 
 
 class Sight(NamedTuple):
-    """The vehicle at an instant."""
-
     time_s: float
     position_enu_m: Vector
     velocity_enu_m_s: Vector

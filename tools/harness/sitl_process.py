@@ -19,8 +19,6 @@ _COMPILES_HOURS = 0.05
 
 
 class SitlProcess:
-    """A running `colibri sitl`."""
-
     def __init__(
         self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path, printed: Path
     ) -> None:

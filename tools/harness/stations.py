@@ -27,8 +27,6 @@ _RADIUS_M, _RATE_RAD_S, _HEIGHT_M = 2.0, 0.5, 3.0
 
 
 class Ack(NamedTuple):
-    """An acknowledgement."""
-
     command: int
     result: int
     target: tuple[int, int]

@@ -25,8 +25,6 @@ STANDING = "y=0,z=0,psi=90,rotors=0"
 
 
 class AutopilotKill(NamedTuple):
-    """Outcome of a kill."""
-
     time_s: float  # of the frame, simulated
     phase: KillInstant
     item: int  # of the mission, current
@@ -40,8 +38,6 @@ class AutopilotKill(NamedTuple):
 
 
 class KilledMission(NamedTuple):
-    """Outcome of a mission."""
-
     kills: list[AutopilotKill]
     flown: bool
     duration_s: float
@@ -165,8 +161,6 @@ _MAX_DELAY_S = 12.0
 
 
 class PlantKill(NamedTuple):
-    """Outcome of a kill."""
-
     time_s: float
     phase: KillInstant
     said: str  # the autopilot's report; empty if the next plant came first

@@ -43,8 +43,6 @@ class RandomEvent(NamedTuple):
 
 
 class RandomFlight(NamedTuple):
-    """A flight, and its events from the take-off on."""
-
     seed: int
     vehicle: str
     feedback: str
@@ -131,8 +129,6 @@ LAND_WITHIN_S = 150.0
 
 
 class RandomFlightOutcome(NamedTuple):
-    """Outcome of a flight."""
-
     violated: str  # the condition, or empty
     frames_s: list[float]  # work of the autopilot in each frame
     flown_s: float

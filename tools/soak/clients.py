@@ -27,8 +27,6 @@ _VEHICLE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.tom
 
 
 class Look(NamedTuple):
-    """Use of resources at an instant."""
-
     wall_s: float
     sim_s: float
     resident_bytes: dict[str, int]

@@ -30,8 +30,6 @@ _MAX_TILT_DEG = 65.0
 
 
 class Outcome(NamedTuple):
-    """A flight."""
-
     lost: str  # empty: not lost
     rms_m: float  # over the last third
     rate_rad_s: float  # largest body rate over the last third: a limit cycle

@@ -15,8 +15,6 @@ FIVE_SIGMA = (25.0, 28.74, 31.81)
 
 
 class KindRecord(NamedTuple):
-    """State of a measurement for a restart."""
-
     accepted_us: int
     rejected_us: int | None
     resets: int

@@ -41,8 +41,6 @@ class Aligned(NamedTuple):
 
 
 class Alignment:
-    """Waits for rest."""
-
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector, interval_s: float) -> None:
         accel, gyro = sensors.accelerometer, sensors.gyroscope
         self._gravity = gravity_m_s2

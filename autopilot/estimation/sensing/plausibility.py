@@ -41,8 +41,6 @@ class Watch:
 
 
 class GpsWatch:
-    """Checks a GPS receiver."""
-
     def __init__(self) -> None:
         self.time_us: int | None = None
         self._alive = Watch(RejectedSource.GPS, -inf, inf, _GPS_PATIENCE_US)

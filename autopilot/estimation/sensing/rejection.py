@@ -17,8 +17,6 @@ class RejectedSource(StrEnum):
 
 
 class Reason(StrEnum):
-    """Why a value was rejected."""
-
     NOT_FINITE = "not finite"
     RANGE = "out of range"
     FROZEN = "frozen"
@@ -32,8 +30,6 @@ Rejections = Mapping[tuple[str, Reason], int]
 
 
 class Rejected:
-    """Counts rejections."""
-
     def __init__(self) -> None:
         self._counts: dict[tuple[str, Reason], int] = {}
         self._published: Rejections = MappingProxyType({})

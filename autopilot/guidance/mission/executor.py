@@ -34,8 +34,6 @@ _FLYING, _SUSPENDED = 1, 2
 
 
 class Reached(NamedTuple):
-    """An item is reached."""
-
     seq: int
 
 

@@ -66,8 +66,6 @@ FENCE_RULES = Rules(check_fence_item, check_fence)
 
 
 class Discs:
-    """The insides of circles."""
-
     def __init__(self, places_m: Sequence[tuple[float, float]], radii_m: Sequence[float]) -> None:
         self._east, self._north = np.array(places_m, dtype=float).reshape(-1, 2).T
         self._radii = np.array(radii_m, dtype=float)

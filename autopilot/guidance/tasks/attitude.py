@@ -101,8 +101,6 @@ class DescentTask(EndlessTask):
 
 
 class HeightLoop:
-    """The height loop, compensated for tilt."""
-
     def __init__(self, weight_n: float, gravity_m_s2: float) -> None:
         self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
         self._offset_m_s2 = 0.0

@@ -18,8 +18,6 @@ ABOVE_TARGET = 2
 
 
 class FollowTargetTask(EndlessTask):
-    """A place relative to the target."""
-
     def __init__(self) -> None:
         self._stop = HoldTask()
         self._ahead_rad: float | None = None

@@ -19,8 +19,6 @@ _BRAKE_1_S = 2.0
 
 
 class OffboardTask(EndlessTask):
-    """Setpoints of a companion."""
-
     def __init__(self, attitude: AttitudeReference | None) -> None:
         self._tilt = TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()

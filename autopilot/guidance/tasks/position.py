@@ -79,8 +79,6 @@ class GoToTask:
 
 
 class HoldTask:
-    """Stop and stay."""
-
     def __init__(self) -> None:
         self._place: Vector | None = None
         self._yaw_rad = 0.0
@@ -166,8 +164,6 @@ def sinking_m_s(context: TaskContext) -> float:
 
 
 class TaskSequence:
-    """Tasks in sequence."""
-
     def __init__(self, first: Leg, *others: Leg) -> None:
         self._ahead = [first, *others]
         self._inner: tuple[int, ...] = ()

@@ -13,8 +13,6 @@ _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
 class ClientInputs(NamedTuple):
-    """Latest client inputs."""
-
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
     followed: TargetState | None = None
@@ -97,8 +95,6 @@ TaskOutput: TypeAlias = PositionMotion | PlannedMotion | AttitudeMotion
 
 
 class FlightTask(Protocol):
-    """A way to fly."""
-
     def update(self, context: TaskContext) -> TaskOutput:
         """Called once a control sample."""
         ...
@@ -107,8 +103,6 @@ class FlightTask(Protocol):
 
 
 class EndlessTask:
-    """A task ended from outside."""
-
     def arrived(self, context: TaskContext) -> bool:
         del context
         return False

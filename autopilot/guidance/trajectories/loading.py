@@ -18,8 +18,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class LoadedTrack(NamedTuple):
-    """A track, with a note for the user."""
-
     track: Track
     note: str
 

@@ -102,8 +102,6 @@ def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool
 
 
 class Shown(NamedTuple):
-    """Callbacks of `fly_plan`."""
-
     progress: Callable[[float], None]
     say: Callable[[str], None]
     compiling: Callable[[int], None]

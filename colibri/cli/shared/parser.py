@@ -15,8 +15,6 @@ _NAME = 18
 
 
 class Subcommand(Protocol):
-    """The module of a subcommand."""
-
     def add_options(self, parser: ArgumentParser) -> None: ...
 
     def run(self, args: Namespace) -> int: ...

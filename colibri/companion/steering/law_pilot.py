@@ -68,8 +68,6 @@ class LawDemand(NamedTuple):
 
 
 class LawPilot:
-    """Flies one track by one law."""
-
     def __init__(
         self,
         profile: Profile,
@@ -102,7 +100,6 @@ class LawPilot:
         return first(self._planner.horizon(0).position_enu_m)
 
     def adopt(self, response: Response) -> None:
-        """Build the law for a response."""
         self._response = response
         self._vehicle = turning_no_faster(self._airframe, response)
         self._loop = ControlLoop(

@@ -93,8 +93,6 @@ class PastReference(NamedTuple):
 
 
 class ReferenceHistory:
-    """References by time."""
-
     def __init__(self) -> None:
         self._past: list[PastReference] = []
 

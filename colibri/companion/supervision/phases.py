@@ -13,8 +13,6 @@ from colibri.companion.supervision.rules import FlightFacts, Rule
 
 
 class CompanionPhase(StrEnum):
-    """Activity of a companion."""
-
     CONNECTING = "connecting"
     CHECKING = "checking"
     ARMING = "arming"
@@ -44,8 +42,6 @@ class PhaseCondition(StrEnum):
 
 
 class PhaseTransition(NamedTuple):
-    """A transition."""
-
     sources: tuple[CompanionPhase, ...]
     condition: PhaseCondition
     target: CompanionPhase

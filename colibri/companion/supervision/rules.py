@@ -139,8 +139,6 @@ class FlightFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckFacts(FlightFacts):
-    """Facts before a flight."""
-
     stack: Stack
     systems: tuple[int, ...]
     home_moved_m: float
@@ -392,7 +390,6 @@ LIMITS: tuple[Rule[FlightFacts], ...] = (
 
 
 def failing(now: CheckFacts, *, required: bool = True) -> list[str]:
-    """Return name and advice of each failing check."""
     rows = (check for check in CHECKS if check.required == required)
     return [f"{check.name}: {check.words(now)}" for check in rows if check.broken(now)]
 

@@ -72,8 +72,6 @@ class _ForkedChild:
 
 
 class LoggedChild:
-    """A running process and the file of its output."""
-
     def __init__(self, launcher: Launcher, spec: ProcessSpec, log: Path) -> None:
         self.name = name_of(spec)
         self.log = log

@@ -34,8 +34,6 @@ _SOON_S = 2e-4
 
 
 class LinkClock(Protocol):
-    """The clock of the delays between plant and autopilot."""
-
     def now_s(self) -> float: ...
 
     def wait(self, timeout_s: float) -> None: ...

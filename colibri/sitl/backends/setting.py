@@ -81,7 +81,6 @@ class Setting(WorldSpec, LawSpec):
         return load_vehicle(self.vehicle).rotors.count
 
     def plant_spec(self) -> PlantSpec:
-        """Return the specification of the plant."""
         start = _STANDING
         if self.airborne is not None:
             vehicle = load_vehicle(self.vehicle)

@@ -16,8 +16,6 @@ _STYLE = "margin:0 0.75rem 0.75rem;font-size:0.875rem;line-height:1.55;overflow-
 
 
 class Done(NamedTuple):
-    """A user action."""
-
     what: str
     value: Any = None
 

@@ -35,8 +35,6 @@ _EVENTS = 3
 
 
 class LogColumns(NamedTuple):
-    """Columns of a log by name, at its times."""
-
     times_s: Array
     named: dict[str, Array]
 
