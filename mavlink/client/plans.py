@@ -97,15 +97,3 @@ class Download(_PlanConversation):
             return (("MISSION_REQUEST_INT", (*self.target, missing, self.plan)),)
         self.result = OK
         return (("MISSION_ACK", (*self.target, OK, self.plan)),)
-
-
-class Clear(_PlanConversation):
-    """The removal of a plan, or with MAV_MISSION_TYPE_ALL of all."""
-
-    answers = frozenset({"MISSION_ACK"})
-
-    def __init__(self, target: Target, plan: int = MISSION, *, repeat: Repeat = USUALLY) -> None:
-        super().__init__(target, plan, repeat)
-
-    def _request(self) -> Sequence[Encoded]:
-        return (("MISSION_CLEAR_ALL", (*self.target, self.plan)),)

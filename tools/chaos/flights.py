@@ -21,7 +21,6 @@ MAX_IMPACT_M_S = 3.5
 _WATCH_S, _LAND_WITHIN_S = 2.5, 30.0
 _NEAR_GROUND_M = 0.15
 _LOST_M = 60.0
-_FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 class ChaosOutcome(NamedTuple):

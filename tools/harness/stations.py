@@ -15,7 +15,6 @@ from colibri.mavlink.wire.ned import ned_from_enu
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 OFFBOARD = (mav.MAV_CMD_DO_SET_MODE, 1, 6, 0)
-HOLD = (mav.MAV_CMD_DO_SET_MODE, 1, 4, 3)
 ARM = (mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
 VEHICLE = (1, AUTOPILOT_COMPONENT)

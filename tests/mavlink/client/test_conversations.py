@@ -11,10 +11,10 @@ from colibri.mavlink.client.client import Client
 from colibri.mavlink.client.commands import Command, CommandInt
 from colibri.mavlink.client.conversation import OK, UNANSWERED, Conversation, Repeat
 from colibri.mavlink.client.parameters import DIFFERS, ListParameters, ReadParameter, SetParameter
-from colibri.mavlink.client.plans import Clear, Download, Upload
+from colibri.mavlink.client.plans import Download, Upload
 from colibri.mavlink.files.log_download import Logs
 from colibri.mavlink.files.memory import MemoryFiles
-from colibri.mavlink.mission.items import ALL, FENCE, MISSION, PLAN_TYPES
+from colibri.mavlink.mission.items import FENCE, MISSION, PLAN_TYPES
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, ParamError, Parameter, Parameters, ParamType
@@ -119,9 +119,6 @@ def test_plans_over_bad_links(seed: int, loss: float, unruly: float, plan: int) 
         assert rig.ended(download) == OK
         assert bits(download.items) == bits(items)
         assert download.opaque_id == upload.opaque_id == rig.ground.service.plans[plan].id
-    rig.ended(Upload(TARGET, ITEMS, plan, repeat=PATIENTLY))
-    assert rig.ended(Clear(TARGET, ALL, repeat=PATIENTLY)) == OK
-    assert not rig.ground.service.plans[plan].items
 
 
 @few
