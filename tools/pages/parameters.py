@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 from itertools import groupby
 
-from colibri.analysis.tables import markdown
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import definitions
@@ -28,15 +27,16 @@ def _sections() -> Iterator[str]:
         yield f"## {group}\n"
         if group in _INTRODUCTIONS:
             yield f"{_INTRODUCTIONS[group]}\n"
-        yield markdown(("name", "default", "range", "meaning"), list(map(_row, parameters)), names=4)
+        yield from map(_item, parameters)
+        yield ""
 
 
-def _row(p: Parameter) -> tuple[str, ...]:
+def _item(p: Parameter) -> str:
     choices = "; ".join(f"{number} {meaning}" for number, meaning in p.values)
     notes = " ".join(filter(None, [p.description + ".", _KEY.sub(r"`\1`", p.details), choices and f"({choices})"]))
     notes += " Read only." if p.read_only else " After a restart." if p.reboot_required else ""
     default, least, most = (_number(p, value) for value in (p.default, p.minimum, p.maximum))
-    return (f"`{p.name}`", f"{default} {p.unit}".strip(), f"{least}…{most}", notes)
+    return f"- `{p.name}` {f'{default} {p.unit}'.strip()}, {least}…{most}: {notes}"
 
 
 def _number(parameter: Parameter, value: float) -> str:

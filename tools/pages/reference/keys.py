@@ -9,7 +9,6 @@ from typing import Any
 
 from msgspec import inspect as kinds
 
-from colibri.analysis.tables import markdown
 from colibri.autopilot.control import scaling
 from colibri.autopilot.control.geometric import GeometricSettings
 from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
@@ -17,7 +16,7 @@ from colibri.autopilot.control.profile import ProfileTables, profile_names, prof
 from colibri.autopilot.control.thesis.cascade import CascadeSettings
 from colibri.autopilot.control.thesis.global_mpc import GlobalSettings
 from colibri.plant.vehicle.description import Vehicle, vehicle_names, vehicle_text
-from tools.pages.tables import cell, with_body
+from tools.pages.tables import with_body
 
 LAWS: dict[str, Any] = {
     "lpv-mpc": LpvMpcSettings,
@@ -73,18 +72,18 @@ def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]], show
     shown[kind] = above
     yield f"{_first_line(kind)}\n"
     notes, inner = _notes(kind), []
-    rows = []
     for field in info.fields:
         key = f"{above}.{field.encode_name}".lstrip(".")
         table = _table_of(field.type)
+        value, comment, where = said.get(key, ("", "", ""))
+        note = notes.get(field.name) or comment
         if table is not None:
             inner.append((table, key))
-        what = "a table, below" if table is not None else _what(field.type)
-        value, comment, where = said.get(key, ("", "", ""))
-        note = notes.get(field.name) or comment or (_first_line(table) if table is not None else "")
+            note = note if note != _first_line(table) else ""
         example = f"; `{value}`{where}" if value else ""
-        rows.append((f"`{field.encode_name}`", cell(what + _optional(field) + example), cell(note)))
-    yield markdown(("key", "value; example", "meaning"), rows, names=3)
+        what = ("a table" if table is not None else _what(field.type)) + _optional(field) + example
+        yield f"- `{field.encode_name}`: {what}" + (f". {note}" if note else "")
+    yield ""
     for table, key in inner:
         yield from _sections(table, key, said, shown)
 
