@@ -45,7 +45,6 @@ def at(position: Vector, velocity: Vector = _NOTHING, yaw_rad: float = 0.0) -> V
 
 
 def item(command: str, *params: float, place: Vector | None = None) -> MissionItem:
-    """Return a mission item; a place is east, north and up from home."""
     p1, p2, p3, p4 = (*params, *(0.0,) * (4 - len(params)))
     number = getattr(mav, f"MAV_CMD_{command}")
     if place is None:

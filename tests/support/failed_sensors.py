@@ -28,8 +28,6 @@ _WATCHED_S, _LAND_WITHIN_S = 20.0, 60.0
 
 
 class Fault(NamedTuple):
-    """A failure of a sensor."""
-
     unit: str
     kind: str
     values: tuple[float, ...] = ()

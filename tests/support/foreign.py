@@ -28,7 +28,6 @@ class Package(NamedTuple):
     entry_points: tuple[str, ...]
 
     def install(self, folder: Path, source: str) -> str:
-        """Install it in a folder; return the PYTHONPATH to find it by."""
         (folder / f"{self.module}.py").write_text(source, encoding="utf-8")
         information = folder / f"{self.module}-1.0.dist-info"
         information.mkdir()

@@ -44,7 +44,6 @@ class DownloadLog(Conversation):
     answers = frozenset({"LOG_DATA"})
 
     def __init__(self, target: Target, log: int, size: int, *, repeat: Repeat = _SILENCE) -> None:
-        """Download a log of `size` bytes."""
         super().__init__(target, "logs", repeat)
         self._log = log
         self._data = bytearray(size)

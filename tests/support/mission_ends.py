@@ -66,7 +66,6 @@ class Ground:
 
 
 def fielded(item: MissionItem, plan_type: int = 0, current: int = 0) -> tuple[Any, ...]:
-    """Return the fields of a MISSION_ITEM_INT after its sequence number."""
     return (item.frame, item.command, current, *item[2:], plan_type)
 
 

@@ -24,7 +24,6 @@ def hummingbird(*parts: str) -> Vehicle:
 
 
 def command(*speeds: float, vehicle: Vehicle) -> ActuatorCommand:
-    """Return the command of four rotor speeds, or of one for all."""
     c1, c2, c3, c4 = (speed / vehicle.rotors.max_speed for speed in (speeds if len(speeds) == 4 else speeds * 4))
     return ActuatorCommand(0, (c1, c2, c3, c4), armed=True)
 
@@ -47,7 +46,6 @@ def flight(
     wind: Vector = CALM,
     frame_us: int = FRAME_US,
 ) -> list[World]:
-    """Fly at a constant command; return the world at every frame, the start included."""
     physics = Physics(vehicle, integrator, blowing(wind))
     worlds = [start if isinstance(start, World) else starting_world(start, vehicle, blowing(wind))]
     while worlds[-1].time_us < duration_s * 1e6:

@@ -115,7 +115,6 @@ def task_classes() -> set[type]:
 
 
 def flown(task: FlightTask) -> Iterator[FlightTask]:
-    """Yield a task, and the one that it flies within."""
     yield task
     if isinstance(task, TaskSequence) and task.task is not None:
         yield from flown(task.task)

@@ -23,11 +23,9 @@ PARAMETERS = "lpv-mpc-asctec-hummingbird.params"
 
 class AtOnce(Stop):
     def __init__(self) -> None:
-        """Handle no signals."""
         self.code = 130
 
     def __bool__(self) -> bool:
-        """Return that it is time."""
         return True
 
 

@@ -29,8 +29,6 @@ def _linear(actions: int = 4) -> list[tuple[Any, Any]]:
 
 
 class Linear(colibri.PolicyLaw):
-    """The same policy as a class."""
-
     inputs = colibri.PolicyInputs(action="rates", interval_ms=4)
 
     def act(self, observation: Any) -> Any:

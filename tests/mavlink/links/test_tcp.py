@@ -193,7 +193,6 @@ def test_a_sleeping_server_is_woken_by_a_new_client(monkeypatch: pytest.MonkeyPa
 
 @pytest.fixture
 def now_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Return the time of the links, to be changed."""
     now = [100.0]
     monkeypatch.setattr(tcp, "perf_counter", lambda: now[0])
     return now

@@ -41,7 +41,6 @@ def fence(*items: MissionItem) -> Geofence:
 
 
 def depth_m(zones: Discs | Polygons, east: float, north: float) -> float:
-    """Return the depth inside the first of the zones."""
     return float(zones.depths_m(np.array([[east, north]]))[0, 0])
 
 
