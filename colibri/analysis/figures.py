@@ -2,7 +2,7 @@
 
 import gc
 import signal
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from multiprocessing import get_context
 from os import getpid
@@ -39,7 +39,7 @@ _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
 
-Figures: TypeAlias = dict[str, Callable[[], Figure]]
+Figures: TypeAlias = Mapping[str, Callable[[], Figure]]
 """Functions that draw figures, by name."""
 
 
@@ -87,27 +87,23 @@ class TimeFigure(NamedTuple):
 
 def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
     """Write the figures of a flight to its folder, half of them by a second process where this one may be forked."""
-    figures = figures_of(flown, plan)
-    others = list(figures)[1::2]
-    other = get_context("fork").Process(target=_draw_beside, args=(figures, others, plan.out, getpid()), daemon=True)
-    forked = can_fork()
-    if forked:
+    figures, other = figures_of(flown, plan), None
+    own, others = list(figures)[::2], list(figures)[1::2]
+    if can_fork():
+        other = get_context("fork").Process(target=_draw, args=(figures, others, plan.out, getpid()), daemon=True)
         other.start()
-    _draw(figures, list(figures)[::2], plan.out)
-    if forked:
+    _draw(figures, own, plan.out)
+    if other is not None:
         other.join()
-    if not forked or other.exitcode:
+    if other is None or other.exitcode:
         _draw(figures, others, plan.out)
     return [plan.out / f"{name}.png" for name in figures]
 
 
-def _draw_beside(figures: Figures, names: Iterable[str], folder: Path, parent: int) -> None:
-    handle_endings(signal.SIG_DFL)
-    end_with(parent)
-    _draw(figures, names, folder)
-
-
-def _draw(figures: Figures, names: Iterable[str], folder: Path) -> None:
+def _draw(figures: Figures, names: Iterable[str], folder: Path, parent: int | None = None) -> None:
+    if parent is not None:
+        handle_endings(signal.SIG_DFL)
+        end_with(parent)
     with gc_frozen():
         for name in names:
             write_figure(figures[name](), folder / name)
@@ -116,12 +112,11 @@ def _draw(figures: Figures, names: Iterable[str], folder: Path) -> None:
 
 def figures_of(flown: FigureSeries, plan: FlightPlan) -> Figures:
     flight = f"{shortened(str(plan.spec.track))}, {plan.flown_by}"
+    figures = {"trajectory": partial(draw_trajectory, flown.in_space(), f"{flight}: trajectory")}
     series = flown.over_time()
-    over_time = {
-        figure.name: partial(draw_times, series, figure, f"{flight}: {figure.subject}")
-        for figure in flight_figures(series, plan)
-    }
-    return {"trajectory": lambda: draw_trajectory(flown.in_space(), f"{flight}: trajectory"), **over_time}
+    for figure in flight_figures(series, plan):
+        figures[figure.name] = partial(draw_times, series, figure, f"{flight}: {figure.subject}")
+    return figures
 
 
 def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from colibri.analysis.logs import RecordingError, Rows, at_times, csv_rows, log_of, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.common.compiled_rotations import euler_from_quaternion, nearest_turn
+from colibri.common import rotations
+from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.errors import checked
 from colibri.common.jit import compiled
 from colibri.common.types import Array
@@ -36,6 +37,7 @@ _PLANT_STATE = slice(1, 14)
 _PLANT_ATTITUDE = slice(10, 14)
 _PLANT_ROTORS = slice(14, 18)
 _SAME_S = 1e-7
+_nearest_turn = compiled(rotations.nearest_turn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,5 +238,5 @@ def _euler(quaternions: Array, yaw_rad: float) -> Array:
     for i in range(len(quaternions)):
         q = quaternions[i]
         angles[i, 0], angles[i, 1], psi = euler_from_quaternion((q[0], q[1], q[2], q[3]))
-        yaw_rad = angles[i, 2] = nearest_turn(psi, yaw_rad)
+        yaw_rad = angles[i, 2] = _nearest_turn(psi, yaw_rad)
     return angles

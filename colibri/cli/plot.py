@@ -22,10 +22,7 @@ def run(args: Namespace) -> int:
 
     try:
         plan = plan_of(args.folder)
-        flown = FigureSeries(plan)
-        for part in FlightReader(plan):
-            flown.add(part)
-        paths = draw_flight(flown, plan)
+        paths = draw_flight(FigureSeries(plan, FlightReader(plan)), plan)
     except Error as error:
         fail(f"{args.folder}: {error}" if str(args.folder) not in str(error) else str(error))
     except OSError as error:

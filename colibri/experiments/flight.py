@@ -85,10 +85,7 @@ class Flight:
         """
         from colibri.analysis.figures import figures_of
 
-        series = FigureSeries(self.plan)
-        for part in FlightReader(self.plan, self.log):
-            series.add(part)
-        figures = figures_of(series, self.plan)
+        figures = figures_of(FigureSeries(self.plan, FlightReader(self.plan, self.log)), self.plan)
         if what not in figures:
             raise OptionError(unknown("figure", what, figures))
         return figures[what]()

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_frd_state
+from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
 ROTORS = 4
 """Of a plant that is not told otherwise."""
@@ -63,20 +63,14 @@ def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
 def state_as_received(frame: StateFrame) -> StateFrame | None:
     """Return the frame as rounded by `encode_state` and `read_state`: a sign or another axis alters no digit."""
     time_us, position, velocity, attitude, rate = frame
-    q1, q2, q3, q4, x, y, z, vx, vy, vz, p, q, r = _SINGLES.unpack(
-        _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
-    )
-    unit = _unit(q1, q2, q3, q4) if isfinite(x + y + z + vx + vy + vz + p + q + r) else None
-    if unit is None:
-        return None
-    return StateFrame(time_us - time_us % 1000, (x, y, z), (vx, vy, vz), ned_frd_from_enu_flu(unit), (p, q, r))
+    numbers = _SINGLES.pack(*ned_frd_from_enu_flu(attitude), *position, *velocity, *rate)
+    return _frame(time_us - time_us % 1000, _SINGLES.unpack(numbers))
 
 
 def _numbers(frame: StateFrame) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    time_us, position, velocity, attitude, rate = frame
+    time_us, (x, y, z), (vx, vy, vz), attitude, (p, q, r) = frame
     time_boot_ms = time_us // 1000
-    position, velocity, attitude, rate = ned_frd_state(position, velocity, attitude, rate)
-    return (time_boot_ms, *attitude, *rate), (time_boot_ms, *position, *velocity)
+    return (time_boot_ms, *ned_frd_from_enu_flu(attitude), p, -q, -r), (time_boot_ms, y, x, -z, vy, vx, -vz)
 
 
 def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
@@ -93,23 +87,23 @@ def decode_state(attitude: Message, position: Message) -> StateFrame | None:
 
 
 def _state(attitude: Sequence[Any], position: Sequence[Any]) -> StateFrame | None:
-    attitude_ms, q1, q2, q3, q4, rollspeed, pitchspeed, yawspeed = attitude
-    position_ms, x, y, z, vx, vy, vz = position
-    # Fields are single floats: their sum is finite if each of them is.
-    all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
-    unit = _unit(q1, q2, q3, q4)
-    if attitude_ms != position_ms or not all_finite or unit is None:
+    attitude_ms, q1, q2, q3, q4, p, q, r = attitude
+    position_ms, north, east, down, vn, ve, vd = position
+    if attitude_ms != position_ms:
         return None
-    state = ned_frd_state((x, y, z), (vx, vy, vz), unit, (rollspeed, pitchspeed, yawspeed))
-    return StateFrame(attitude_ms * 1000, *state)
+    return _frame(attitude_ms * 1000, (q1, q2, q3, q4, east, north, -down, ve, vn, -vd, p, -q, -r))
 
 
-def _unit(w: float, x: float, y: float, z: float) -> Quaternion | None:
-    squared = w * w + x * x + y * y + z * z
-    if not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
+def _frame(time_us: int, numbers: Sequence[float]) -> StateFrame | None:
+    """Return a frame of an attitude in NED/FRD, then position, velocity and rates in ENU/FLU."""
+    q1, q2, q3, q4, x, y, z, vx, vy, vz, p, q, r = numbers
+    squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
+    # Numbers are single floats: their sum is finite if each of them is.
+    if not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE or not isfinite(x + y + z + vx + vy + vz + p + q + r):
         return None
     norm = sqrt(squared)
-    return (w / norm, x / norm, y / norm, z / norm)
+    unit = ned_frd_from_enu_flu((q1 / norm, q2 / norm, q3 / norm, q4 / norm))
+    return StateFrame(time_us, (x, y, z), (vx, vy, vz), unit, (p, q, r))
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:

@@ -1,13 +1,12 @@
 """Conversions between ENU/FLU and MAVLink's NED/FRD, used nowhere else; each is its own inverse."""
 
 from math import sqrt
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
-from colibri.common.types import Array, Quaternion, Vector
+from colibri.common.types import Array
 
 _Number = TypeVar("_Number", float, Array)
 """One vector, or a column of many per component."""
-State: TypeAlias = tuple[Vector, Vector, Quaternion, Vector]
 _HALF_SQRT2 = sqrt(0.5)
 
 
@@ -29,9 +28,3 @@ def ned_frd_from_enu_flu(
     """Convert an attitude from ENU/FLU to NED/FRD, or back: pitch changes its sign, yaw becomes pi/2 - yaw."""
     w, x, y, z = q
     return (_HALF_SQRT2 * (w + z), _HALF_SQRT2 * (x + y), _HALF_SQRT2 * (x - y), _HALF_SQRT2 * (w - z))
-
-
-def ned_frd_state(position: Vector, velocity: Vector, attitude: Quaternion, rate: Vector) -> State:
-    """Convert position, velocity, attitude and body rates in one call, for every frame."""
-    (x, y, z), (u, v, w), (p, q, r) = position, velocity, rate
-    return (y, x, -z), (v, u, -w), ned_frd_from_enu_flu(attitude), (p, -q, -r)

@@ -1,5 +1,6 @@
 """Contents of a flight's figures as named series, reduced to the points that a figure can show."""
 
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -114,7 +115,7 @@ _OF_REFERENCES = [_NAMES.index(name) for name in _SLOPES]
 class FigureSeries:
     """Collects a flight for its figures, part by part, in some MB."""
 
-    def __init__(self, plan: FlightPlan) -> None:
+    def __init__(self, plan: FlightPlan, parts: Iterable[Samples] = ()) -> None:
         self._rotors = plan.plant_vehicle.rotors
         self._names = _NAMES + columns_of(plan)[len(COLUMNS) :]
         self._start: list[Array] = []
@@ -123,6 +124,8 @@ class FigureSeries:
         self._newest: Array = np.empty((0, len(self._names)))
         self._squares_m2 = 0.0
         self._settled = 0
+        for part in parts:
+            self.add(part)
 
     def add(self, part: Samples) -> None:
         self._path.add(part.columns((*POSITION, *POSITION_REFERENCE)))

@@ -41,8 +41,13 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
         with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
             for note in filter(None, (plan.track_note, in_words(plan.without_effect.items()))):
                 say(note)
-            beside = plan.spec.link == "udp" and not args.no_figures
-            summary = fly_plan(plan, _loading_figures(progress) if beside else progress, say, compiling)
+
+            def show(sim_time_s: float) -> None:
+                if plan.spec.link == "udp" and not args.no_figures:  # while two other processes fly
+                    import colibri.analysis.figures  # noqa: F401
+                progress(sim_time_s)
+
+            summary = fly_plan(plan, show, say, compiling)
     except FlightError as error:
         _keep_what_there_is(plan, str(error))
         if error.said:
@@ -64,17 +69,6 @@ def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     if above:
         fail(f"--fail-above: {'; '.join(above)}; the logs are in {plan.out}", EXIT_FAILED)
     return 0
-
-
-def _loading_figures(progress: Callable[[float], None]) -> Callable[[float], None]:
-    """Load what draws at the first call, while two other processes fly."""
-
-    def load_and_show(sim_time_s: float) -> None:
-        import colibri.analysis.figures  # noqa: F401
-
-        progress(sim_time_s)
-
-    return load_and_show
 
 
 def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
