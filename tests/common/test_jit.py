@@ -236,3 +236,16 @@ def test_a_kernel_is_interpreted_while_another_compiles_it(tmp_path: Path, monke
     other.end()
     assert kernel(argument) == 0.25
     assert len(kernel.signatures) == 1
+
+
+def test_kernels_of_a_read_only_folder_are_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    image, other = tmp_path / "cache", tmp_path / "other"
+    assert _unseen(tmp_path, monkeypatch)(1.0) == 3.0
+    monkeypatch.setattr(on_disk, "folders", lambda: [image, other])
+    monkeypatch.setattr(on_disk, "_can_be_written", lambda folder: folder == other)
+    monkeypatch.delitem(sys.modules, "unseen")
+    kernel = importlib.import_module("unseen").tripled
+    other.mkdir()
+    assert kernel(2.0) == 6.0
+    assert sum(kernel.stats.cache_hits.values()) == 1
+    assert not list(other.iterdir())
