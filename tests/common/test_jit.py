@@ -8,17 +8,18 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numba import float64, typeof
 from numba.core.dispatcher import Dispatcher
 from numba.core.event import Event, Listener, install_listener
 from numba.core.registry import CPUDispatcher
 
 from colibri import autopilot, common, mavlink, plant
 from colibri.common.machine_code import on_disk
-from colibri.common.machine_code.content import functions_of, key_of
+from colibri.common.machine_code.content import fields_of, functions_of, key_of
 from colibri.common.machine_code.interpretation import interpret_while_waiting
 from colibri.common.machine_code.turns import Turn
 
@@ -109,6 +110,11 @@ TABLE = np.array([1.0, 2.0])
 """
 
 
+class KeyedPair(NamedTuple):
+    value: float
+    weight: float
+
+
 def _key(folder: Path, monkeypatch: pytest.MonkeyPatch, keyed: str, elsewhere: str, factor: float) -> str:
     folder.mkdir(parents=True)
     (folder / "keyed.py").write_text(keyed)
@@ -133,6 +139,8 @@ def test_the_key_of_machine_code_is_its_content(tmp_path: Path, monkeypatch: pyt
     keys = [_key(tmp_path / str(n), monkeypatch, *case) for n, case in enumerate(cases.values())]
     assert keys[0] == keys[1]
     assert len(set(keys)) == len(cases) - 1
+    argument = typeof(KeyedPair(1.0, 2.0))  # type: ignore[no-untyped-call]
+    assert fields_of((argument, float64)) == ((("value", "weight"), ()),)
 
 
 def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -249,3 +257,15 @@ def test_kernels_of_a_read_only_folder_are_loaded(tmp_path: Path, monkeypatch: p
     assert kernel(2.0) == 6.0
     assert sum(kernel.stats.cache_hits.values()) == 1
     assert not list(other.iterdir())
+
+
+def test_versions_of_a_kernel_unused_for_months_are_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("tripled-0.1.nbc", "tripled-1.1.nbc", "other-0.1.nbc")
+    old, recent, another = (tmp_path / "cache" / f"unseen.{name}" for name in names)
+    for file in (old, recent, another):
+        file.parent.mkdir(exist_ok=True)
+        file.touch()
+    for file in (old, another):
+        os.utime(file, (1e9, 1e9))
+    _unseen(tmp_path, monkeypatch)(1.0)
+    assert [file.exists() for file in (old, recent, another)] == [False, True, True]
