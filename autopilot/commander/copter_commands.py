@@ -189,6 +189,11 @@ class CopterCommands(Commands):
         self._pilot.speed_m_s = command.p2
         return None
 
+    def _set_home(self, command: ReceivedCommand) -> Refusal | None:
+        """Set home; a place of 0, 0 is here."""
+        here = command.x == command.y == 0.0
+        return super()._set_home(command._replace(p1=1.0) if here else command)
+
     def _terminate(self, command: ReceivedCommand) -> Refusal | None:
         return super()._terminate(command) if command.p1 > 0.5 else Refusal("termination: 1 terminates", FAILED)
 

@@ -8,7 +8,7 @@ from collections.abc import Collection
 from re import sub
 
 from colibri.autopilot.commander.copter_commands import CopterCommands
-from colibri.autopilot.commander.rules.modes import Mode, State
+from colibri.autopilot.commander.rules.modes import Mode, Need, State
 from colibri.autopilot.commander.rules.shown_modes import CUSTOM, STABILIZED, BaseModes, ModeBook, ShownMode
 from colibri.autopilot.ground.conventions import Commanded, Conventions
 from colibri.autopilot.ground.onboard_log import DATAFLASH
@@ -109,11 +109,14 @@ MODES = ModeBook(
     refusal=lambda mode, refusal: Refusal(f"Mode change to {mode.name} failed: {_why(refusal.reason)}", FAILED),
     unarmable=lambda mode: Refusal(f"Arm: {mode.name} mode not armable", FAILED),
     base_modes=_base_modes,
+    as_command=lambda number: (float(CUSTOM), float(number), 0.0),
+    takeoff=GUIDED,
 )
 
 
 def _why(reason: str) -> str:
-    return reason.partition(" refused: ")[2] or reason
+    why = reason.partition(" refused: ")[2] or reason
+    return {Need.POSITION.value: "requires position", Need.STICKS.value: "in RC failsafe"}.get(why, why)
 
 
 _EXTRA1, _EXTRA2, _EXTRA3 = mav.MAV_DATA_STREAM_EXTRA1, mav.MAV_DATA_STREAM_EXTRA2, mav.MAV_DATA_STREAM_EXTRA3
@@ -153,15 +156,21 @@ _TEXTS = (
     (r"^Mission RTL item: .*", ""),
     (r"^Takeoff (altitude reached: |detected).*", ""),
     (r"^Landing detected$", ""),
+    (r"^(Arm|PreArm): outside the geofence", r"\1: Vehicle breaching Polygon fence"),
+    (r"^(Arm|PreArm): more than [\d.]+ m (from|above) home", r"\1: Vehicle breaching fence"),
+    (r"^Failsafe cleared: ground station lost", "GCS Failsafe Cleared"),
+    (r"^Failsafe cleared: sticks lost", "Radio Failsafe Cleared"),
+    (r"^(Failsafe activated|Failsafe): ground station lost.*", "GCS Failsafe"),
+    (r"^(Failsafe activated|Failsafe): sticks lost.*", "Radio Failsafe"),
+    (r"^(Failsafe activated|Failsafe|Warning): battery (low|critical).*", r"Battery 1 is \2"),
+    (r"^(Failsafe activated|Failsafe|Warning): geofence breached.*", "Fence Breached"),
 )
 """Status texts of Colibri, and ArduCopter's; empty where it sends none."""
 
 
 def _rewrite(text: str) -> str:
     for pattern, words in _TEXTS:
-        changed = sub(pattern, words, text)
-        if changed != text:
-            return changed
+        text = sub(pattern, words, text)
     return text
 
 

@@ -28,8 +28,12 @@ _OUR_FENCE = ("GF_MAX_VER_DIST", "GF_MAX_HOR_DIST", "GF_ACTION")
 _LINK_ACTIONS = {0: 0, 1: 2, 2: 2, 3: 2, 4: 2, 5: 3, 6: 2, 7: 1}
 """NAV_DLL_ACT and NAV_RCL_ACT by FS_GCS_ENABLE and FS_THR_ENABLE, whose 3 is LAND."""
 _LINK_ACTIONS_BACK = {0: 0, 1: 7, 2: 1, 3: 5, 5: 5}
-_OURS_FROM_THE_START: Mapping[str, Value] = {"MPC_XY_VEL_MAX": 25.0, "COM_DISARM_LAND": 1.0, "RTL_MIN_DIST": 0.0}
-"""Speeds are limited by WPNAV_SPEED alone, a landing disarms at once, and every return climbs."""
+_OURS_FROM_THE_START: Mapping[str, Value] = {"MPC_XY_VEL_MAX": 25.0, "COM_DISARM_LAND": 1.0, "RTL_MIN_DIST": 0.0} | {
+    name: 0.0 for name in ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
+}
+"""Speeds are limited by WPNAV_SPEED alone, a landing disarms at once, every return climbs, and batteries are judged by
+voltage.
+"""
 
 
 class CopterRow(NamedTuple):

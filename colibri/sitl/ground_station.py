@@ -68,8 +68,10 @@ class Station(Inbox):
         trouble: Trouble,
         seed: int,
         beats: bool,
+        by_bits: bool = True,
     ) -> None:
         super().__init__()
+        self._by_bits = by_bits
         self._flight = flight
         self.number = number
         self.system = system
@@ -159,11 +161,12 @@ class Station(Inbox):
 
     def get_param(self, name: str) -> Value:
         """Request a parameter."""
-        return self._parameter(ReadParameter(self._vehicle, name, repeat=_REPEAT))
+        return self._parameter(ReadParameter(self._vehicle, name, by_bits=self._by_bits, repeat=_REPEAT))
 
     def set_param(self, name: str, value: Value) -> Value:
         """Set a parameter; return its new value."""
-        change = SetParameter(self._vehicle, name, value, kind=self._kinds.get(name), repeat=_REPEAT)
+        kind, by_bits = self._kinds.get(name), self._by_bits
+        change = SetParameter(self._vehicle, name, value, kind=kind, by_bits=by_bits, repeat=_REPEAT)
         taken = self._parameter(change)
         if change.result == DIFFERS:
             raise RefusedError(f"{name} = {value:g}", 0, f"it stays at {taken:g}")

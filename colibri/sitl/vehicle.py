@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from math import dist, nan, pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from colibri.autopilot.commander.rules.modes import Mode, custom_mode
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.identities import CONVENTIONS
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.process.station_events import StationEvents
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
@@ -80,6 +81,7 @@ class Sitl(View, Stepped, Steered):
 
     def __init__(self, setting: Setting, lockstep: LockstepSession, origin: Geodetic) -> None:
         self.setting = setting
+        self._conventions = CONVENTIONS[setting.identity]
         self.origin = origin
         self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
         self.record = Record()
@@ -160,6 +162,10 @@ class Sitl(View, Stepped, Steered):
         east, north, from_m = self.position
         if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
             from_m = self.home[2]  # home is where it is armed, unless it was set elsewhere
+        first = self._conventions.modes.takeoff
+        if first is not None:
+            self._select(first, "the mode of take-off")
+            self.arm()
         self.gcs.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m, what="take-off")
         if not self.armed:
             self.arm()
@@ -219,10 +225,17 @@ class Sitl(View, Stepped, Steered):
             self.arm()
 
     def select(self, mode: Mode | str) -> None:
-        """Change the flight mode."""
-        number = custom_mode(Mode(_chosen("mode", mode, tuple(Mode))))
-        params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
-        self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
+        """Change the flight mode, by its name here or with the identity, such as "GUIDED"."""
+        book = self._conventions.modes
+        shown = {each.name: each.number for each in book.modes}
+        number = shown.get(mode)
+        if number is None:
+            number = book.chosen[Mode(_chosen("mode", mode, (*Mode, *shown)))]
+        self._select(number, mode)
+
+    def _select(self, number: int, name: str) -> None:
+        params = self._conventions.modes.as_command(number)
+        self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {name}")
 
     def command(self, number: int, *params: float) -> int:
         """Send a COMMAND_LONG and return any MAV_RESULT; missing parameters are 0."""
@@ -233,10 +246,20 @@ class Sitl(View, Stepped, Steered):
         self.select(Mode.MISSION)
         if not self.armed:
             self.arm()
+        if self._mission_waits:
+            self.gcs.command(mav.MAV_CMD_MISSION_START, what="the mission")
+
+    @property
+    def _mission_waits(self) -> bool:
+        book = self._conventions.modes
+        return book.numbers[book.chosen[Mode.MISSION]].waits and self.mode is not Mode.MISSION
 
     def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload a mission."""
-        self.gcs.upload(on_wire(plan, self.origin), MISSION)
+        """Upload a mission; where item 0 is home, it is put before the plan."""
+        wire = on_wire(plan, self.origin)
+        if self._conventions.wire.home_first:
+            wire = [*on_wire([items.waypoint(0.0, 0.0, 0.0)], self.origin), *map(_after_home, wire)]
+        self.gcs.upload(wire, MISSION)
 
     def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a geofence of `items.polygon` and `items.circle`."""
@@ -352,9 +375,16 @@ class Sitl(View, Stepped, Steered):
         """Connect another component on its own link; `beats` sends HEARTBEAT."""
         number = len(self._stations) + 1
         trouble, seed = self.link.ground, self.setting.seed
-        station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)
+        by_bits = not self._conventions.wire.numbers_as_floats
+        who = {"system": system, "component": component}
+        station = Station(self, number, **who, trouble=trouble, seed=seed, beats=beats, by_bits=by_bits)
         self._stations.append(station)
         return station
+
+
+def _after_home(item: MissionItem) -> MissionItem:
+    """Return an item whose jump counts home as item 0."""
+    return item._replace(p1=item.p1 + 1.0) if item.command == mav.MAV_CMD_DO_JUMP else item
 
 
 def _chosen(what: str, name: str, names: Sequence[str]) -> str:

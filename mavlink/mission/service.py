@@ -160,8 +160,9 @@ class MissionService:
     def _described(self, progress: MissionProgress) -> list[Send]:
         """Return the text of an item that has begun since the last call."""
         describe, shown, items = self._vehicle.describe, self._shown, self.plans[MISSION].items
-        active = progress.state == mav.MISSION_STATE_ACTIVE and progress.seq < len(items)
-        if describe is None or not active or (shown and shown[:2] == progress[:2]):
+        begun = progress.state in (mav.MISSION_STATE_ACTIVE, mav.MISSION_STATE_COMPLETE) and progress.seq < len(items)
+        again = shown is not None and (shown.seq == progress.seq and shown.state != mav.MISSION_STATE_NOT_STARTED)
+        if describe is None or not begun or again:
             return []
         return self._text.say(INFO, describe(progress.seq + self._offset, items[progress.seq]))
 

@@ -115,6 +115,7 @@ class Parameters:
             raise ValueError("two parameters have one name")
         self._initial = {parameter.name: parameter.default for parameter in self._definitions} | dict(initial)
         self._values, self._links = dict(self._initial), links
+        self._followed: tuple[str, ...] = ()  # names of the last change's further changes
         self._made: object | None = None
         self.prepare = prepare
         self._ready: Ready | None = None
@@ -183,7 +184,7 @@ class Parameters:
         self.proposed.popleft()
         refusal = self._try(batch)
         if refusal is None or len(batch) == 1:
-            self.settled += [(name, refusal) for name in batch]
+            self.settled += [(name, refusal) for name in (*batch, *self._followed)]
             return
         changes, half = list(batch.items()), len(batch) // 2
         self.proposed.extendleft((dict(changes[half:]), dict(changes[:half])))
@@ -200,8 +201,10 @@ class Parameters:
         return definition.refusal(value) or (ParamError.READ_ONLY if definition.read_only else value)
 
     def _try(self, changes: Mapping[str, Value]) -> ParamError | None:
+        self._followed = ()
         if self._links is not None:
-            changes = {**self._links(changes, {**self._values, **changes}), **changes}
+            further = self._links(changes, {**self._values, **changes})
+            changes, self._followed = {**further, **changes}, tuple(further)
         changed = {name: value for name, value in changes.items() if value != self._values[name]}
         if not changed:
             return None

@@ -90,6 +90,9 @@ def ardupilot_parameters(vehicle: Vehicle) -> Values:
         "MOT_THST_EXPO": expo,
         "MOT_THST_HOVER": _within(_ARDUPILOT_HOVER, vehicle, "hover thrust", hover),
     }
+    values["BATT_MONITOR"] = 4  # voltage and current; without a monitor ArduCopter hides BATT_FS_* and its limits
+    if vehicle.battery is not None:
+        values["BATT_CAPACITY"] = round(1e3 * vehicle.battery.capacity_ah)
     if vehicle.sensors is not None:
         delay_ms = round(vehicle.sensors.gps.delay_s * 1e3)
         _within(_ARDUPILOT_DELAY_MS, vehicle, "sensors.gps.delay_s in ms", delay_ms)

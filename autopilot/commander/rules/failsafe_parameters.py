@@ -102,6 +102,20 @@ _BATTERY_ACTIONS = (
 )
 
 
+_COPTER_ACTIONS = {Condition.BATTERY_LOW: "BATT_FS_LOW_ACT", Condition.BATTERY_CRITICAL: "BATT_FS_CRT_ACT"}
+_COPTER_BATTERY = {
+    0: Action.WARN,
+    1: Action.LAND,
+    2: Action.RETURN,
+    3: Action.RETURN,
+    4: Action.LAND,
+    5: Action.TERMINATE,
+    6: Action.RETURN,
+    7: Action.HOLD,
+}
+"""Actions by ArduCopter's parameters, where they are defined."""
+
+
 def failsafe_parameters() -> list[Parameter]:
     return [*(number.parameter() for number in NUMBERS), *_actions()]
 
@@ -119,10 +133,15 @@ def limits(parameters: Parameters) -> Limits:
 
 def settings(parameters: Parameters) -> dict[Condition, FailsafeSetting]:
     known = limits(parameters)
+    by_identity = {
+        condition: _COPTER_BATTERY[int(parameters[name])]
+        for condition, name in _COPTER_ACTIONS.items()
+        if name in parameters
+    }
     return {
         row.condition: FailsafeSetting(
             round(known[row.delay] * _US) if row.delay else 0,
-            dict(row.choices)[int(parameters[row.parameter])],
+            by_identity.get(row.condition) or dict(row.choices)[int(parameters[row.parameter])],
         )
         for row in TABLE
     }

@@ -57,6 +57,8 @@ class ModeBook:
         saved: Number shown for a failsafe's mode.
         resumed: Number shown where a flight begins in the air.
         by_command: Returns the number of DO_SET_MODE's parameters 1 to 3, or a refusal.
+        as_command: Returns DO_SET_MODE's parameters 1 to 3 for a number.
+        takeoff: Number of the mode in which an armed vehicle takes NAV_TAKEOFF; None: in any, armed or not.
         by_message: Returns the number of SET_MODE's base and custom mode, or a refusal.
         unknown: Returns the refusal of an unknown number, with how the client wrote it.
         refusal: Returns the refusal of a known mode with its reason.
@@ -75,6 +77,8 @@ class ModeBook:
     refusal: Callable[[ShownMode, Refusal], Refusal]
     unarmable: Callable[[ShownMode], Refusal]
     base_modes: Callable[[ShownMode, State, int], BaseModes]
+    as_command: Callable[[int], tuple[float, float, float]]
+    takeoff: int | None = None
 
     @property
     def numbers(self) -> dict[int, ShownMode]:
@@ -127,4 +131,5 @@ PX4_MODES = ModeBook(
     refusal=lambda _, refusal: refusal,
     unarmable=lambda mode: Refusal(f"Arming denied in {mode.name}: choose another mode first"),
     base_modes=_base_modes,
+    as_command=lambda number: (float(CUSTOM), float(number >> 16 & 0xFF), float(number >> 24 & 0xFF)),
 )
