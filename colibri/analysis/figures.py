@@ -2,6 +2,7 @@
 
 import gc
 import signal
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from multiprocessing import get_context
@@ -17,7 +18,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from colibri.analysis.recording import INPUT, POSITION_REFERENCE, SETTLED_AFTER_S, rotor_names
 from colibri.analysis.report import length as in_metres
 from colibri.analysis.series.figure_series import ATTITUDE, POSITION, START_S, FigureSeries, Series
-from colibri.common.process.lifecycle import end_with, gc_frozen, handle_endings
+from colibri.common.process.lifecycle import EXIT_FAILED, end_with, gc_frozen, handle_endings
 from colibri.flights.launcher import can_fork
 from colibri.flights.plan import FlightPlan
 
@@ -106,7 +107,12 @@ def _draw(figures: Figures, names: Iterable[str], folder: Path, parent: int | No
         end_with(parent)
     with gc_frozen():
         for name in names:
-            write_figure(figures[name](), folder / name)
+            try:
+                write_figure(figures[name](), folder / name)
+            except OSError:
+                if parent is None:
+                    raise
+                sys.exit(EXIT_FAILED)  # the parent tries again, and reports it
             gc.collect()  # a figure is a net of circles, and its pixels take more than all that it shows
 
 

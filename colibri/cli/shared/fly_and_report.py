@@ -89,7 +89,11 @@ def _report(plan: FlightPlan, summary: FrameCount, *, figures: bool, quiet: bool
     if figures:
         from colibri.analysis.figures import draw_flight
 
-        draw_flight(flown, plan)
+        try:
+            draw_flight(flown, plan)
+        except OSError as error:
+            where = error.filename or plan.out
+            fail(f"cannot write {where}: {error.strerror}; the report is in {plan.out}", EXIT_FAILED)
     if not quiet:
         print_report(found, plan.out, flown_by=plan.flown_by)
     return found

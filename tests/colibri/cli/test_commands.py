@@ -177,6 +177,17 @@ def test_figures_that_find_no_room_are_one_line(
     assert refused("plot", tmp_path) == f"{tmp_path}: No space left on device"
 
 
+@pytest.mark.long
+def test_figures_of_either_process_fail_in_one_line(tmp_path: Path, ran: Ran) -> None:
+    ran("fly", "hover", "--link", "memory", "--duration", "0.1", "--no-figures", "--quiet", "--out", tmp_path)
+    for name in ("position", "attitude"):
+        (tmp_path / f"{name}.png").unlink(missing_ok=True)
+        (tmp_path / f"{name}.png").mkdir()
+        plot = [sys.executable, "-m", "colibri", "plot", str(tmp_path)]
+        done = subprocess.run(plot, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (2, f"colibri: error: {tmp_path}/{name}.png: Is a directory\n")
+
+
 def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, ran: Ran) -> None:
     options = ("--link", "memory", "--duration", "0.1", "--no-figures", "--out", tmp_path)
     said = ran("fly", "hover", "--controller", "geometric-se3", *options).out
