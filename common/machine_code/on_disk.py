@@ -105,7 +105,8 @@ class _OnDisk(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         super().save_overload(sig, data)
-        self._impl.drop_unused(_KEPT_UNUSED_S)
+        with suppress(OSError):  # another process may delete them, too
+            self._impl.drop_unused(_KEPT_UNUSED_S)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (*super()._index_key(sig, codegen), fields_of(sig))

@@ -5,7 +5,6 @@ compilation of a caller needs.
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 from glob import escape
 from pathlib import Path
@@ -35,11 +34,14 @@ class _Kept(NamedTuple):
     signature: Any
 
 
-class _Place(_CacheLocator):
+class Results(CompileResultCacheImpl, _CacheLocator):
+    """Writer and reader of compilation results for numba, in a folder and under a key."""
+
     def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
-        self._py_file = function.__code__.co_filename  # which numba's warnings name
-        self._folder = folder
-        self._key = key
+        self._py_file, self._lineno = function.__code__.co_filename, function.__code__.co_firstlineno
+        self._locator, self._folder, self._key = self, folder, key
+        self._prefix = f"{function.__module__}.{function.__qualname__}-".replace("<", "").replace(">", "")
+        self._filename_base = self._prefix + key
 
     def get_cache_path(self) -> str:
         return str(self._folder)
@@ -47,28 +49,14 @@ class _Place(_CacheLocator):
     def get_source_stamp(self) -> str:
         return self._key
 
-    def get_disambiguator(self) -> str:
-        return self._key
-
-
-class Results(CompileResultCacheImpl):
-    """Writer and reader of compilation results for numba, in a folder and under a key."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path, key: str) -> None:
-        self._lineno = function.__code__.co_firstlineno
-        self._locator = _Place(function, folder, key)
-        self._prefix = f"{function.__module__}.{function.__qualname__}-".replace("<", "").replace(">", "")
-        self._filename_base = self._prefix + key
+    get_disambiguator = get_source_stamp
 
     def drop_unused(self, for_s: float) -> None:
         """Delete files of this kernel's other versions that were not read for this time before the last one written."""
-        status = {}
-        for file in Path(self._locator.get_cache_path()).glob(f"{escape(self._prefix)}*"):
-            with suppress(OSError):
-                status[file] = file.stat()
-        now_s = max((it.st_mtime for it in status.values()), default=0.0)
-        for file, it in status.items():
-            if max(it.st_atime, it.st_mtime) < now_s - for_s:
+        files = {file: file.stat() for file in self._folder.glob(f"{escape(self._prefix)}*")}
+        before_s = max((it.st_mtime for it in files.values()), default=0.0) - for_s
+        for file, it in files.items():
+            if max(it.st_atime, it.st_mtime) < before_s:
                 file.unlink(missing_ok=True)
 
     def reduce(self, cres: Any) -> Any:

@@ -18,6 +18,7 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "sensors": {"feedback": "sensors", "turbulence": "light"},
     "tests": {"sitl": True},
 }
+_COUNT_EVERY_S = 5.0
 _SHARED_BY = 2
 """Processes that fly each: what one compiles, the other need not; further ones would mostly wait."""
 
@@ -41,29 +42,23 @@ def compile_all(names: Sequence[str], *, quiet: bool) -> int:
 
 @contextmanager
 def _progress() -> Iterator[None]:
-    """Count the functions in the cache on standard error: in one line of a terminal, in a log every ten seconds."""
+    """Count new machine code on standard error."""
     from colibri.common.machine_code.on_disk import folder_to_write
 
-    folder, ended, terminal = folder_to_write(), Event(), sys.stderr.isatty()
-
-    def kept() -> int:
-        return sum(1 for _ in folder.glob("*.nbc")) if folder else 0
+    folder, ended = folder_to_write(), Event()
 
     def count() -> None:
-        before = kept()
-        while not ended.wait(1.0 if terminal else 10.0):
-            line = f"compiling: {kept() - before} functions so far"
-            sys.stderr.write(f"\r{line}" if terminal else f"{line}\n")
-            sys.stderr.flush()
+        before = {*folder.glob("*.nbc")} if folder else set()
+        while folder and not ended.wait(_COUNT_EVERY_S):
+            sys.stderr.write(f"compiling: {len({*folder.glob('*.nbc')} - before)} functions so far\n")
 
-    thread = Thread(target=count, daemon=True)
+    thread = Thread(target=count)
     thread.start()
     try:
         yield
     finally:
         ended.set()
         thread.join()
-        sys.stderr.write("\n" if terminal else "")
 
 
 def _fly(name: str) -> None:
