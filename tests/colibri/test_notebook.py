@@ -35,11 +35,12 @@ def test_the_notebook_runs(tmp_path: Path) -> None:
     assert sum("text/html" in forms for forms in kept) == 2
 
 
-def test_the_notebook_of_the_model_holds() -> None:
-    cells = json.loads((DOCS / "notebooks" / "lpv-model.ipynb").read_text(encoding="utf-8"))["cells"]
+@pytest.mark.parametrize(("name", "asserts"), [("lpv-model", 6), pytest.param("gym", 4, marks=pytest.mark.long)])
+def test_what_a_notebook_asserts_holds(name: str, asserts: int) -> None:
+    cells = json.loads((DOCS / "notebooks" / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
     codes = [cell for cell in cells if cell["cell_type"] == "code"]
     exec("\n".join("".join(cell["source"]) for cell in codes), {})
-    assert sum("assert" in line for cell in codes for line in cell["source"]) == 6
+    assert sum("assert" in line for cell in codes for line in cell["source"]) == asserts
 
 
 def test_the_solver_of_the_page_flies(monkeypatch: pytest.MonkeyPatch) -> None:
