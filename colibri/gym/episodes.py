@@ -24,6 +24,7 @@ from colibri.common.matrices import norm
 from colibri.common.types import Array
 from colibri.gym import kernels
 from colibri.gym.errors import GymError
+from colibri.plant.environment.air import CALM
 from colibri.plant.environment.weather import Wind
 from colibri.plant.physics.integrators import RK4_STEP_S
 from colibri.plant.physics.parameters import parameters_of
@@ -138,6 +139,7 @@ class Episodes:
         if start not in ("near", "thrown"):
             raise GymError(unknown("start", start, ("near", "thrown")))
         within("gate_m", gate_m, 0.05, 100.0, "m")
+        self._last_built: tuple[list[tuple[str, Any]], tuple[Any, ...]] | None = None
         self.gate_m = 0.0 if gates is None else float(gate_m)
         if gates is None:
             self.reference = self._sampled("hover" if track is None else track, duration)
@@ -291,24 +293,25 @@ class Episodes:
         return np.ascontiguousarray(np.hstack([position(track.track, times_s, order) for order in (0, 1)]))
 
     def _drawn(self, values: Mapping[str, Any]) -> "Begun":
-        vehicle, wind = self.vehicle, Wind(0.0, 0.0)
-        lost = -1
+        wind, lost = Wind(0.0, 0.0), -1
         start: dict[str, float] = {}
+        changes: list[tuple[str, Any]] = []
         for key, value in values.items():
             if key == "wind":
                 wind = wind_of(value)
             elif key == "lost":
                 lost = value
             elif key.startswith("vehicle."):
-                vehicle = vehicle.replace(key.removeprefix("vehicle."), value)
+                changes.append((key.removeprefix("vehicle."), value))
             else:
                 start[key.removeprefix("start.")] = value
         for place, key in enumerate(_COORDINATES):
             start[key] = start.get(key, 0.0) + float(self._first[place])
-        start.setdefault("rotors", vehicle.hover_rpm)
+        vehicle, hover_rpm, whole, scale, mixer = self._built(changes)
+        start.setdefault("rotors", hover_rpm)
         world = starting_world(Start(**start), vehicle)
-        scale, mixer = scale_of(vehicle, self.max_rates)
-        parameters = packed(parameters_of(vehicle, wind.velocity_enu_m_s))
+        parameters = whole.copy()
+        parameters["wind_enu_m_s"] = wind.velocity_enu_m_s
         if not isinstance(lost, int) or not -1 <= lost < vehicle.rotors.count:
             most = vehicle.rotors.count - 1
             raise GymError(f'draw: lost must be a rotor, 0 to {most}, or -1, not "{shown(lost)}"')
@@ -325,6 +328,17 @@ class Episodes:
             mixer,
             scale,
         )
+
+    def _built(self, changes: list[tuple[str, Any]]) -> tuple[Any, ...]:
+        """Return the vehicle with changes, and what follows from it; the last one is kept."""
+        if self._last_built is None or self._last_built[0] != changes:
+            vehicle = self.vehicle
+            for key, value in changes:
+                vehicle = vehicle.replace(key, value)
+            parameters = packed(parameters_of(vehicle, CALM))
+            built = (vehicle, vehicle.hover_rpm, parameters, *scale_of(vehicle, self.max_rates))
+            self._last_built = changes, built
+        return self._last_built[1]
 
 
 class Begun(NamedTuple):

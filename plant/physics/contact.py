@@ -1,5 +1,6 @@
 """Check that the plant's fixed step can integrate a vehicle on the ground, by the poles of its contact points."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ class _Hardness(NamedTuple):
     slip_damping_n_s_m: float
 
 
+@lru_cache(maxsize=4)
 def check_contact(vehicle: Vehicle) -> None:
     """Raise a `VehicleError` with the largest valid values if the ground is too hard for the plant's step."""
     ground = vehicle.ground
