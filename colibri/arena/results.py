@@ -1,7 +1,7 @@
 """Table and figure of an arena: the worst of all starts, and published values beside."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from math import isnan
 from pathlib import Path
@@ -17,13 +17,15 @@ from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, write_fi
 from colibri.analysis.lost import LOST_M
 from colibri.analysis.tables import Row as Cells
 from colibri.analysis.tables import comma_separated, markdown
-from colibri.arena.sets import SETS, ArenaSet, Published, Row
+from colibri.arena.flights import Arena, Published, Row
 from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.spec import LawSpec
+from colibri.campaigns.figure import COLORS, make_room_for_names
 from colibri.campaigns.flights import Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.campaigns.results import CampaignResults
+from colibri.plant.vehicle.description import Vehicle
 
 CAP_M = LOST_M
 """Errors of a lost flight."""
@@ -37,7 +39,6 @@ _MAX_COLUMNS = 3
 _LEAST_MM = 0.1
 """Smallest error of the figure."""
 _PUBLISHED = ("#777777", "#BBBBBB")
-_COLORS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
 
 
 class Cell(NamedTuple):
@@ -57,11 +58,11 @@ class Cell(NamedTuple):
 
 
 class ArenaResults(CampaignResults):
-    """The results of an arena; its campaign has the name of the set, and factors `law` and `case`."""
+    """The results of an arena; its campaign has the name or path of the set, and factors `law` and `case`."""
 
     @cached_property
-    def arena(self) -> ArenaSet:
-        return SETS[self.campaign.name]()
+    def arena(self) -> Arena:
+        return Arena(self.campaign.name)
 
     @cached_property
     def cells(self) -> dict[tuple[str, Row], Cell]:
@@ -71,7 +72,7 @@ class ArenaResults(CampaignResults):
         for (law, case), places in self.groups().items():
             found.setdefault((law, case.rpartition(", start ")[0]), []).extend(places)
         laws = dict.fromkeys(law for law, _ in found)
-        every = ((law, row) for law in laws for row in self.arena.rows())
+        every = ((law, row) for law in laws for row in self.arena.set.rows())
         return {(law, row): self._cell(found[law, str(row)], values) for law, row in every if (law, str(row)) in found}
 
     def _cell(self, places: list[int], values: Any) -> Cell:
@@ -91,7 +92,9 @@ class ArenaResults(CampaignResults):
 
     def table(self) -> tuple[Cells, list[Cells]]:
         """Return mean errors, mm: a row for each track, speed and disturbance, a column for each law."""
-        published = {(each.law, row): value for each in self.arena.published for row, value in self._published(each)}
+        published = {
+            (each.law, row): value for each in self.arena.set.published for row, value in self._published(each)
+        }
         laws, others = (list(dict.fromkeys(law for law, _ in found)) for found in (self.cells, published))
         lines: list[Cells] = []
         for row, thrust in self._thrust.items():
@@ -105,8 +108,10 @@ class ArenaResults(CampaignResults):
         """Return for each law its rate and preview, lost flights, and figures over all rows."""
         lines: list[Cells] = []
         for level in self.campaign.grid["law"]:
-            law = build_law(level.settings, self.arena)
+            law = build_law(level.settings, self.arena.vehicle())
             cells = [cell for (name, _), cell in self.cells.items() if name == level.name]
+            if not cells:
+                continue
             ahead_s = 1e-6 * law.preview.interval_us * (law.preview.samples - 1)
             counts = [sum(column) for column in list(zip(*cells, strict=True))[:2]]
             lost = f"{counts[1]} of {counts[0]}"
@@ -127,11 +132,11 @@ class ArenaResults(CampaignResults):
 
     @cached_property
     def _thrust(self) -> dict[Row, float]:
-        return {row: round(self.arena.thrust(row), 3) for row in self.arena.rows()}
+        return {row: round(self.arena.thrust(row), 3) for row in self.arena.set.rows()}
 
     def _published(self, each: Published) -> Iterator[tuple[Row, float]]:
         for track, values in each.mean_mm.items():
-            for speed, value in zip(self.arena.speeds[track], values, strict=True):
+            for speed, value in zip(self.arena.set.speeds[track], values, strict=True):
                 yield Row(track, speed, each.world), value
 
     def save(self, folder: str | Path, *, parquet: bool = False) -> Path:
@@ -142,7 +147,7 @@ class ArenaResults(CampaignResults):
         if not self.flown:
             return path
         rows = self.rows_by_law()
-        sources = "".join(f"\n{each.law}: {each.source}.\n" for each in self.arena.published)
+        sources = "".join(f"\n{each.law}: {each.source}.\n" for each in self.arena.set.published)
         text = f"{markdown(*self.table(), names=3)}\n{markdown(*self.law_table(), names=1)}{sources}"
         (path / "arena.md").write_text(text, encoding="utf-8")
         lines = [tuple("" if cell is None else str(cell) for cell in row.values()) for row in rows]
@@ -155,57 +160,69 @@ class ArenaResults(CampaignResults):
     def plot(self, metric: str | None = None) -> Figure:
         """Return mean errors over speed, or over disturbances where tracks have one speed, a panel for each track."""
         del metric
-        by_speed = any(len(speeds) > 1 for speeds in self.arena.speeds.values())
-        tracks, worlds = list(self.arena.tracks), list(self.arena.worlds)
-        columns = min(_MAX_COLUMNS, len(tracks))
+        by_speed = any(len(speeds) > 1 for speeds in self.arena.set.speeds.values())
+        tracks = list(self.arena.set.tracks)
+        columns = min(_MAX_COLUMNS if by_speed else 2, len(tracks))
         figure, grid = axes_grid(-(-len(tracks) // columns), columns, TOP_IN + 0.3, row_in=2.6, share=False)
-        figure.subplots_adjust(hspace=0.42)
         panels = [axes for line in grid for axes in line]
         for axes, name in zip(panels, tracks, strict=False):
             rows = [row for row in self._thrust if row.track == name]
-            for number, law in enumerate(dict.fromkeys(law for law, _ in self.cells)):
-                for world in worlds if by_speed else [""]:
-                    shown = [row for row in rows if not by_speed or row.world == world]
-                    along = [row.speed if by_speed else worlds.index(row.world) for row in shown]
-                    style: dict[str, Any] = {
-                        "color": _COLORS[number % len(_COLORS)],
-                        "marker": "o",
-                        "markersize": 3,
-                        "linewidth": 1.2,
-                    }
-                    style |= {"linestyle": "-" if world == worlds[0] else "--" if by_speed else "none"}
-                    label = f"{law}, {world}" if by_speed and len(worlds) > 1 else law
-                    axes.plot(along, [self.cells[law, row].mean_mm for row in shown], label=label, **style)
-            for number, each in enumerate(self.arena.published):
-                values = [value for row, value in self._published(each) if row.track == name]
-                style = {"color": _PUBLISHED[number % len(_PUBLISHED)], "linestyle": ":", "marker": "x"}
-                axes.plot(self.arena.speeds[name], values, label=f"{each.law}, published", **style)
-            self._dress(axes, name, by_speed=by_speed)
+            (self._over_speeds if by_speed else self._over_worlds)(axes, name, rows)
+            axes.grid(**GRID)
+            axes.set_title(name, fontsize="medium")
         for axes in panels[len(tracks) :]:
             axes.set_visible(False)
-        put_head(figure, f"Arena {self.campaign.name}: worst mean position error", columns=4)
+        figure.subplots_adjust(hspace=0.42)
+        if not by_speed:
+            make_room_for_names(figure, self.arena.set.worlds)
+            figure.subplots_adjust(wspace=0.12)
+            for axes in (axes for line in grid for axes in line[1:]):
+                axes.tick_params(labelleft=False)
+        shaded = "; shaded: more thrust than the rotors have" if by_speed else ""
+        put_head(figure, f"Arena {Path(self.campaign.name).stem}: mean position error, worst start{shaded}", columns=5)
         return figure
 
-    def _dress(self, axes: Axes, name: str, *, by_speed: bool) -> None:
-        axes.set_yscale("log")
-        axes.set_ylim(_LEAST_MM, 2.0 * _MM * CAP_M)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.grid(**GRID)
-        axes.set_title(name, fontsize="medium")
-        axes.set_ylabel("mean error (mm)")
-        worlds = list(self.arena.worlds)
-        if not by_speed:
-            axes.set_xticks(range(len(worlds)), worlds, rotation=20, ha="right", fontsize="small")
-            return
-        axes.set_xlabel("top speed (m/s)")
-        for row, thrust in self._thrust.items():
-            if row.track == name and row.world == worlds[0] and thrust > 1.0:
+    def _over_speeds(self, axes: Axes, name: str, rows: Sequence[Row]) -> None:
+        for law, color, known in self._curves(rows):
+            values = [self.cells[law, row].mean_mm for row in known]
+            axes.plot([row.speed for row in known], values, label=law, color=color, marker="o", markersize=3)
+        for each, color in zip(self.arena.set.published, _PUBLISHED, strict=False):
+            values = [value for row, value in self._published(each) if row.track == name]
+            style: dict[str, Any] = {"color": color, "linestyle": ":", "marker": "x"}
+            axes.plot(self.arena.set.speeds[name], values, label=f"{each.law}, published", **style)
+        for row in rows:
+            if self._thrust[row] > 1.0:
                 axes.axvspan(row.speed - 0.5, row.speed + 0.5, color="#D55E00", alpha=0.12, linewidth=0)
+        axes.set_xticks(self.arena.set.speeds[name], [f"{speed:g}" for speed in self.arena.set.speeds[name]])
+        axes.set_xlabel("top speed (m/s)")
+        axes.set_ylabel("mean error (mm)")
+        axes.set_yscale("log")
+        axes.set_ylim(_LEAST_MM, 1.6 * _MM * CAP_M)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+    def _over_worlds(self, axes: Axes, _name: str, rows: Sequence[Row]) -> None:
+        curves = list(self._curves(rows))
+        for number, (law, color, known) in enumerate(curves):
+            shift = 0.5 * (number - 0.5 * (len(curves) - 1)) / len(curves)
+            places = [rows.index(row) + shift for row in known]
+            style: dict[str, Any] = {"color": color, "linestyle": "none", "marker": "o", "markersize": 4}
+            axes.plot([self.cells[law, row].mean_mm for row in known], places, label=law, **style)
+        axes.set_yticks(range(len(rows)), [row.world for row in rows])
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_xlabel("mean error (mm)")
+        axes.set_xscale("log")
+        axes.set_xlim(_LEAST_MM, 1.6 * _MM * CAP_M)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+    def _curves(self, rows: Sequence[Row]) -> Iterator[tuple[str, str, list[Row]]]:
+        """Yield each law with its colour and the rows that it has flown."""
+        for number, law in enumerate(dict.fromkeys(law for law, _ in self.cells)):
+            yield law, COLORS[number % len(COLORS)], [row for row in rows if (law, row) in self.cells]
 
 
-def build_law(settings: Mapping[str, Any], arena: ArenaSet) -> Any:
+def build_law(settings: Mapping[str, Any], vehicle: Vehicle) -> Any:
     spec = LawSpec(**settings)
-    return build_controller(spec.chosen(load_profile(spec.profile)), arena.vehicle, perf_counter, spec.law)
+    return build_controller(spec.chosen(load_profile(spec.profile)), vehicle, perf_counter, spec.law)
 
 
 def _plain(value: float) -> float | None:

@@ -3,11 +3,12 @@
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 from colibri.analysis.tables import print_table
+from colibri.arena.flights import MAX_STARTS, Arena
 from colibri.arena.results import METRICS, ArenaResults
-from colibri.arena.sets import MAX_STARTS, SETS
 from colibri.autopilot.control.law_files import full_name, is_place, table_of
 from colibri.autopilot.control.profile import profile_names
 from colibri.autopilot.control.registry import controller_names
@@ -29,7 +30,7 @@ def arena(args: Namespace) -> int:
     for name in dict.fromkeys(args.sets):
         planned = planned_of(name, laws, args.starts)
         planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
-        out = args.out / name
+        out = args.out / Path(name).stem
         with closing(FlightBar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             results = fly_campaign(
                 planned,
@@ -50,12 +51,10 @@ def arena(args: Namespace) -> int:
 
 def planned_of(name: str, laws: dict[str, dict[str, Any]], starts: int) -> Campaign:
     """Return the campaign of a set; its cases are the rows, from each start."""
-    if name not in SETS:
-        raise CampaignError(unknown("set", name, SETS))
     if not 1 <= starts <= MAX_STARTS:
         raise CampaignError(f'starts: must be 1 to {MAX_STARTS}, not "{starts}"')
-    flown = SETS[name]()
-    cases = {f"{row}, start {start}": flown.settings(row, start) for row in flown.rows() for start in range(starts)}
+    flown = Arena(name)
+    cases = {f"{row}, start {start}": flown.settings(row, start) for row in flown.set.rows() for start in range(starts)}
     return campaign_of(CampaignTables(name=name, grid={"law": laws, "case": cases}, metrics=METRICS))
 
 

@@ -10,11 +10,11 @@ import pytest
 
 import colibri
 from colibri.arena import run
+from colibri.arena.flights import Arena, Row, set_names
 from colibri.arena.results import ArenaResults
 from colibri.arena.run import laws_of, planned_of
-from colibri.arena.sets import SETS, ArenaSet, Published, Row
-from colibri.campaigns.flights import FlightResult, Verdict
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.campaigns.flights import FlightResult, Verdict, check, common_of
+from colibri.plant.vehicle.description import vehicle_text
 from tests.support.campaigns import Here
 from tests.support.commands import Refused
 from tests.support.pages import ROOT
@@ -35,30 +35,42 @@ class Lifts:
 """
 
 
-def small() -> ArenaSet:
-    published = (Published("theirs", "a paper of 2024", "calm", {"circle": (7.0, 8.0)}),)
-    return ArenaSet(
-        "two short circles",
-        load_vehicle("hummingbird"),
-        {"circle": "ramped:curve=circle,acceleration=5,speed={speed}"},
-        {"circle": (10.0, 20.0)},
-        {"calm": {}, "heavy": {"plant-vehicle.body.mass_kg*": 1.1}},
-        3.0,
-        published,
-    )
+SMALL = """
+vehicle = "mine.toml"
+duration_s = 3
+[tracks]
+circle = "ramped:curve=circle,acceleration=5,speed={speed}"
+[speeds]
+circle = [10, 20]
+[worlds.calm]
+[worlds.heavy]
+"plant-vehicle.body.mass_kg*" = 1.1
+[[published]]
+law = "theirs"
+source = "a paper of 2024"
+world = "calm"
+[published.mean_mm]
+circle = [7, 8]
+"""
 
 
-def test_the_race_has_25_cells_told_and_not_told() -> None:
-    race = SETS["race"]()
-    rows = list(race.rows())
-    assert len(rows) == 50
+def test_the_race_has_25_cells() -> None:
+    race = Arena("race")
+    rows = list(race.set.rows())
+    assert len(rows) == len(list(Arena("race-told").set.rows())) == 25
     beyond = {(row.track, row.speed) for row in rows if race.thrust(row) > 1.0}
     wrapped = {("wrapped-circle", 10.0), ("wrapped-lemniscate", 8.0), ("wrapped-lemniscate", 10.0)}
     assert beyond == wrapped | {("tilted-circle", 12.5), ("lemniscate", 12.5), ("wrapped-circle", 12.5)}
     planned = planned_of("race", laws_of(["agile"]), 5)
-    assert planned.flights == 250
+    assert planned.flights == 125
     first, second = (level.settings["start"] for level in planned.grid["case"][:2])
     assert np.hypot.reduce([first[axis] - second[axis] for axis in "xyz"]) == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("name", set_names())
+def test_flights_of_a_set_can_begin(name: str) -> None:
+    planned = planned_of(name, laws_of(["se3"]), 1)
+    assert check([next(planned.points())], common_of(planned)) == []
 
 
 def test_a_set_is_flown_with_a_file_of_ones_own(
@@ -67,12 +79,13 @@ def test_a_set_is_flown_with_a_file_of_ones_own(
     from colibri.cli.main import main
 
     (tmp_path / "own.py").write_text(LAW, encoding="utf-8")
-    monkeypatch.setitem(SETS, "race", small)
+    (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(vehicle_text("hummingbird"), encoding="utf-8")
     monkeypatch.setattr(run, "engine_of", lambda *_: Here())
     options = ["--law", "se3", "--law", f"{tmp_path}/own.py", "--starts", "1", "--out", str(tmp_path / "out")]
-    assert main(["arena", "race", *options]) == 0
+    assert main(["arena", f"{tmp_path}/small.toml", *options]) == 0
     assert "circle" in capsys.readouterr().out
-    folder = tmp_path / "out" / "race"
+    folder = tmp_path / "out" / "small"
     assert {path.name for path in folder.iterdir()} >= {"arena.md", "arena.png", "flights.csv"}
     with (folder / "arena.csv").open(encoding="utf-8", newline="") as file:
         rows = {(row["law"], row["speed_m_s"], row["disturbance"]): row for row in csv.DictReader(file)}
@@ -120,3 +133,17 @@ def test_laws_of_the_examples_hold_a_point(law: str) -> None:
     flight = colibri.fly("hover", controller=f"{ROOT}/examples/laws/{law}.py", link="direct", duration=3.0, start=start)
     assert flight.lost is None
     assert abs(flight.samples["x"][-1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("circle = [10, 20]", "", "tracks.circle: needs both {speed} and speeds.circle, or neither"),
+        ("[7, 8]", "[7]", "published: theirs: circle needs a value for each of its speeds, and a world"),
+        ('"mine.toml"', "3", "vehicle: Expected `str`, got `int`"),
+    ],
+)
+def test_a_wrong_set_is_one_line(tmp_path: Path, refused: Refused, old: str, new: str, why: str) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL.replace(old, new), encoding="utf-8")
+    assert refused("arena", str(path)) == f"{path}: {why}"
