@@ -22,14 +22,14 @@ _INTERVAL_S = 0.02
 
 
 class Row(NamedTuple):
-    """A row of the table: a track, by its name and top speed, m/s (0: its only one), under a disturbance."""
+    """A row of the table: a track, by its name and top speed (0: its only one), under a disturbance."""
 
     track: str
-    speed: float
+    speed_m_s: float
     world: str
 
     def __str__(self) -> str:
-        return f"{self.track} {self.speed:g}, {self.world}"
+        return f"{self.track} {self.speed_m_s:g}, {self.world}"
 
 
 class Published(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -116,7 +116,7 @@ class Arena:
         return float(vehicle.body.mass_kg * np.linalg.norm(needed, axis=1).max() / vehicle.max_wrench()[0])
 
     def _track(self, row: Row) -> tuple[str, Track]:
-        text = self.set.tracks[row.track].format(speed=row.speed)
+        text = self.set.tracks[row.track].format(speed=row.speed_m_s)
         return text, track(text)
 
 

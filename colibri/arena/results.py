@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from math import isnan
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -31,10 +30,6 @@ CAP_M = LOST_M
 """Errors of a lost flight."""
 METRICS = tuple(map(Metric, ("mean_error_m", "rmse_m", "max_error_m", "control_step_us.p50", "max_tilt_deg")))
 _MM = 1e3
-_COLUMNS = (
-    *("law", "track", "speed_m_s", "disturbance", "thrust", "flights", "lost"),
-    *("mean_mm", "rms_mm", "largest_mm", "step_us", "tilt_deg"),
-)
 _MAX_COLUMNS = 3
 _LEAST_MM = 0.1
 """Smallest error of the figure."""
@@ -80,15 +75,14 @@ class ArenaResults(CampaignResults):
         of_flights = values[places]
         of_flights[away, :3] = CAP_M
         worst = np.nanmax(of_flights, axis=0, initial=0.0) * (_MM, _MM, _MM, 1.0, 1.0)
-        return Cell(len(places), int(away.sum()), *map(float, worst))
+        return Cell(len(places), int(away.sum()), *(round(float(value), 3) for value in worst))
 
     def rows_by_law(self) -> list[dict[str, Any]]:
         """Return a row for each law, track, speed and disturbance, as plain data; thrust in parts of the rotors'."""
-        figures = {key: (_plain(value) for value in cell[2:]) for key, cell in self.cells.items()}
-        rows = [
-            (law, *row, self._thrust[row], *cell[:2], *figures[law, row]) for (law, row), cell in self.cells.items()
+        return [
+            {"law": law, **row._asdict(), "thrust": self._thrust[row], **cell._asdict()}
+            for (law, row), cell in self.cells.items()
         ]
-        return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
 
     def table(self) -> tuple[Cells, list[Cells]]:
         """Return mean errors, mm: a row for each track, speed and disturbance, a column for each law."""
@@ -98,7 +92,7 @@ class ArenaResults(CampaignResults):
         laws, others = (list(dict.fromkeys(law for law, _ in found)) for found in (self.cells, published))
         lines: list[Cells] = []
         for row, thrust in self._thrust.items():
-            speed = f"{row.speed:g}" if row.speed else ""
+            speed = f"{row.speed_m_s:g}" if row.speed_m_s else ""
             flown = (str(self.cells.get((law, row), "")) for law in laws)
             said = (f"{published[law, row]:g}" if (law, row) in published else "" for law in others)
             lines.append((row.track, speed, row.world, f"{thrust:.2f}", *flown, *said))
@@ -113,21 +107,11 @@ class ArenaResults(CampaignResults):
             if not cells:
                 continue
             ahead_s = 1e-6 * law.preview.interval_us * (law.preview.samples - 1)
-            counts = [sum(column) for column in list(zip(*cells, strict=True))[:2]]
-            lost = f"{counts[1]} of {counts[0]}"
+            lost = f"{sum(cell.lost for cell in cells)} of {sum(cell.flights for cell in cells)}"
             mean, most = np.mean([cell.mean_mm for cell in cells]), max(cell.largest_mm for cell in cells)
-            step = np.median([cell.step_us for cell in cells])
-            figures = (f"{mean:.1f}", f"{most:.0f}", f"{step:.0f}")
+            figures = (f"{mean:.1f}", f"{most:.0f}", f"{np.median([cell.step_us for cell in cells]):.0f}")
             lines.append((level.name, f"{law.control_interval_us / 1e3:g}", f"{ahead_s:g}", lost, *figures))
-        headings = (
-            "law",
-            "every (ms)",
-            "preview (s)",
-            "lost",
-            "mean of all rows (mm)",
-            "largest (mm)",
-            "step, p50 (µs)",
-        )
+        headings = ("law", "every (ms)", "preview (s)", "lost", "mean of rows (mm)", "largest (mm)", "step (µs)")
         return headings, lines
 
     @cached_property
@@ -150,8 +134,8 @@ class ArenaResults(CampaignResults):
         sources = "".join(f"\n{each.law}: {each.source}.\n" for each in self.arena.set.published)
         text = f"{markdown(*self.table(), names=3)}\n{markdown(*self.law_table(), names=1)}{sources}"
         (path / "arena.md").write_text(text, encoding="utf-8")
-        lines = [tuple("" if cell is None else str(cell) for cell in row.values()) for row in rows]
-        (path / "arena.csv").write_text(comma_separated(_COLUMNS, lines), encoding="utf-8")
+        lines = [tuple(map(str, row.values())) for row in rows]
+        (path / "arena.csv").write_text(comma_separated(tuple(rows[0]), lines), encoding="utf-8")
         facts = {"set": self.campaign.name, "cap_m": CAP_M, "rows": rows}
         (path / "arena.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
         write_figure(self.plot(), path / "arena")
@@ -185,14 +169,14 @@ class ArenaResults(CampaignResults):
     def _over_speeds(self, axes: Axes, name: str, rows: Sequence[Row]) -> None:
         for law, color, known in self._curves(rows):
             values = [self.cells[law, row].mean_mm for row in known]
-            axes.plot([row.speed for row in known], values, label=law, color=color, marker="o", markersize=3)
+            axes.plot([row.speed_m_s for row in known], values, label=law, color=color, marker="o", markersize=3)
         for each, color in zip(self.arena.set.published, _PUBLISHED, strict=False):
             values = [value for row, value in self._published(each) if row.track == name]
             style: dict[str, Any] = {"color": color, "linestyle": ":", "marker": "x"}
             axes.plot(self.arena.set.speeds[name], values, label=f"{each.law}, published", **style)
         for row in rows:
             if self._thrust[row] > 1.0:
-                axes.axvspan(row.speed - 0.5, row.speed + 0.5, color="#D55E00", alpha=0.12, linewidth=0)
+                axes.axvspan(row.speed_m_s - 0.5, row.speed_m_s + 0.5, color="#D55E00", alpha=0.12, linewidth=0)
         axes.set_xticks(self.arena.set.speeds[name], [f"{speed:g}" for speed in self.arena.set.speeds[name]])
         axes.set_xlabel("top speed (m/s)")
         axes.set_ylabel("mean error (mm)")
@@ -223,7 +207,3 @@ class ArenaResults(CampaignResults):
 def build_law(settings: Mapping[str, Any], vehicle: Vehicle) -> Any:
     spec = LawSpec(**settings)
     return build_controller(spec.chosen(load_profile(spec.profile)), vehicle, perf_counter, spec.law)
-
-
-def _plain(value: float) -> float | None:
-    return None if isnan(value) else round(value, 3)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from qpsolvers import solve_qp
+from scipy.spatial.transform import Rotation
 
 import colibri
 
@@ -82,15 +83,9 @@ class Nmpc:
         x = np.cross(y, z)
         across = jerk / length
         rates = np.stack([-(across * y).sum(1), (across * x).sum(1), yaw_rate * z[:, 2]], 1)
-        turned = []
-        for axes in np.stack([x, y, z], axis=2):
-            # The eigenvector of Bar-Itzhack (2000) is the quaternion of a rotation matrix, without a special case.
-            (a, b, c), (d, e, f), (g, h, i) = axes
-            rows = [[a - e - i, d + b, g + c, h - f], [d + b, e - a - i, h + f, c - g]]
-            rows += [[g + c, h + f, i - a - e, d - b], [h - f, c - g, d - b, a + e + i]]
-            q = np.roll(np.linalg.eigh(np.array(rows))[1][:, -1], 1)
-            near = q if q @ near >= 0.0 else -q
-            turned.append(near)
+        turned = np.roll(Rotation.from_matrix(np.stack([x, y, z], axis=2)).as_quat(), 1, axis=1)
+        for k in range(NODES):
+            near = turned[k] = turned[k] if turned[k] @ near >= 0.0 else -turned[k]
         thrusts = np.repeat(self.hover * length / self.gravity[2], 4, axis=1)
         return np.hstack([p, turned, v, rates]), thrusts
 

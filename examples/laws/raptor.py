@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from foundation_policy import QuadrotorPolicy
+from scipy.spatial.transform import Rotation
 
 import colibri
 
@@ -41,17 +42,9 @@ class Raptor:
         state = self.frame.state(state)
         off = np.clip(state.position_enu_m - references.position_enu_m[0], -FARTHEST_M, FARTHEST_M)
         drift = np.clip(state.velocity_enu_m_s - references.velocity_enu_m_s[0], -FASTEST_M_S, FASTEST_M_S)
-        # The policy holds a heading of zero.
         yaw = references.yaw_rad[0] + np.radians(self.frame.yaw_deg)
-        level = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
-        w, x, y, z = state.attitude
-        attitude = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        level = Rotation.from_euler("z", -yaw).as_matrix()  # the policy holds a heading of zero
+        attitude = Rotation.from_quat(np.roll(state.attitude, -1)).as_matrix()
         seen = [*(level @ off), *(level @ attitude).ravel(), *(level @ drift), *state.rate_flu_rad_s, *memory.action]
         self.memory.state = memory.hidden
         action = self.policy.evaluate_step(np.array([seen]))[0]

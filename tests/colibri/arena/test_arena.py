@@ -58,7 +58,7 @@ def test_the_race_has_25_cells() -> None:
     race = Arena("race")
     rows = list(race.set.rows())
     assert len(rows) == len(list(Arena("race-told").set.rows())) == 25
-    beyond = {(row.track, row.speed) for row in rows if race.thrust(row) > 1.0}
+    beyond = {(row.track, row.speed_m_s) for row in rows if race.thrust(row) > 1.0}
     wrapped = {("wrapped-circle", 10.0), ("wrapped-lemniscate", 8.0), ("wrapped-lemniscate", 10.0)}
     assert beyond == wrapped | {("tilted-circle", 12.5), ("lemniscate", 12.5), ("wrapped-circle", 12.5)}
     planned = planned_of("race", laws_of(["agile"]), 5)
@@ -88,7 +88,7 @@ def test_a_set_is_flown_with_a_file_of_ones_own(
     folder = tmp_path / "out" / "small"
     assert {path.name for path in folder.iterdir()} >= {"arena.md", "arena.png", "flights.csv"}
     with (folder / "arena.csv").open(encoding="utf-8", newline="") as file:
-        rows = {(row["law"], row["speed_m_s"], row["disturbance"]): row for row in csv.DictReader(file)}
+        rows = {(row["law"], row["speed_m_s"], row["world"]): row for row in csv.DictReader(file)}
     assert len(rows) == 8
     assert [rows[law, "10.0", "calm"]["lost"] for law in ("se3", "Lifts")] == ["0", "1"]
     assert float(rows["Lifts", "10.0", "calm"]["mean_mm"]) == 5000.0
