@@ -26,21 +26,15 @@ DEFAULT_LAWS = ("agile", "flight", "se3")
 
 def arena(args: Namespace) -> int:
     """Fly each set in a folder of its name, print its tables, and return the exit code."""
-    laws, code = laws_of(args.law or DEFAULT_LAWS), 0
-    for name in dict.fromkeys(args.sets):
-        planned = planned_of(name, laws, args.starts)
+    laws, sets, code = laws_of(args.law or DEFAULT_LAWS), list(dict.fromkeys(args.sets)), 0
+    if len(sets) > 1 and (args.json or args.junit):
+        raise CampaignError(f'{"--json" if args.json else "--junit"}: takes one set, not "{" ".join(sets)}"')
+    for name, planned in [(name, planned_of(name, laws, args.starts)) for name in sets]:
         planned = planned._replace(metrics=with_limits(planned.metrics, args.fail_above))
-        out = args.out / Path(name).stem
-        with closing(FlightBar(planned.name, planned.flights, quiet=args.quiet)) as bar:
-            results = fly_campaign(
-                planned,
-                engine_of(args.workers, args.dask),
-                out,
-                resume=args.resume,
-                progress=bar.ended,
-                begun=bar.begun,
-                kind=ArenaResults,
-            )
+        out, engine = args.out / Path(name).stem, engine_of(args.workers, args.dask)
+        with closing(FlightBar(name, planned.flights, quiet=args.quiet)) as bar:
+            watch: dict[str, Any] = {"progress": bar.ended, "begun": bar.begun}
+            results = fly_campaign(planned, engine, out, resume=args.resume, kind=ArenaResults, **watch)
         assert isinstance(results, ArenaResults)
         if not (args.quiet or args.json):
             print_table(f"{name}: worst mean error, mm; written to {out}", *results.table(), names=3)
@@ -69,6 +63,7 @@ def laws_of(given: Sequence[str]) -> dict[str, dict[str, Any]]:
         elif not is_place(text) and text not in controller_names():
             raise CampaignError(unknown("law", text, [*profile_names(), *controller_names(), "FILE.py[:CLASS]"]))
         else:
-            name = full_name(text) if is_place(text) else text
-            found[table_of(name)] = {"profile": profile_for(name), "controller": text}
+            law = full_name(text) if is_place(text) else text
+            name = table_of(law)
+            found[law if name in found else name] = {"profile": profile_for(law), "controller": text}
     return found

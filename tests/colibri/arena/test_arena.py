@@ -119,6 +119,7 @@ def test_the_worst_start_counts_and_a_lost_one_as_the_cap() -> None:
         (["rase"], 'unknown set "rase" (did you mean "race"?)'),
         (["race", "--starts", "9"], 'starts: must be 1 to 7, not "9"'),
         (["race", "--law", "agil"], 'unknown law "agil" (did you mean "agile"?)'),
+        (["race", "robust", "--json"], '--json: takes one set, not "race robust"'),
         (["race", "--law", "none.py"], "controller none.py: No such file or directory"),
         (["race", "--law", "agile", "--law", "agile"], 'law: "agile" is given twice'),
     ],
