@@ -27,7 +27,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--resume", action="store_true", help="continue the sets in --out")
     add_gate(add, None)
     add_junit(add)
-    add_out(add, "out/arena", "a folder for each set: tables and figure")
+    add_out(add, "out/arena", "the tables and the figure of each set")
 
 
 def run(args: Namespace) -> int:

@@ -92,8 +92,8 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             "fly control laws on the tracks and disturbances of a set, beside published values",
             "campaigns",
             """
-            colibri arena race --law agile --law my_law.py:Law    # 25 cells, not told and told
-            colibri arena policy --starts 1
+            colibri arena race --law agile --law my_law.py:Law    # the 25 cells of SSI-MPC
+            colibri arena robust policy --starts 1
             """,
         ),
         "study": CommandEntry(
