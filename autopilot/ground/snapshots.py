@@ -21,8 +21,10 @@ from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.guidance.guidance import Guidance
+from colibri.autopilot.guidance.tasks.guided import GuidedTask
 from colibri.common.compiled_rotations import quaternion_from_euler
 from colibri.common.types import Array, PerRotor, Vector
+from colibri.mavlink.setpoints.setpoints import PositionSetpoint
 from colibri.mavlink.telemetry.snapshot import (
     NO_SETPOINT,
     NOT_SOLVED,
@@ -113,6 +115,7 @@ class SnapshotBuilder:
             delay_us=pilot.sensed.delay_us,
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
             channels=pilot.sensed.steered.channels,
+            requested=requested(pilot.task.setpoint) if isinstance(pilot.task, GuidedTask) else None,
             flight_started_us=times.armed_us,
             takeoff_us=times.takeoff_us,
             landing_us=times.landing_us,
@@ -144,6 +147,13 @@ class SnapshotBuilder:
             *(squared, forecast, how.mass_kg, how.path_lag_s),
         )
         return self._solver
+
+
+def requested(setpoint: PositionSetpoint | None) -> Setpoint | None:
+    if setpoint is None:
+        return None
+    moves = (setpoint.velocity_m_s, setpoint.acceleration_m_s2)
+    return Setpoint(setpoint.position_enu_m, *moves, setpoint.yaw_rad, setpoint.yaw_rate_rad_s)
 
 
 def landed_state(pilot: Pilot, state: VehicleState) -> int:

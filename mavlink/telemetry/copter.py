@@ -8,7 +8,7 @@ from math import degrees, hypot, isfinite
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry import sensors
+from colibri.mavlink.telemetry import controller, sensors
 from colibri.mavlink.telemetry.encoder import (
     Encoder,
     boot_ms,
@@ -106,6 +106,16 @@ def rc_channels_raw(s: TelemetrySnapshot) -> Fields:
     return (boot_ms(s), 0, *(*s.channels, *(0,) * 8)[:8], _NO_RSSI)
 
 
+def position_target_local_ned(s: TelemetrySnapshot) -> Fields | None:
+    """POSITION_TARGET_LOCAL_NED (85): the client's setpoint in GUIDED, with its type mask."""
+    return None if s.requested is None else controller.position_target_local_ned(s._replace(setpoint=s.requested))
+
+
+def position_target_global_int(s: TelemetrySnapshot) -> Fields:
+    """POSITION_TARGET_GLOBAL_INT (87): the client's setpoint in GUIDED, or the law's."""
+    return controller.position_target_global_int(s if s.requested is None else s._replace(setpoint=s.requested))
+
+
 def _angles_frd(s: TelemetrySnapshot) -> tuple[float, float, float]:
     roll, pitch, yaw = euler_from_quaternion(s.attitude)
     return (roll, -pitch, yaw_ned(yaw))
@@ -126,6 +136,8 @@ _ENCODERS = {
     "FENCE_STATUS": fence_status,
     "RC_CHANNELS": rc_channels,
     "RC_CHANNELS_RAW": rc_channels_raw,
+    "POSITION_TARGET_LOCAL_NED": position_target_local_ned,
+    "POSITION_TARGET_GLOBAL_INT": position_target_global_int,
     "SCALED_IMU2": _second,
     "SCALED_IMU3": _second,
 }

@@ -128,6 +128,7 @@ class TelemetrySnapshot(NamedTuple):
     fence_breach_type: int = 0
     fence_breached_us: int = 0
     channels: tuple[int, ...] = ()  # of the radio, us
+    requested: Setpoint | None = None  # by a client in ArduPilot's GUIDED; without attitude
     load: float = 0.0  # computing time, part of the frame interval
     sensed: SensorFrame | None = None  # None under state feedback
     fix: GpsFix | None = None

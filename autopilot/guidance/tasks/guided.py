@@ -65,6 +65,11 @@ class GuidedTask(EndlessTask):
         self.paused = False
 
     @property
+    def setpoint(self) -> PositionSetpoint | None:
+        """The position setpoint that is flown."""
+        return self._setpoint if isinstance(self._setpoint, PositionSetpoint) else None
+
+    @property
     def order(self) -> Order:
         """The order that a restart goes on with."""
         setpoint = self._setpoint

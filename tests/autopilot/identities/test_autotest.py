@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from colibri.common.earth.geodesy import geodetic_of
-from colibri.mavlink.mission.items import FENCE
+from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
@@ -60,6 +60,23 @@ def held(sitl: Sitl, fact: Callable[[], bool], seconds: float, what: str = "") -
     while sitl.time_us < end:
         sitl.step()
         assert fact(), f"{what} at {sitl.time_us * 1e-6:.1f} s: {sitl.position} {sitl.velocity}"
+
+
+def reaches(sitl: Sitl, fact: Callable[[], bool], seconds: float, within: float, what: str) -> None:
+    """Fly on until a fact has held for some time."""
+    since_us = sitl.time_us
+    end = sitl.time_us + round(within * 1e6)
+    while sitl.time_us - since_us < seconds * 1e6:
+        sitl.step()
+        assert sitl.time_us < end, f"{what} for {seconds} s: {sitl.position} {sitl.velocity}"
+        if not fact():
+            since_us = sitl.time_us
+
+
+def speeds(sitl: Sitl, tolerance: float, seconds: float, *wanted: float) -> None:
+    for speed in wanted:
+        near = lambda speed=speed: abs(ground_speed(sitl) - speed) < tolerance  # noqa: E731
+        reaches(sitl, near, seconds, 60.0, f"{speed} m/s")
 
 
 def radio(sitl: Sitl, **channels: int) -> None:
@@ -186,7 +203,9 @@ def set_home(sitl: Sitl) -> None:
     assert abs(moved.altitude * 1e-3 - z) < 0.1
     for params in ((1.0,), (0.0,)):
         assert sitl.gcs.order_int(mav.MAV_CMD_DO_SET_HOME, *params, frame=GLOBAL, x=0, y=0) == ACCEPTED
-        assert dist((home().latitude, home().longitude), (first.latitude, first.longitude)) < 100
+        sitl.run(0.2)
+        back = home()
+        assert dist((back.latitude, back.longitude), (first.latitude, first.longitude)) < 100
         sitl.gcs.order_int(mav.MAV_CMD_DO_SET_HOME, frame=GLOBAL, x=x, y=y, z=z)
 
 
@@ -207,6 +226,33 @@ def no_radio(sitl: Sitl) -> None:
         sitl.command(mav.MAV_CMD_RUN_PREARM_CHECKS)
         says(sitl, words)
         assert sitl.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == FAILED
+
+
+def reboot(sitl: Sitl) -> None:
+    assert sitl.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0) == ACCEPTED
+    sitl.run(3.0)
+
+
+def initial_mode(sitl: Sitl) -> None:
+    sitl.set_param("INITIAL_MODE", LAND)
+    sitl.set_param("SIM_RC_FAIL", 1)
+    starts = sitl.get_param("STAT_BOOTCNT")
+    reboot(sitl)
+    in_mode(sitl, LAND)
+    assert sitl.get_param("STAT_BOOTCNT") == starts + 1
+    sitl.set_param("SIM_RC_FAIL", 0)
+    in_mode(sitl, STABILIZE)
+
+
+def mission_at_boot(sitl: Sitl) -> None:
+    upload(sitl, items.takeoff(5.0), items.waypoint(0.0, 5.0, 5.0), items.return_home())
+    for option, count in ((0, 4), (1, 0)):
+        sitl.set_param("MIS_OPTIONS", option)
+        reboot(sitl)
+        before = len(sitl.gcs.heard["MISSION_COUNT"])
+        sitl.send("MISSION_REQUEST_LIST", 1, 1, MISSION)
+        sitl.wait_until(lambda before=before: len(sitl.gcs.heard["MISSION_COUNT"]) > before, within=5.0)  # type: ignore[misc]
+        assert sitl.gcs.latest("MISSION_COUNT").count == count
 
 
 def fence_by_old_items(sitl: Sitl) -> None:
@@ -405,13 +451,11 @@ def pause_guided(sitl: Sitl) -> None:
 
 def speeds_in_mission(sitl: Sitl) -> None:
     legs = []
-    for place, speed in ((100.0, 4.0), (0.0, 15.0), (150.0, 10.0)):
+    for place, speed in ((60.0, 4.0), (500.0, 15.0), (150.0, 10.0)):
         legs += [items.change_speed(speed), items.waypoint(0.0, place, 20.0)]
     upload(sitl, items.takeoff(20.0), *legs, items.return_home())
     in_auto(sitl)
-    for speed, below in ((4.0, 0.5), (15.0, 0.5), (10.0, 0.5)):
-        sitl.wait_until(lambda speed=speed: abs(ground_speed(sitl) - speed) < 0.4, within=60.0)  # type: ignore[misc]
-        held(sitl, lambda speed=speed, below=below: abs(ground_speed(sitl) - speed) < below, 2.0, f"{speed} m/s")  # type: ignore[misc]
+    speeds(sitl, 0.5, 4.0, 4.0, 15.0, 10.0)
 
 
 def speeds_in_guided(sitl: Sitl) -> None:
@@ -419,8 +463,7 @@ def speeds_in_guided(sitl: Sitl) -> None:
     sitl.goto(0.0, 2000.0, 20.0, wait=False)
     for speed in (2.0, 10.0, 4.0):
         assert sitl.command(mav.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed) == ACCEPTED
-        sitl.wait_until(lambda speed=speed: abs(ground_speed(sitl) - speed) < 0.2, within=20.0)  # type: ignore[misc]
-        held(sitl, lambda speed=speed: abs(ground_speed(sitl) - speed) < 0.2, 10.0, f"{speed} m/s")  # type: ignore[misc]
+        speeds(sitl, 0.2, 10.0, speed)
 
 
 def speed_parameters(sitl: Sitl) -> None:
@@ -428,17 +471,16 @@ def speed_parameters(sitl: Sitl) -> None:
     in_auto(sitl)
     for speed in (7.0, 8.0, 11.0):
         sitl.set_param("WPNAV_SPEED", 100.0 * speed)
-        sitl.wait_until(lambda speed=speed: abs(ground_speed(sitl) - speed) < 1.0, within=30.0)  # type: ignore[misc]
-        held(sitl, lambda speed=speed: abs(ground_speed(sitl) - speed) < 1.0, 4.0, f"{speed} m/s")  # type: ignore[misc]
+        speeds(sitl, 1.0, 4.0, speed)
 
 
 def vertical_speed_parameters(sitl: Sitl) -> None:
-    upload(
-        sitl, items.takeoff(20.0), items.waypoint(0.0, 0.5, 120.0), items.waypoint(0.0, 0.0, 10.0), items.return_home()
-    )
+    up, down = items.waypoint(0.0, 0.5, 120.0), items.waypoint(0.0, 0.0, 10.0)
+    upload(sitl, items.takeoff(5.0), up, down, items.return_home())
     sitl.set_param("WPNAV_SPEED_UP", 800.0)
     sitl.set_param("WPNAV_SPEED_DN", 500.0)
     in_auto(sitl)
+    says(sitl, "Mission: 2 WP", 30.0)
     for speed in (7.0, 6.0):
         sitl.set_param("WPNAV_SPEED_UP", 100.0 * speed)
         sitl.wait_until(lambda speed=speed: abs(sitl.velocity[2] - speed) < 1.0, within=40.0)  # type: ignore[misc]
@@ -456,7 +498,12 @@ def guided_submodes(sitl: Sitl) -> None:
     sitl.wait_until(lambda: dist(sitl.position, (5.0, 5.0, 10.0)) < 1.0, within=20.0)
     assert near_angle(heading(sitl), 135.0, 1.5)
     target = latest(sitl, "POSITION_TARGET_LOCAL_NED")
-    assert dist((target.x, target.y, target.z), (5.0, 5.0, -10.0)) < 1.0
+    assert dist((target.x, target.y, target.z), (5.0, 5.0, -10.0)) < 0.01
+    assert target.type_mask & 0xFFF == 3576 & 0xFFF
+    sitl.select("LOITER")
+    sitl.run(0.1)
+    number = float(mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED)
+    assert sitl.command(mav.MAV_CMD_REQUEST_MESSAGE, number) != ACCEPTED
 
 
 def global_positions(sitl: Sitl) -> None:
@@ -685,8 +732,10 @@ ROWS = (
     Row(7, "ParameterValidation", parameter_validation, quick=True),
     Row(8, "SetHome", set_home),
     Row(10, "SetModesViaAuxSwitch", aux_switches, {"FLTMODE4": CIRCLE, "RC9_OPTION": 18, "RC10_OPTION": 55}),
+    Row(11, "InitialMode", initial_mode),
     Row(12, "NoRCOnBootPreArmFailure", no_radio, quick=True),
     Row(13, "FenceUpload_MissionItem", fence_by_old_items, {"FENCE_ENABLE": 1, "FENCE_TYPE": 6}, quick=True),
+    Row(14, "MISSION_OPTION_CLEAR_MISSION_AT_BOOT", mission_at_boot),
     Row(16, "MAV_CMD_NAV_TAKEOFF, _command_int", takeoff_heights),
     Row(17, "MAV_CMD_CONDITION_YAW", condition_yaw),
     Row(18, "ModeAltHold", alt_hold),
