@@ -10,7 +10,7 @@ from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.mode_selection import ModeSelection, Needs
 from colibri.autopilot.commander.motion_commands import MAX_TURN_DEG, MIN_CLIMB_M, MotionCommands
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.guidance.tasks.guided import STOP, GuidedTask, Turn
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import Orbit, turn_of
@@ -27,6 +27,10 @@ GUIDED, GUIDED_NOGPS, LOITER, ALT_HOLD, POSHOLD, CIRCLE, AUTO = 4, 20, 5, 2, 16,
 """Numbers of modes."""
 _ABOVE_HOME = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CHANGES_MODE = 1.0
+_ARRIVES_WITHIN_M = 0.3
+"""Distance at which a take-off ends; where sticks take over, it would be missing."""
+_LIFTING_US = 500_000
+"""Time after a take-off by stick in which it still may become one to a height."""
 
 
 class CopterMotion(MotionCommands):
@@ -81,6 +85,18 @@ class CopterMotion(MotionCommands):
             return Refusal(f"Takeoff: {command.z:g} m above home is not above the vehicle", FAILED)
         context = pilot.context()
         return _failed(self._fly(Mode.TAKEOFF, TakeoffTask(up_m, None, context, context.behaviour.limits.climb_m_s)))
+
+    def takeoff_by_stick(self, height_m: float) -> None:
+        """Climb to a height above the ground, once the throttle is raised in a mode that holds height."""
+        pilot = self._pilot
+        lifts = pilot.sensed.now_us - pilot.ground.times.takeoff_us < _LIFTING_US and pilot.state.mode in MANUAL
+        if (pilot.ground.standing or lifts) and self._modes.shown.number in (LOITER, POSHOLD, ALT_HOLD):
+            context = pilot.context()
+            speed_m_s = context.behaviour.stick_climb_m_s or None
+            self._fly(
+                Mode.TAKEOFF,
+                TakeoffTask(pilot.ground.height_m + height_m + _ARRIVES_WITHIN_M, None, context, speed_m_s),
+            )
 
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         if not self.guided:

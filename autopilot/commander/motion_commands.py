@@ -50,6 +50,9 @@ class MotionCommands:
             mav.MAV_CMD_CONDITION_YAW: self._turn,
         }
 
+    def takeoff_by_stick(self, height_m: float) -> None:
+        """Do nothing: sticks do not begin a take-off to a height."""
+
     def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         """Fly to a place; DroneKit uses a mission item for it."""
         place = (latitude_deg, longitude_deg, altitude_m)

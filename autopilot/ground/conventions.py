@@ -50,6 +50,9 @@ class Served(Protocol):
     pilot: Pilot
     banner: tuple[str, ...]
 
+    @property
+    def takeoff_by_stick(self) -> Callable[[float], None]: ...
+
     def say(self, severity: int, text: str) -> None: ...
 
 

@@ -135,7 +135,7 @@ class Stations:
         book = conventions.modes
         commands = conventions.commands(Commanded(pilot, fence, missions, self.needs, tasks, parameters, book))
         self.modes, self.offboard.taken = commands.modes, commands.taken
-        self.exempt, self.select_mode = commands.exempt, commands.modes.select
+        self.exempt, self.takeoff_by_stick = commands.exempt, commands.motion.takeoff_by_stick
         vehicle = MissionVehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
         if wire.home_first:
             vehicle = vehicle._replace(home=lambda: home_item(pilot.home), describe=conventions.describe)

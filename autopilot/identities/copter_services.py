@@ -17,6 +17,7 @@ _PREARM_EVERY_US = 30_000_000
 _SWITCHES_US = (1230, 1360, 1490, 1620, 1749)
 """Upper ends of the first five positions of the mode switch."""
 _LOW_US, _HIGH_US, _CHANNEL_US = 1200, 1800, (800, 2200)
+_RAISED_US = 1600
 _THROTTLE, _YAW, _DOWN_US, _RIGHT_US, _LEFT_US, _HELD_US = 2, 3, 1050, 1900, 1100, 2_000_000
 _ARMS, _DISARMS = 1, 2
 _MODE_OPTIONS = {
@@ -125,7 +126,7 @@ class StreamRates:
         for name, number in _STREAMS.items():
             if fields.req_stream_id in (number, mav.MAV_DATA_STREAM_ALL):
                 self._rates[name] = rate
-                self._served.parameters.propose(f"SR0_{name}", rate)
+                self._served.parameters.set(f"SR0_{name}", rate)  # silently, as ArduPilot
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -195,6 +196,9 @@ class Switches:
             self._switch(channels, armed=snapshot.armed)
             for number in range(6, len(channels) + 1):
                 self._function(number, channels[number - 1])
+        height_m = 0.01 * self._served.parameters["PILOT_TKOFF_ALT"]
+        if height_m > 0.0 and snapshot.armed and channels[_THROTTLE] > _RAISED_US:
+            self._served.takeoff_by_stick(height_m)
         self._rudder(channels, now_us, armed=snapshot.armed, manual=snapshot.custom_mode == 0)
         return ()
 

@@ -11,7 +11,10 @@ from colibri.flights.fleet_spec import FleetSpec
 
 
 def add_options(parser: ArgumentParser) -> None:
-    shown = {"gcs": "udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N", "start": "standing at home"}
+    shown = {
+        "gcs": "udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N or, as ardupilot, tcpin:127.0.0.1:5760 + 10 N",
+        "start": "standing at home",
+    }
     add_spec(parser, FleetSpec, leave_out=("floor",), shown=shown)
     add = parser.add_argument
     add_view(add)

@@ -356,6 +356,38 @@ def velocity(sitl: Sitl, north: float, east: float, down: float, frame: int = LO
     )
 
 
+def takeoff_by_stick(sitl: Sitl) -> None:
+    radio(sitl, c3=1000)
+    sitl.select("POSHOLD")
+    sitl.arm()
+    steered(sitl, 2.0, c3=1000)
+    assert height(sitl) <= 0.1
+    steered(sitl, 0.5, c3=1710)
+    assert height(sitl) <= 2.0
+    steered(sitl, 8.0, c3=1500)
+    for _ in range(20):
+        radio(sitl, c3=1500)
+        held(sitl, lambda: 6.9 <= height(sitl) <= 8.0, 0.5, "height")
+
+
+def without_gps(sitl: Sitl) -> None:
+    """Take off and climb by attitude and thrust alone, as DroneKit's set_attitude_target does."""
+    sitl.select("GUIDED_NOGPS")
+    sitl.arm()
+
+    def climbs(thrust: float, seconds: float) -> None:
+        for _ in range(round(10 * seconds)):
+            sitl.send("SET_ATTITUDE_TARGET", 0, 1, 1, 0b100, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, thrust)
+            sitl.run(0.1)
+
+    climbs(0.7, 6.0)
+    assert isclose(sitl.velocity[2], 1.0, abs_tol=0.05)
+    climbs(0.6, 3.0)
+    assert isclose(sitl.velocity[2], 0.5, abs_tol=0.05)
+    sitl.run(5.0)
+    assert abs(sitl.velocity[2]) < 0.05
+
+
 def landing(sitl: Sitl) -> None:
     sitl.takeoff(25.0)
     sitl.select("LAND")
@@ -741,6 +773,7 @@ ROWS = (
     Row(18, "ModeAltHold", alt_hold),
     Row(19, "ModeLoiter", loiter),
     Row(20, "BrakeMode, BrakeZ", brake),
+    Row(21, "PosHoldTakeOff", takeoff_by_stick, {"PILOT_TKOFF_ALT": 700}),
     Row(22, "Landing", landing),
     Row(23, "CopterMission", mission),
     Row(24, "MISSION_START", mission_start),
@@ -756,6 +789,7 @@ ROWS = (
     Row(33, "SetpointGlobalPos", global_positions, {"FS_GCS_ENABLE": 0}),
     Row(34, "SetpointGlobalVel, SetpointBadVel", velocities, {"WPNAV_ACCEL_Z": 250}),
     Row(35, "GuidedModeThrust", guided_thrust, {"GUID_OPTIONS": 8}),
+    Row(35, "the climb rate of an attitude's thrust", without_gps),
     Row(36, "WPYawBehaviour1RTL, RTLYaw", return_facing, {"WP_YAW_BEHAVIOR": 1}),
     Row(37, "RTLSpeed, RTL_ALT_FINAL", return_at_height, {"RTL_SPEED": 700, "RTL_ALT_FINAL": 1000}),
     Row(38, "RTL_TO_RALLY", return_to_rally, {"RALLY_INCL_HOME": 0}),
