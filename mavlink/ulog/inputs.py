@@ -5,13 +5,14 @@ from enum import IntEnum
 from struct import Struct
 from typing import NamedTuple
 
-from colibri.mavlink.ulog import messages
+from colibri.mavlink.ulog.messages import DATA
 
 INPUT, INPUT_NUMBER = "colibri_input", 106
 CHUNK_BYTES = 88
 """Fits a frame of state or sensor feedback."""
 INPUT_FIELDS = f"uint64_t timestamp;uint8_t what;bool goes_on;uint8_t size;uint8_t[{CHUNK_BYTES}] data;"
 _CHUNK = Struct(f"<HQB?B{CHUNK_BYTES}s")
+_MESSAGE = Struct(f"<HB{_CHUNK.format[1:]}")
 CONTENT_BYTES = _CHUNK.size
 """Of a message without its head."""
 
@@ -36,7 +37,7 @@ def encode_input(time_us: int, kind: RecordKind, content: bytes) -> bytes:
     for begin in range(0, max(len(content), 1), CHUNK_BYTES):
         chunk = content[begin : begin + CHUNK_BYTES]
         goes_on = begin + CHUNK_BYTES < len(content)
-        encoded += messages.message("D", _CHUNK.pack(INPUT_NUMBER, time_us, kind, goes_on, len(chunk), chunk))
+        encoded += _MESSAGE.pack(CONTENT_BYTES, DATA, INPUT_NUMBER, time_us, kind, goes_on, len(chunk), chunk)
     return encoded
 
 
