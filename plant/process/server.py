@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from math import isfinite
 from time import perf_counter, sleep
-from typing import Any
+from typing import Any, TypeVarTuple
 
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
@@ -18,6 +18,7 @@ from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, report_end
 from colibri.plant.simulation.plant import Plant
 
+Ts = TypeVarTuple("Ts")
 _CATCH_UP_S = 0.1
 
 
@@ -134,15 +135,15 @@ class Server:
 
     def _log(self, world: World) -> None:
         if world is not self._logged:
-            self._keep(lambda logs: logs.write_world(world))
+            self._keep(PlantLogs.write_world, world)
         self._logged = world
 
-    def _keep(self, write: Callable[[PlantLogs], None]) -> None:
+    def _keep(self, write: Callable[[PlantLogs, *Ts], None], *args: *Ts) -> None:
         """Write to the logs; an endless flight goes on without a log that cannot be written."""
         if self._logs is None:
             return
         try:
-            write(self._logs)
+            write(self._logs, *args)
         except LogError as error:
             if self._ends:
                 raise
@@ -178,7 +179,7 @@ class Server:
         received, time_us = self._end.received, self._time_us
         if self._logs is not None and self._logs.has_tlog:
             frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
-            self._keep(lambda logs: logs.write_frames(time_us, frames))
+            self._keep(PlantLogs.write_frames, time_us, frames)
         received.clear()
 
     def _wait_until(self, due_s: float) -> None:
