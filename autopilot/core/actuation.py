@@ -94,7 +94,8 @@ class Actuation:
         """Return how the rotors turn at `now_us`, idling at the least while armed, parts of the largest speed."""
         rotors = self._loop.vehicle.rotors
         minimum = rotors.idle_speed / rotors.max_speed if armed else 0.0
-        return tuple([max(control, minimum) for control in self._solving.controls(now_us)])
+        controls = self._solving.controls(now_us)
+        return tuple([control if control > minimum else minimum for control in controls])
 
     def decide(
         self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float

@@ -159,7 +159,7 @@ class Physics:
         target = self._standing
         if command.armed:
             idle, top = self._idle, self._top
-            target = tuple([max(control * top, idle) for control in command.controls])
+            target = tuple([speed if (speed := control * top) > idle else idle for control in command.controls])
         if self._held is None:
             return target
         return tuple(free if held is None else held for free, held in zip(target, self._held, strict=True))
