@@ -70,7 +70,12 @@ def follow(
     put(yaw, target.yaw_rad)
     if not law[0].turns:
         go_on_turning(rigid, law[0].interval_s, target.yaw_rad)
-    approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
+    if limits.upright:
+        approach(rigid[:3], rigid[3:6], (p, v, a), feasible_part(v, a, disturbance, limits, vehicle), law, near)
+    else:
+        put(p, near[0])
+        put(v, near[1])
+        put(a, near[2])
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(rigid, near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)

@@ -18,7 +18,8 @@ from colibri.autopilot.control.interface import (
     Preview,
     VehicleState,
 )
-from colibri.autopilot.control.lpv_mpc import planning
+from colibri.autopilot.control.lpv_mpc import compromise, planning
+from colibri.autopilot.control.lpv_mpc.compromise import Deviation
 from colibri.autopilot.control.lpv_mpc.condensing import PREDICTED
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach
 from colibri.autopilot.control.lpv_mpc.model import RIGID, Disturbance
@@ -54,9 +55,9 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     poles: tuple[Negative, Negative]
     approach_speed_m_s: Positive
-    follow_within_m: Positive
+    follow_within_m: Positive = 0.54
     max_acceleration_m_s2: Positive
-    exact_within_m: Positive
+    exact_within_m: Positive = 0.3
     max_tilt_deg: Degrees
     min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
     """Part of the weight."""
@@ -85,6 +86,7 @@ class LawMemory(NamedTuple):
     plan: Plan | None  # previous plan, if usable
     age: int  # samples since that plan
     lag_us: int  # of path time behind the clock
+    deviation: Deviation | None = None
 
 
 class LawInputs(NamedTuple):
@@ -111,7 +113,8 @@ class LpvMpc(TrackingLaw[LawMemory]):
         self._mpc = Mpc(settings.plan, settings.weights, vehicle, settings.qp.build(), h, clock, upright=upright)
         self.min_path_speed = settings.path.min_speed
         samples = self._mpc.horizon + 2
-        self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
+        samples = ceil(settings.path.max_speed * samples)
+        self.preview = Preview(self.control_interval_us, samples if upright else max(samples, compromise.SAMPLES))
         self._span_n = float(self.tracker.allocation[0].sum())
         if vehicle.rotors.count > len(AXES):  # without moments
             self._span_n = min(self._span_n, 1.0 / float(self._mpc.from_wrench[:, 0].max()))
@@ -129,7 +132,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
             self._mpc.from_wrench,
             self._mpc.turns,
         )
-        self._targets = TargetBuilder(guidance, settings.path, self._mpc)
+        self._targets = TargetBuilder(guidance, settings.path, self._mpc, upright=upright)
         self._min_squared = square(self.tracker.lag.min_speed)
         min_n = self._span_n * self._min_squared
         min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
@@ -162,7 +165,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
     ) -> tuple[LawMemory, Decision]:
         del time_us
         inputs = self._inputs(memory, state)
-        return self._decide(memory, inputs, self._targets.on_clock(self._now, references))
+        return self._decide(memory, inputs, self._targets.on_clock(self._now, references, memory.deviation))
 
     def step_on_path(
         self, memory: LawMemory, time_us: int, state: VehicleState, references: Horizon
@@ -216,7 +219,8 @@ class LpvMpc(TrackingLaw[LawMemory]):
         phi, theta, psi = planning.first_angles(wanted.target)
         path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
         how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
-        return LawMemory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
+        memory = LawMemory(after, plan, age, lag_us, wanted.deviation)
+        return memory, Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         if plan is None or plan.speeds is None:
@@ -227,7 +231,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
     def _choose(
         self, memory: LawMemory, inputs: LawInputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
-        target, force, path = wanted
+        target, force, path, _ = wanted
         along_n, force_n = planning.along(force, inputs.observed.measured)
         if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())

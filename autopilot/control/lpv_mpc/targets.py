@@ -6,6 +6,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import feed_forward
+from colibri.autopilot.control.lpv_mpc.compromise import Deviation, compromise, stay_within
 from colibri.autopilot.control.lpv_mpc.condensing import PlanReferences
 from colibri.autopilot.control.lpv_mpc.feed_forward import Approach, Flat
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc
@@ -24,13 +25,15 @@ class Wanted(NamedTuple):
     target: Packed  # the `PlanReferences`
     force: Array  # to align thrust with now, N, ENU, (3,)
     path: PathNow | None = None  # nominal speeds along the path, if free
+    deviation: Deviation | None = None  # from references beyond the largest thrust
 
 
 class TargetBuilder:
     """Builds the targets of plans."""
 
-    def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc) -> None:
-        self._guidance, self._path, self._mpc = guidance, path, mpc
+    def __init__(self, guidance: Approach, path: PathSettings, mpc: Mpc, *, upright: bool) -> None:
+        self._guidance, self._path, self._mpc, self._upright = guidance, path, mpc, upright
+        self._compromise, self._none = packed(compromise(guidance.interval_s)), Deviation.none()
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2
         rotors = len(mpc.from_wrench)
@@ -43,10 +46,16 @@ class TargetBuilder:
         self._near = (target.position, target.velocity, target.acceleration)
         self._flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
 
-    def on_clock(self, now: Packed, references: Horizon) -> Wanted:
+    def on_clock(self, now: Packed, references: Horizon, deviation: Deviation | None) -> Wanted:
         (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
+        if not self._upright:
+            before = self._none if deviation is None else deviation
+            arrays = (before.motion.copy(), before.coefficients.copy(), before.dual.copy())
+            model, near = self._mpc.model, _motion(self._samples)
+            phase = stay_within(now, p, v, a, self._compromise, model, before.phase, *arrays, near)
+            (p, v, a), deviation = near, Deviation(phase, *arrays) if phase >= 0 else None
         feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
-        return Wanted(self._record, force)
+        return Wanted(self._record, force, None, deviation)
 
     def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return the target of references at the path times of the previous plan.

@@ -155,18 +155,25 @@ def test_an_impossible_track_is_followed_upright(lap_s: float, count: int, lasts
     assert max(it.z_m.max() for it in flown) < 4.5
 
 
-def test_agile_flies_a_vertical_loop() -> None:
-    """Radius 1 m at 4 rad/s, 1.6 g: thrust points down at the top."""
+@pytest.mark.parametrize(
+    ("radius_m", "rate_rad_s", "off_m"),
+    [(1.0, 4.0, 0.5), (3.0, -2.6, 1.5)],  # the thrust of the second is 3.1 g at the bottom, of 2.2 g
+)
+def test_agile_flies_vertical_loops(radius_m: float, rate_rad_s: float, off_m: float) -> None:
+    """Thrust points down at the top; beyond the largest thrust the loop is cut, and found again."""
+    turns_s = 12.0 * np.pi / abs(rate_rad_s)
 
     def loop(t: float) -> tuple[float, float, float]:
-        angle = 0.5 * t**2 if t < 4.0 else 4.0 * (t - 2.0)
-        return float(np.sin(angle)), 0.0, 8.0 - float(np.cos(angle))
+        t = min(t, turns_s + 4.0)
+        angle = rate_rad_s * (t * t / 8.0 if t < 4.0 else t - 2.0 - max(t - turns_s, 0.0) ** 2 / 8.0)
+        return radius_m * float(np.sin(angle)), 0.0, 20.0 - radius_m * float(np.cos(angle))
 
-    flown = colibri.fly(loop, profile="agile", link="direct", duration=8.28)  # ends upright
+    flown = colibri.fly(loop, profile="agile", link="direct", duration=turns_s + 7.0)
     upright = np.cos(flown.samples["phi"]) * np.cos(flown.samples["theta"])
     assert upright.min() < np.cos(np.radians(150.0))
     assert flown.lost is None
-    assert flown.report["max_error_m"] < 0.5
+    assert flown.report["max_error_m"] < off_m
+    assert flown.samples["z"][-1] == pytest.approx(20.0 - radius_m, abs=0.01)
 
 
 def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
