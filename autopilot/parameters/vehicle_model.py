@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from colibri.autopilot.parameters.number_paths import Number, Path, has
+from colibri.plant.vehicle.description import MAX_ROTORS
 
 _SPEED = "{speed}"
 """Placeholder for the unit of rotor speeds."""
@@ -31,7 +32,7 @@ def _axes(
 
 def _rotors() -> list[Number]:
     numbers = []
-    for rotor in range(4):
+    for rotor in range(MAX_ROTORS):
         for place, (axis, where) in enumerate((("X", "forward"), ("Y", "left"))):
             path = ("rotors", "position_m", rotor, place)
             what = f"Rotor {rotor + 1}: position {where}"

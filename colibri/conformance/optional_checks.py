@@ -97,7 +97,7 @@ def _path(subject: Subject, law: Any, steps: list[FlownStep]) -> str:
     return ""
 
 
-def _plan(_: Subject, law: Any, steps: list[FlownStep]) -> str:
+def _plan(subject: Subject, law: Any, steps: list[FlownStep]) -> str:
     for step in steps:
         how, columns = step.decision.diagnostics, law.plan_columns
         if how.predicted is None and how.planned_squared is None:
@@ -106,7 +106,7 @@ def _plan(_: Subject, law: Any, steps: list[FlownStep]) -> str:
             return "diagnostics has one of predicted and planned_squared: a plan is shown by both"
         if how.predicted.ndim != 2 or not all(0 <= column < how.predicted.shape[1] for column in columns):
             return f"plan_columns {tuple(columns)} are not in predicted of shape {how.predicted.shape}"
-        if how.planned_squared.shape != (len(how.predicted) - 1, 4):
+        if how.planned_squared.shape != (len(how.predicted) - 1, subject.vehicle.rotors.count):
             return f"planned_squared of shape {how.planned_squared.shape} beside predicted {how.predicted.shape}"
         off = np.array([how.predicted[0, column] for column in columns[:3]]) - step.state.euler
         off[2] = (off[2] + np.pi) % (2.0 * np.pi) - np.pi

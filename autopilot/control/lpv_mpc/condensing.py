@@ -245,7 +245,7 @@ def _add_terminal(
                 H[k, j] = H[k, j] + s * W[i, j] + t * W[i + 1, j] + u * W[i + 2, j] + v * W[i + 3, j]
 
 
-@compiled
+@inlined
 def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
     for block in range(problem.starts.shape[0] - 1):
         weight = problem.weights.first if block == 0 else problem.weights.next
@@ -260,7 +260,7 @@ def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f:
                 f[here - inputs] -= change
 
 
-@compiled
+@inlined
 def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
     """Fill the bounds of the commands' limits, and clip the nominal corrections to them.
 

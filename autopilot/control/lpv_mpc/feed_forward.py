@@ -15,7 +15,7 @@ import numpy as np
 from colibri.autopilot.control.lpv_mpc.model import Disturbance
 from colibri.autopilot.control.parts.thrust_force import LEAST_N, ForceLimits, limit_force, overcome_drag
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
@@ -152,7 +152,7 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
         flat.squared[0, rotor] = 3.0 * (ahead[0] - ahead[1]) + ahead[2] if ahead.shape[0] == 3 else ahead[0]
 
 
-@compiled
+@inlined
 def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
     """Fill the commands, (N, m), within limits, (N, 2), from one of the squared speeds, (N + 1, m), to the next."""
     for n in range(commands.shape[0]):

@@ -145,7 +145,7 @@ def _expect(now: Now, target: PlanReferences, last: Array, vehicle: Packed, kind
     respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.transition, work.responses)
 
 
-@compiled
+@inlined
 def ease(commands: Array, starts: Integers, limits: Array) -> None:
     """Limit the references' commands in each block to half of the rotors' range.
 
@@ -165,7 +165,7 @@ def ease(commands: Array, starts: Integers, limits: Array) -> None:
                     commands[step, rotor] = to + part * (commands[step, rotor] - 0.5 * (low + high))
 
 
-@compiled
+@inlined
 def carry_over(last: Array, commands: Array, starts: Integers, corrections: Array) -> None:
     """Fill the correction of each block, and before them the first again, (b + 1, m).
 
@@ -259,7 +259,7 @@ def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> 
     return binding
 
 
-@compiled
+@inlined
 def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) -> None:
     for block in range(corrections.shape[0]):
         for step in range(starts[block], starts[block + 1]):

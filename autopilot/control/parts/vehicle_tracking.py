@@ -23,6 +23,7 @@ from colibri.common.matrices import dot, matvec, put
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
+_WRENCH = 4
 _NOTHING = np.empty(0)
 
 
@@ -64,6 +65,8 @@ class VehicleTracker:
         self._interval_s = interval_s
         self._observer, self._mass = packed(observing), packed(mass_model(mass, vehicle, interval_s))
         self._rotors = packed(RotorModel(self.lag, self.allocation))
+        self._rotor_count = vehicle.rotors.count
+        self._actuated = (4, max(self._rotor_count, _WRENCH))
 
     def initial(self, rotor_speed: float) -> Tracked:
         speeds = np.full(self.vehicle.rotors.count, rotor_speed / self.vehicle.rotors.max_speed)
@@ -98,10 +101,13 @@ class VehicleTracker:
     def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, vehicle's unit, and the next tracker state."""
         _, _, measured, estimate, mass_kg, max_speed, current_a = observed
-        actuated, wrenches = np.empty((2, len(squared))), np.empty((2, 4))
+        actuated = np.empty(self._actuated)
         top = self.vehicle.rotors.max_speed
-        rotor_lag.actuate(tracked.speeds, squared, max_speed, top, self._rotors, actuated, wrenches)
-        (commands, speeds), (wrench, mean_wrench) = actuated, wrenches
+        rotor_lag.actuate(tracked.speeds, squared, max_speed, top, self._rotors, actuated)
+        commands, speeds, wrench, mean_wrench = actuated
+        if self._rotor_count != _WRENCH:
+            commands, speeds = commands[: self._rotor_count], speeds[: self._rotor_count]
+            wrench, mean_wrench = wrench[:_WRENCH], mean_wrench[:_WRENCH]
         charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
         after = Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
         return commands, after

@@ -62,12 +62,10 @@ def lead(speeds: Array, squared_commands: Array, lag: SampledLag, max_speed: flo
 
 
 @compiled
-def actuate(
-    speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array, wrenches: Array
-) -> None:
-    """Write commands, vehicle's unit, and speeds a sample later, (2, m); the wrench then, and on average, (2, 4)."""
-    lag, allocation = packed[0].lag, packed[0].allocation
-    commands, after, wrench, mean = out[0], out[1], wrenches[0], wrenches[1]
+def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
+    """Write commands in the vehicle's unit, speeds and wrench a sample later, and the mean wrench, (4, m or more)."""
+    lag, allocation, rotors = packed[0].lag, packed[0].allocation, speeds.shape[0]
+    commands, after, wrench, mean = out[0, :rotors], out[1, :rotors], out[2], out[3]
     put(lead(speeds, squared_commands, lag, max_speed), commands)
     put(follow(speeds, commands, lag), after)
     wrench[:], mean[:] = 0.0, 0.0
