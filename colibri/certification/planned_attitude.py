@@ -107,7 +107,7 @@ class PlannedAttitude:
         return PlanFlyer(self, np.column_stack([held, headings]), thrusts_n)
 
     def momentum(self, thrusts_n: Array) -> Momentum:
-        momentum = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed
+        momentum = self._vehicle.momentum_along_z() * self._vehicle.rotors.max_speed
         from_moments = self._from_wrench[:, 1:]
         level = thrusts_n[:, None] * self._from_wrench[:, 0]
 

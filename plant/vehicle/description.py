@@ -315,7 +315,16 @@ class Vehicle(Table, frozen=True, kw_only=True):
         return np.concatenate([force, moment + drag])
 
     def allocation(self) -> Array:
-        """Return the matrix from squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2], (4, N)."""
+        """Return the matrix from squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2], (4, N).
+
+        With products of inertia, moments are those that turn a body with the diagonal alone likewise: D I⁻¹ τ.
+        """
+        if any(self.body.inertia_products_kg_m2):
+            from colibri.common.matrices import inverse, matmul  # loads Numba, which most vehicles do without
+
+            wrenches, inertia = self.wrenches(), self.body.inertia()
+            alike = np.diag(inertia)[:, None] * matmul(inverse(inertia), wrenches[3:])
+            return np.concatenate([wrenches[2:3], alike])
         if not self.is_flat:
             return self.wrenches()[2:]
         rotors, (x, y, _) = self.rotors, self.arms_m().T
@@ -327,6 +336,11 @@ class Vehicle(Table, frozen=True, kw_only=True):
         """Return the largest U1 (N), U2, U3, U4 (N m) of the rotors, each on its own, (4,)."""
         max_wrench: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
         return max_wrench
+
+    def momentum_along_z(self) -> Array:
+        """Return the row (N,) that maps rotor speeds to their angular momentum along body z, N m s."""
+        momentum: Array = self.rotor_momentum() * self.rotors.axes()[:, 2]
+        return momentum
 
     def rotor_momentum(self) -> Array:
         """Return the row (N,) that maps rotor speeds to their angular momentum along their axes, N m s.

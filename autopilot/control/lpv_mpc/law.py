@@ -28,6 +28,7 @@ from colibri.autopilot.control.lpv_mpc.path import PathSettings
 from colibri.autopilot.control.lpv_mpc.planning import Now
 from colibri.autopilot.control.lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.autopilot.control.parts.error_dynamics import gains
+from colibri.autopilot.control.parts.level import levelled, seen_level
 from colibri.autopilot.control.parts.recovery import RecoverySettings
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.tracking_law import TrackingLaw, TrackingSettings
@@ -106,6 +107,7 @@ class LpvMpc(TrackingLaw[LawMemory]):
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         settings = read_settings(scaled("lpv-mpc", table, vehicle), LpvMpcSettings)
+        vehicle, self._to_body = levelled(vehicle)
         super().__init__(settings, settings.fallback, vehicle)
         h = self._interval_s
         max_tilt_deg = settings.guidance.max_tilt_deg
@@ -187,6 +189,8 @@ class LpvMpc(TrackingLaw[LawMemory]):
 
     def _inputs(self, memory: LawMemory, state: VehicleState) -> LawInputs:
         tracked, battery = memory.tracked, self.tracker.battery
+        if self._to_body is not None:
+            state = seen_level(state, self._to_body)
         observed = self.tracker.observe(tracked, state)
         self._model_kg[0] = observed.mass_kg
         expected = (

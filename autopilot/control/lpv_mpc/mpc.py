@@ -246,7 +246,7 @@ def model_of(vehicle: Vehicle, interval_s: float) -> Model:
         airframe_of(vehicle),
         np.array(vehicle.body.inertia_kg_m2),
         vehicle.allocation() * square(vehicle.rotors.max_speed),
-        vehicle.rotor_momentum() * vehicle.rotors.max_speed,
+        vehicle.momentum_along_z() * vehicle.rotors.max_speed,
         lag,
         interval_s,
     )

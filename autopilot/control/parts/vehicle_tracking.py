@@ -59,7 +59,7 @@ class VehicleTracker:
         self.lag = rotor_lag.rotor_lag(vehicle, interval_s)
         self.battery = BatteryModel(vehicle)
         self.allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)  # squared speeds to U1..U4, N, N m
-        self.momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed  # of each rotor at top speed, N m s
+        self.momentum = vehicle.momentum_along_z() * vehicle.rotors.max_speed  # of each rotor at top speed, N m s
         observing = observer_of(observer, vehicle, interval_s)
         self.inertia = observing.inertia
         self._interval_s = interval_s

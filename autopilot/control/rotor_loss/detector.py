@@ -60,7 +60,7 @@ def signature_of(vehicle: Vehicle) -> Signature:
     return Signature(
         allocation[0] * square(vehicle.rotors.max_speed),
         effect,
-        vehicle.rotor_momentum() * vehicle.rotors.max_speed,
+        vehicle.momentum_along_z() * vehicle.rotors.max_speed,
         np.array(vehicle.body.inertia_kg_m2),
         deviations**2,
         vehicle.body.mass_kg,

@@ -93,7 +93,7 @@ class Mixer:
         self._allocation = vehicle.allocation()
         self._mixing = mixing_of(self._allocation)
         self._inverse = self._mixing["inverse"][0]
-        self._momentum = vehicle.rotor_momentum()
+        self._momentum = vehicle.momentum_along_z()
         self.rotors = vehicle.rotors.count
         self._squared_max = square(vehicle.rotors.max_speed)
 

@@ -50,7 +50,7 @@ def motion_model(vehicle: Vehicle) -> MotionModel:
         gravity_m_s2=vehicle.gravity_m_s2,
         inertia=np.array(vehicle.body.inertia_kg_m2),
         allocation=allocation,
-        momentum=vehicle.rotor_momentum(),
+        momentum=vehicle.momentum_along_z(),
         arms_m=vehicle.arms_m()[:, :2].copy(),
         drag=np.array(drag.linear_n_s_m if drag else (0.0, 0.0, 0.0)),
         rotor_drag=drag.rotor_coefficient if drag else 0.0,
