@@ -24,6 +24,7 @@ Point: TypeAlias = Annotated[tuple[float, ...], msgspec.Meta(min_length=2, max_l
 Direction: TypeAlias = Literal["ccw", "cw"]
 
 MIN_ROTORS, MAX_ROTORS = 3, 8
+_ROUNDING = 1e-9
 _Rotor = TypeVar("_Rotor")
 _EachRotor: TypeAlias = Annotated[tuple[_Rotor, ...], msgspec.Meta(min_length=MIN_ROTORS, max_length=MAX_ROTORS)]
 
@@ -51,7 +52,7 @@ class Body(Table, frozen=True, kw_only=True):
         super().__post_init__()
         largest = max(self.inertia_kg_m2)
         excess = 2.0 * largest - sum(self.inertia_kg_m2)
-        if excess > 0.0:
+        if excess > _ROUNDING * largest:
             signs = [-1.0 if moment == largest else 1.0 for moment in self.inertia_kg_m2]
             near = [moment + sign * excess / 3.0 for moment, sign in zip(self.inertia_kg_m2, signs, strict=True)]
             near = [moment * (1.0 if sign < 0.0 else 1.001) for moment, sign in zip(near, signs, strict=True)]
@@ -61,7 +62,7 @@ class Body(Table, frozen=True, kw_only=True):
             )
         if any(self.inertia_products_kg_m2):
             x, y, z = np.linalg.eigvalsh(self.inertia()).tolist()
-            if x <= 0.0 or x + y < z:
+            if x <= 0.0 or x + y < (1.0 - _ROUNDING) * z:
                 moments = f"{x:.4g}, {y:.4g}, {z:.4g}"
                 raise ValueError(
                     f"inertia_products_kg_m2: too large, with principal moments {moments}: "

@@ -13,12 +13,12 @@ from colibri.common.elementary import square
 from colibri.common.errors import checked
 from colibri.common.jit import Packed, compiled, packed
 from colibri.common.matrices import dot, inverse, matmul, matvec
-from colibri.common.types import Array
+from colibri.common.types import Array, PerRotor
 from colibri.plant.vehicle.description import AXES, Vehicle, controlled_axes
 
-_PRIORITY = (1.0, 10.0, 10.0, 0.1)
-"""Weights of thrust, roll, pitch and yaw, each in parts of what the rotors can set."""
-_SWEEPS, _REGULAR = 200, 1e-6
+_EVEN, _PRIORITY = (1.0, 1.0, 1.0, 1.0), (1.0, 10.0, 10.0, 0.2)
+"""Weights of thrust, roll, pitch and yaw, each in parts of what the rotors can set: first for what can be reached."""
+_SWEEPS, _REGULAR, _REACHED = 400, 1e-7, 2e-3
 _YAW_PART = 0.02
 
 
@@ -38,7 +38,7 @@ def allocate(wrench: Array, mixing: Packed, least: float, most: float) -> Array:
     """Return the squared speeds, (m,), from `least` to `most`, whose wrench, (4,), is the nearest."""
     allocation, inverse = mixing[0].allocation, mixing[0].inverse
     rotors = inverse.shape[0]
-    free, squared, missed = np.zeros(rotors), np.empty(rotors), np.empty(4)
+    free, squared = np.zeros(rotors), np.empty(rotors)
     within = True
     for i in range(rotors):
         for row in range(4):
@@ -47,12 +47,24 @@ def allocate(wrench: Array, mixing: Packed, least: float, most: float) -> Array:
         within &= squared[i] == free[i]
     if within:
         return free
-    scaled = np.empty((4, rotors))
+    for priority in (_EVEN, _PRIORITY):
+        if _approach(wrench, allocation, free, priority, least, most, squared) < _REACHED:
+            break
+    return squared
+
+
+@compiled
+def _approach(
+    wrench: Array, allocation: Array, free: Array, priority: PerRotor, least: float, most: float, squared: Array
+) -> float:
+    """Move squared speeds, one after another, towards a wrench; return the largest miss, weighted."""
+    rotors = squared.shape[0]
+    scaled, missed, largest = np.empty((4, rotors)), np.empty(4), 0.0
     for row in range(4):
         whole = 0.0
         for i in range(rotors):
             whole += abs(allocation[row, i])
-        scale = _PRIORITY[row] / whole if whole > 0.0 else 0.0
+        scale = priority[row] / whole if whole > 0.0 else 0.0
         missed[row] = -scale * wrench[row]
         for i in range(rotors):
             scaled[row, i] = scale * allocation[row, i]
@@ -67,7 +79,9 @@ def allocate(wrench: Array, mixing: Packed, least: float, most: float) -> Array:
             for row in range(4):
                 missed[row] += scaled[row, i] * (to - squared[i])
             squared[i] = to
-    return squared
+    for row in range(4):
+        largest = max(largest, abs(missed[row]))
+    return largest
 
 
 def holds_yaw(vehicle: Vehicle) -> bool:
