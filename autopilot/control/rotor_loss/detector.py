@@ -22,7 +22,7 @@ from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, opened, packed
 from colibri.common.matrices import matvec, put
 from colibri.common.types import Array, PerRotor, Quaternion, Vector
-from colibri.plant.vehicle.description import Vehicle
+from colibri.plant.vehicle.description import AXES, Vehicle
 
 ALARM = 20.0  # log odds: e²⁰ samples are a century
 _CLEARLY = 3.0  # log odds against the next rotor
@@ -47,6 +47,7 @@ class Signature(NamedTuple):
     variances: Array  # of the residual, N² and N² m², (4,)
     mass_kg: float
     gravity_m_s2: float
+    yaw_drag_n_m_s: float  # of the hubs in hover, which hides the yaw of small rotors; 0 for four
 
 
 def signature_of(vehicle: Vehicle) -> Signature:
@@ -65,7 +66,15 @@ def signature_of(vehicle: Vehicle) -> Signature:
         deviations**2,
         vehicle.body.mass_kg,
         vehicle.gravity_m_s2,
+        _yaw_drag_n_m_s(vehicle),
     )
+
+
+def _yaw_drag_n_m_s(vehicle: Vehicle) -> float:
+    if vehicle.drag is None or vehicle.rotors.count == len(AXES):
+        return 0.0
+    x, y, _ = vehicle.arms_m().T
+    return vehicle.drag.rotor_coefficient * vehicle.hover_speed * float((x * x + y * y).sum())
 
 
 class DetectorModel(NamedTuple):
@@ -212,6 +221,7 @@ def _add_evidence(
     residual[1] = ix * (now[3] - before[3]) / interval_s - (iy - iz) * q * r + q * h
     residual[2] = iy * (now[4] - before[4]) / interval_s - (iz - ix) * p * r - p * h
     residual[3] = iz * (now[5] - before[5]) / interval_s - (ix - iy) * p * q + h_rate
+    residual[3] += rotors.yaw_drag_n_m_s * r
     for row in range(4):
         for i in range(rotor_count):
             expected[row] += rotors.effect[row, i] * thrust_n[i]
