@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
+from colibri.autopilot.control.lpv_mpc.condensing import PREDICTED
 from colibri.autopilot.control.lpv_mpc.deviations import DEVIATIONS, ROTATION
 from colibri.autopilot.control.lpv_mpc.law import LawMemory, LpvMpc, LpvMpcSettings
 from colibri.autopilot.control.lpv_mpc.mpc import Mpc, Plan
@@ -52,7 +53,6 @@ _GRID = 4
 _BETWEEN = 1.5
 """Difference of the gain anywhere over the largest on a grid."""
 _ETA_SPARE = 1e-9
-_PREDICTED = 16
 
 
 class PlannedAttitude:
@@ -160,8 +160,8 @@ class PlannedAttitude:
         law, n = self._law, self._law.preview.samples
         if plan is None:
             steady = self._squared(thrust_n, z[_COMMANDS])
-            states = np.zeros((self._horizon + 1, _PREDICTED))
-            states[:, 12:] = self._squared(thrust_n, 0.0 * z[_COMMANDS])
+            states = np.zeros((self._horizon + 1, PREDICTED + len(self._from_wrench)))
+            states[:, PREDICTED:] = self._squared(thrust_n, 0.0 * z[_COMMANDS])
             plan = Plan(np.tile(steady, (self._horizon, 1)), states)
         tracked = law.initial(0.0).tracked._replace(
             speeds=np.sqrt(self._squared(thrust_n, z[_MOMENTS])), charge_ah=self._charge_ah

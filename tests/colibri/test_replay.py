@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.process.recorded_inputs import encoded, read_inputs
 from colibri.flights.replay import replay_flight
@@ -71,6 +72,17 @@ def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, ran: Ran) -> Non
     said = ran("replay", log, code=1)
     assert said.out.endswith(" s, all identical\n")
     assert said.err.endswith(" s, and the flight went on to t = 2.000 s: it was cut off\n")
+
+
+def test_a_flight_of_six_rotors_is_recorded_and_replayed(tmp_path: Path) -> None:
+    fly(tmp_path, "line", "--vehicle", "firefly", "--link", "memory", "--duration", "1")
+    assert replay_flight(tmp_path) == (250, 996_000, None)
+    samples = read_recording(tmp_path)
+    assert samples["omega6"].min() > 83.8
+    assert samples["U1"].mean() == pytest.approx(1.53 * 9.81, rel=0.2)
+    motors = ULog(str(tmp_path / "flight.ulg")).get_dataset("actuator_motors").data
+    assert motors["control[5]"][-1] > 0.1
+    assert np.isnan(motors["control[6]"]).all()
 
 
 def test_a_flight_on_sensors_is_replayed(tmp_path: Path) -> None:

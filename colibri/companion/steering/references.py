@@ -68,7 +68,9 @@ class Stay(NamedTuple):
 
     def track(self, here: Vector, yaw_rad: float) -> Track:
         x, y, z = self.place(here)
-        return Hover(x=x, y=y, height=z, yaw=degrees(yaw_rad) if self.yaw is None else self.yaw).track()
+        return Hover(
+            x=round(x, 9), y=round(y, 9), height=round(z, 9), yaw=degrees(yaw_rad) if self.yaw is None else self.yaw
+        ).track()
 
 
 def stay_of(name: str) -> Stay | None:
