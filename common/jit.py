@@ -38,6 +38,11 @@ def inlined(function: _Function) -> _Function:
     return cast(_Function, _kernel(function, forceinline=True))
 
 
+def without_gil(function: _Function) -> _Function:
+    """Compile a function that other threads may run beside."""
+    return cast(_Function, _kernel(function, nogil=True))
+
+
 def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
     """Compile at once for these argument types alone; other arguments are converted."""
 
@@ -114,8 +119,8 @@ class _Compiling(Listener):
         pass
 
 
-def _kernel(function: Callable[..., Any], *, forceinline: bool = False) -> Any:
-    kernel: Any = njit(error_model="numpy", forceinline=forceinline)(function)
+def _kernel(function: Callable[..., Any], **options: Any) -> Any:
+    kernel: Any = njit(error_model="numpy", **options)(function)
     machine_code = kernel._cache = MachineCode(kernel)  # noqa: SLF001
     kernel.compile = machine_code.in_turn(kernel.compile)
     return kernel

@@ -2,6 +2,9 @@
 
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import pairwise
 from math import ceil
 from pathlib import Path, PurePath
 from typing import Any, Literal, NamedTuple, get_args
@@ -108,6 +111,7 @@ class Episodes:
         limit_m: float = 5.0,
         draw: Mapping[str, Any] | None = None,
         reward: Reward | None = None,
+        threads: int = 1,
     ) -> None:
         if action not in ACTIONS:
             raise GymError(unknown("action", action, ACTIONS))
@@ -115,7 +119,7 @@ class Episodes:
         within("duration", duration, 1.0 / rate, 3600.0, "s")
         within("limit_m", limit_m, 0.1, 1000.0, "m")
         within("preview_s", preview_s, 1.0 / rate, 10.0, "s")
-        for name, whole, least in (("preview", preview, 0), ("history", history, 1)):
+        for name, whole, least in (("preview", preview, 0), ("history", history, 1), ("threads", threads, 1)):
             if isinstance(whole, bool) or not isinstance(whole, int) or not least <= whole <= 100:
                 raise GymError(f'{name} must be a whole number from {least} to 100, not "{shown(whole)}"')
         if not isinstance(max_rates, Sequence) or len(max_rates) != 3 or not all(map(is_number, max_rates)):
@@ -139,6 +143,9 @@ class Episodes:
         if start not in ("near", "thrown"):
             raise GymError(unknown("start", start, ("near", "thrown")))
         within("gate_m", gate_m, 0.05, 100.0, "m")
+        edges = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
+        self._parts = [slice(*pair) for pair in pairwise(edges)]
+        self._pool = ThreadPoolExecutor(threads) if len(self._parts) > 1 else None
         self._last_built: tuple[list[tuple[str, Any]], tuple[Any, ...]] | None = None
         self.gate_m = 0.0 if gates is None else float(gate_m)
         if gates is None:
@@ -217,17 +224,23 @@ class Episodes:
         return rewards, terminated, truncated
 
     def _advance(self, actions: Array) -> None:
+        if self._pool is None:
+            self._advance_rows(actions, self._parts[0])
+        else:  # each row depends on itself alone
+            list(self._pool.map(partial(self._advance_rows, actions), self._parts))
+
+    def _advance_rows(self, actions: Array, rows: slice) -> None:
         kernels.advance(
-            self.x,
-            actions,
-            self._last,
-            self._older,
-            self.steps,
-            self._passed,
-            self.flying,
-            self._parameters,
-            self._mixers,
-            self._scales,
+            self.x[rows],
+            actions[rows],
+            self._last[rows],
+            self._older[rows],
+            self.steps[rows],
+            self._passed[rows],
+            self.flying[rows],
+            self._parameters[rows],
+            self._mixers[rows],
+            self._scales[rows],
             self.reference,
             self._stride,
             self.action == "rates",
@@ -236,9 +249,9 @@ class Episodes:
             self._limit_m,
             self._floor_m,
             self.gate_m,
-            self.observations,
-            self._rewards,
-            self._ends,
+            self.observations[rows],
+            self._rewards[rows],
+            self._ends[rows],
         )
 
     def info(self) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from colibri.autopilot.control.parts.policy_interface import aim, observe, take, turn
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import Packed, compiled, without_gil
 from colibri.common.types import Array, Vector
 from colibri.plant.physics.equations import close_attitude
 from colibri.plant.physics.integrators import runge_kutta_4
@@ -67,7 +67,7 @@ def judge_race(
     return reward, 0, k
 
 
-@compiled
+@without_gil
 def advance(
     x: Array,
     actions: Array,
