@@ -21,6 +21,9 @@ def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
     ]
 
 
+_PRODUCT = "Inertia matrix: element "
+
+
 def _axes(
     name: str, key: Path, unit: str, maximum: float, what: str, scale: float, minimum: float = 0.0
 ) -> list[Number]:
@@ -33,10 +36,13 @@ def _axes(
 def _rotors() -> list[Number]:
     numbers = []
     for rotor in range(MAX_ROTORS):
-        for place, (axis, where) in enumerate((("X", "forward"), ("Y", "left"))):
+        for place, (axis, where) in enumerate((("X", "forward"), ("Y", "left"), ("Z", "up"))):
             path = ("rotors", "position_m", rotor, place)
             what = f"Rotor {rotor + 1}: position {where}"
             numbers.append(Number(f"VEH_ROT{rotor + 1}_{axis}", path, "m", -5.0, 5.0, what, decimals=4))
+        for place, axis in enumerate(_AXES):
+            what = f"Rotor {rotor + 1}: thrust direction, {axis.lower()}"
+            numbers.append(Number(f"VEH_ROT{rotor + 1}_A{axis}", ("rotors", "axis", rotor, place), "", -1.0, 1.0, what))
         part = f"Rotor {rotor + 1}: fraction of thrust"
         numbers.append(Number(f"VEH_ROT{rotor + 1}_PART", ("rotors", "strength", rotor), "norm", 0.05, 1.0, part))
     return numbers
@@ -46,6 +52,13 @@ _VEHICLE = [
     Number("VEH_GRAVITY", ("gravity_m_s2",), "m/s^2", 1.0, 30.0, "Gravity", decimals=4),
     Number("VEH_MASS", ("body", "mass_kg"), "kg", 0.01, 100.0, "Mass", decimals=4),
     *_axes("VEH_I{0}{0}", ("body", "inertia_kg_m2"), "g m^2", 1e4, "Moment of inertia about {}", 1e-3, 1e-3),
+    *(
+        Number(
+            f"VEH_I{axes}", ("body", "inertia_products_kg_m2", place), "g m^2", -1e4, 1e4, _PRODUCT + axes.lower(), 1e-3
+        )
+        for place, axes in enumerate(("XY", "XZ", "YZ"))
+    ),
+    *_axes("VEH_COM_{0}", ("body", "center_of_mass_m"), "m", 5.0, "Centre of mass along {}", 1.0, -5.0),
     Number(
         "VEH_CT", ("rotors", "thrust_coefficient"), f"uN/{_SPEED}^2", 1e-6, 1e6, "Rotor thrust coefficient", 1e-6, 6
     ),
