@@ -50,7 +50,7 @@ def _flown(count: int, seed: int, **options: Any) -> list[bytes]:
         {"id": "colibri/Track-v0", "action": "rates", "preview": 3},
         {"id": "colibri/Hover-v0", "action": "velocity", "observation": "estimate", "preview": 2, "history": 2},
         {"id": "colibri/Track-v0", "action": "position", "draw": _DRAW},
-        {"id": "colibri/Recover-v0"},
+        {"id": "colibri/Recover-v0", "vehicle": "firefly", "history": 2},
         {"id": "colibri/Recover-v0", "action": "attitude"},
         {"id": "colibri/Race-v0", "action": "rates"},
     ],
