@@ -1,10 +1,11 @@
 """Landing detection: still while the reference sinks."""
 
-from math import degrees, sqrt
+from math import degrees, dist, hypot, sqrt
 from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.elementary import acos
+from colibri.common.types import Vector
 
 _BELOW_M, _FAR_BELOW_M = 0.15, 1.0
 _STILL_M_S = 0.15
@@ -18,6 +19,8 @@ _MODEL_ERROR, _UNCARRIED_S = 0.2, 0.5
 """Of the modelled lift in parts of weight, and the lack of it that proves ground: by then a fall is 5 m/s faster."""
 _UNCARRIED_STILL_S, _FALLS_M_S2 = 0.2, 4.0
 """The same where the climb rate falls by less than this per second of weight: in the air by more than 9."""
+_JUMP_M_S = 1.0
+"""Change of the climb rate in one sample that no force causes: the estimate was corrected, or the ground was hit."""
 SUSPECTED_S = 0.1
 """Lack of lift from which on a failed sensor may take the ground for a motion."""
 
@@ -27,6 +30,10 @@ HARD_M_S, HARD_UP = 3.0, 0.5
 """Speed, and cosine of the tilt, beyond which a contact is an impact."""
 HARD_WITHIN_US = 4_000_000
 """A landing is detected at most so long after its contact."""
+
+KNOCK_SAMPLES = 6
+_KNOCK_M_S, _KNOCK_M_S2 = 2.0, 50.0
+"""Change of velocity within so many samples, and acceleration, that only a contact causes."""
 
 HELD_DOWN_M, NEAR_GROUND_M = 0.5, 1.0
 """Height that is missing after a fall, and largest distance from where the vehicle stood last."""
@@ -71,15 +78,18 @@ def watch(
 
 
 class Lack(NamedTuple):
-    """Lack of lift by CUSUM, in seconds of weight, and the climb rate before it."""
+    """Lack of lift by CUSUM, in seconds of weight, the climb rate before it, and the last climb rate."""
 
     lack_s: float = 0.0
     climb_m_s: float = 0.0
+    last_m_s: float = 0.0
 
     def after(self, lift: float, climb_m_s: float, interval_s: float) -> "Lack":
-        """Add a sample; `lift` is the rotors', in parts of weight."""
+        """Add a sample; `lift` is the rotors', in parts of weight. It begins anew where the estimate jumps."""
+        if abs(climb_m_s - self.last_m_s) > _JUMP_M_S:
+            return Lack(0.0, climb_m_s, climb_m_s)
         lack_s = max(self.lack_s + (1.0 - _MODEL_ERROR - lift) * interval_s, 0.0)
-        return Lack(lack_s, self.climb_m_s) if self.lack_s and lack_s else Lack(lack_s, climb_m_s)
+        return Lack(lack_s, self.climb_m_s if self.lack_s and lack_s else climb_m_s, climb_m_s)
 
     def is_carried(self, climb_m_s: float) -> bool:
         """Whether the ground carries the vehicle, which lacks lift for long and yet comes down on purpose.
@@ -88,6 +98,13 @@ class Lack(NamedTuple):
         """
         falls = climb_m_s - self.climb_m_s < -_FALLS_M_S2 * self.lack_s
         return self.lack_s >= (_UNCARRIED_S if falls else _UNCARRIED_STILL_S)
+
+
+class Motion(NamedTuple):
+    """The velocity at one time."""
+
+    time_us: int
+    velocity_enu_m_s: Vector
 
 
 class Hardest(NamedTuple):
@@ -115,6 +132,16 @@ class Hardest(NamedTuple):
             return ""
         tilt_deg = degrees(acos(max(self.up, -1.0)))
         return f"Impact at {self.speed_m_s:.1f} m/s" + (f", tilted {tilt_deg:.0f} degrees" if self.up < HARD_UP else "")
+
+
+def knock(before: Motion, now: Motion, height_m: float) -> str:
+    """Return the impact that the vehicle flies on from, `height_m` above the ground, as text; empty without one."""
+    speed_m_s = hypot(*before.velocity_enu_m_s)
+    if abs(height_m) > NEAR_GROUND_M or speed_m_s <= HARD_M_S:
+        return ""
+    changed_m_s = dist(before.velocity_enu_m_s, now.velocity_enu_m_s)
+    least_m_s = max(_KNOCK_M_S, _KNOCK_M_S2 * 1e-6 * (now.time_us - before.time_us))
+    return f"Impact at {speed_m_s:.1f} m/s" if changed_m_s > least_m_s else ""
 
 
 def is_below(height_m: float, state: VehicleState) -> bool:

@@ -9,7 +9,7 @@ from tools.random_flights.flights import RandomEvent, RandomFlight, case_of, fly
 
 def case(*events: RandomEvent, well: bool = True) -> RandomFlight:
     also = () if well else (RandomEvent(0.0, "silence", (0.1,)),)
-    return RandomFlight(1, "hummingbird", "state", "0@0", None, {}, 3.0, 25.0, [*events, *also])
+    return RandomFlight(1, "hummingbird", "state", "0@0", None, {}, False, 3.0, 25.0, [*events, *also])
 
 
 def test_a_seed_is_always_the_same_case() -> None:

@@ -49,6 +49,7 @@ class RandomFlight(NamedTuple):
     wind: str
     turbulence: str | None
     params: dict[str, Value]
+    may_fall: bool  # a parameter asks for it after a failure
     height_m: float
     radius_m: float  # of the fence around home
     events: list[RandomEvent]
@@ -60,7 +61,9 @@ class RandomFlight(NamedTuple):
 
     @property
     def lands(self) -> bool:
-        """Whether the vehicle should land whatever happens: at most one of its sensors fails."""
+        """Whether the vehicle should land whatever happens: at most one sensor fails, and no parameter asks to fall."""
+        if self.may_fall:
+            return False
         failed = [str(event.values[0]) for event in self.events if event.what == "inject"]
         return not failed or (len(failed) == 1 and failed[0].startswith("SENSOR_"))
 
@@ -78,14 +81,18 @@ def case_of(seed: int) -> RandomFlight:
     turbulence = chance.choice((None, None, "light", "moderate"))
     all_known = definitions(load_profile("flight"), load_vehicle(vehicle))
     known = [it for it in all_known if it.name.startswith(_DRAWN) and it.name not in _KEPT and not it.read_only]
-    params = {it.name: _value(chance, it) for it in chance.sample(known, chance.randrange(6))}
+    drawn = chance.sample(known, chance.randrange(6))
+    params = {it.name: _value(chance, it) for it in drawn}
+    may_fall = any("terminate" in dict(it.values).get(int(params[it.name]), "").lower() for it in drawn)
     events = [_mode(chance) for _ in range(chance.randint(2, 4))]
     events += [_failure(chance, feedback) for _ in range(chance.choice((0, 1, 1, 2)))]
     events += [
         RandomEvent(chance.uniform(1.0, 5.0), "wind", (f"{chance.uniform(0.0, 10.0):.1f}@{chance.randrange(360)}",))
     ]
     chance.shuffle(events)
-    return RandomFlight(seed, vehicle, feedback, wind, turbulence, params, chance.uniform(3.0, 12.0), 25.0, events)
+    return RandomFlight(
+        *(seed, vehicle, feedback, wind, turbulence, params, may_fall, chance.uniform(3.0, 12.0), 25.0, events)
+    )
 
 
 def _mode(chance: random.Random) -> RandomEvent:
@@ -123,7 +130,7 @@ def _value(chance: random.Random, parameter: Parameter) -> Value:
 MAX_IMPACT_M_S = 4.0
 """What the vehicle calls an impact is 3 m/s, by its estimate."""
 MAX_TILT_DEG = 75.0
-AIRBORNE_M, NEAR_GROUND_M = 1.0, 0.15
+AIRBORNE_M, NEAR_GROUND_M, TOUCHING_M = 1.0, 0.15, 0.03
 AFTER_S = 5.0
 LAND_WITHIN_S = 150.0
 
@@ -242,11 +249,12 @@ class _Flown:
         flight, self._frames = self.flight, self._frames + 1
         if self._frames % 4 == 0:
             self._feed()
-        armed, high = flight.armed, flight.position[2] > NEAR_GROUND_M
+        armed, before_m = flight.armed, flight.position[2]
         speed_m_s, tilt_deg = flight.speed_m_s, flight.tilt_deg
         self._plain_step()
         _, _, z = flight.position
-        if high and z <= NEAR_GROUND_M and (speed_m_s > MAX_IMPACT_M_S or tilt_deg > MAX_TILT_DEG):
+        hits = before_m > TOUCHING_M >= z and speed_m_s > MAX_IMPACT_M_S
+        if hits or (before_m > NEAR_GROUND_M >= z and tilt_deg > MAX_TILT_DEG):
             self._impact = f"impact at {speed_m_s:.1f} m/s, {tilt_deg:.0f} degrees, t = {flight.time_s:.2f} s"
         if armed and not flight.armed and z > AIRBORNE_M:
             self._impact = f"rotors stopped at {z:.1f} m, t = {flight.time_s:.2f} s"

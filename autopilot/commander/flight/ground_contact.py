@@ -1,5 +1,6 @@
 """Ground contact, and the times of arming, take-off and landing."""
 
+from collections import deque
 from typing import NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Event
@@ -7,13 +8,16 @@ from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import (
+    KNOCK_SAMPLES,
     SUSPECTED_S,
     Hardest,
     Lack,
     Landing,
+    Motion,
     is_clear,
     is_far_below,
     is_held_down,
+    knock,
     watch,
 )
 from colibri.mavlink.services.statustext import CRITICAL, INFO, NOTICE
@@ -49,6 +53,7 @@ class GroundContact:
         self._lines = lines
         self._landing = Landing()
         self._lack, self._hardest = Lack(), Hardest()
+        self._motions: deque[Motion] = deque(maxlen=KNOCK_SAMPLES)
         self.impact = ""
         self.standing = self.idles = True
         self.height_m = 0.0
@@ -82,6 +87,7 @@ class GroundContact:
     def take_off(self, now_us: int) -> None:
         self.standing = False
         self._landing, self._lack, self._hardest = Landing(), Lack(), Hardest()
+        self._motions.clear()
         self.times = self.times._replace(takeoff_us=now_us)
         self._lines.say(INFO, "Takeoff detected")
 
@@ -96,6 +102,12 @@ class GroundContact:
 
     def watch(self, now_us: int, vehicle: VehicleState, wanted_m: float, *, sinks: bool, drifts: bool = False) -> bool:
         """Detect ground in flight; return whether the vehicle fell to it, below the height that is wanted."""
+        motion, motions = Motion(now_us, vehicle.velocity_enu_m_s), self._motions
+        knocked = knock(motions[0], motion, vehicle.position_enu_m[2] - self.height_m) if motions else ""
+        if knocked:
+            self._lines.say(CRITICAL, knocked)
+            motions.clear()
+        motions.append(motion)
         if self._lack.lack_s < SUSPECTED_S:
             self._hardest = self._hardest.after(now_us, vehicle)
         fell = not sinks and self._hardest.is_recent(now_us) and is_held_down(wanted_m, vehicle, self.height_m)

@@ -1,11 +1,11 @@
 """The magnetometer: the earth's field plus the vehicle's own."""
 
-from math import radians
+from math import hypot, radians
 
 import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
-from colibri.autopilot.estimation.eskf_predict import HARD_IRON
+from colibri.autopilot.estimation.eskf_predict import ATTITUDE, GYRO_BIAS, HARD_IRON
 from colibri.autopilot.estimation.measurements.instrument import FusedInstrument, Ratio, Value
 from colibri.autopilot.estimation.measurements.kind import MeasurementKind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
@@ -23,10 +23,22 @@ _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
 """Allowed deviations from the earth's field in strength and inclination."""
 _PATIENCE_US = 10_000_000
 _INFLATED_GAUSS = 0.3
+_MEAN_S = 1.0
+_DRIFT_SIGMAS, _DRIFT_GAUSS = 8.0, 0.004
+"""The mean strength has drifted if its deviation exceeds both."""
+_DOUBT_SIGMAS, _DOUBT_GAUSS = 20.0, 0.004
+"""The mean innovation contradicts the model if it exceeds both; without failures it stays below 10 deviations."""
+_DOUBT_RAD_S, _DOUBT_IRON_GAUSS = 0.02, 0.1
+"""What the gyroscope's bias and the vehicle's own field may then have become."""
 
 
 class MagnetometerFusion(FusedInstrument):
-    """The magnetometer of one flight; `variance` in gauss²."""
+    """The magnetometer of one flight; `variance` in gauss².
+
+    A slow drift of this sensor or of the gyroscope passes the test of each sample and turns the attitude. It is seen in
+    means. The mean strength, which no error of the attitude changes, convicts the magnetometer. A mean innovation
+    does not tell which of the two drifts: both become less certain, and GPS velocity decides.
+    """
 
     part, name, numbers = "magnetometer", "field", 3
     source, bit, ratio = RejectedSource.MAGNETOMETER, mav.MAV_SYS_STATUS_SENSOR_3D_MAG, Ratio.FIELD
@@ -37,6 +49,10 @@ class MagnetometerFusion(FusedInstrument):
         self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
         self.kind = MeasurementKind(self.name, self.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
         self._watch = Watch(self.source, -_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
+        self._strength_gauss = hypot(*field_enu_gauss)
+        self._deviation_gauss = 0.0  # mean of the strength's
+        self._mean: Vector = (0.0, 0.0, 0.0)  # of the innovations, gauss
+        self._mean_us = 0
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return the field, gauss FLU."""
@@ -48,10 +64,41 @@ class MagnetometerFusion(FusedInstrument):
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         measured = np.array(value)
         is_of_earth = update.is_of_earth(x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
-        if not is_of_earth and not self.kind.reject(time_us):
+        part = min((time_us - self._mean_us) * 1e-6 / _MEAN_S, 1.0)
+        self._mean_us = time_us
+        drifts = self._drifts(x, P, value, part)
+        if (drifts or not is_of_earth) and not self.kind.reject(time_us):
             return Reason.FIELD
-        accepted = self.kind.fuse(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
+        resets = self.kind.resets
+        take = self.kind.force_accept if drifts else self.kind.fuse
+        accepted = take(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
+        if self.kind.resets != resets:
+            self._deviation_gauss, self._mean = 0.0, (0.0, 0.0, 0.0)
+        elif accepted:
+            self._doubt(P, part)
         return None if accepted else Reason.INNOVATION
+
+    def _drifts(self, x: Array, P: Array, value: Value, part: float) -> bool:
+        own_x, own_y, own_z = x[-3:].tolist()
+        own = (value[0] - own_x, value[1] - own_y, value[2] - own_z)
+        strength = hypot(*own)
+        self._deviation_gauss += part * (strength - self._strength_gauss - self._deviation_gauss)
+        if abs(self._deviation_gauss) <= _DRIFT_GAUSS:
+            return False
+        along = np.array(own) / strength
+        iron = along @ P[-3:, -3:] @ along
+        return bool(square(self._deviation_gauss) > square(_DRIFT_SIGMAS) * (0.5 * part * self.variance + iron))
+
+    def _doubt(self, P: Array, part: float) -> None:
+        (a, b, c), (mx, my, mz) = self.kind.test.innovation, self._mean
+        self._mean = mx, my, mz = (mx + part * (a - mx), my + part * (b - my), mz + part * (c - mz))
+        squared = mx * mx + my * my + mz * mz
+        if squared <= max(square(_DOUBT_GAUSS), square(_DOUBT_SIGMAS) * 0.5 * part * self.variance):
+            return
+        self._mean = (0.0, 0.0, 0.0)
+        update.inflate_covariance(P, ATTITUDE, 3, squared / square(self._strength_gauss))
+        update.inflate_covariance(P, GYRO_BIAS, 3, square(_DOUBT_RAD_S))
+        update.inflate_covariance(P, HARD_IRON, 3, square(_DOUBT_IRON_GAUSS))
 
     def typical(self) -> Value:
         return tuple(self._field.tolist())

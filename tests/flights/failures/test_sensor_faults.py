@@ -9,6 +9,7 @@ import pytest
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.core.step import Step
 from colibri.common.earth.geodesy import Geodetic
+from colibri.common.types import Vector
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.wire.dialect import mav
@@ -112,6 +113,22 @@ def test_a_landing_without_gyroscope_ends_upright(sitl: Sitl) -> None:
     sitl.wait_until(lambda: sitl.said("Landing detected"), within=3.0)
     sitl.wait_until(lambda: not sitl.armed, within=3.0)
     assert sitl.tilt_deg < 5.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "drift"), [("mag", (0.02, 0.0, 0.0)), ("gyro", (0.002, 0.0, 0.0))], ids=["magnetometer", "gyroscope"]
+)
+@pytest.mark.sitl(feedback="sensors", vehicle="jmavsim", wind="7@200", strict=False)
+def test_a_sensor_that_drifts_slowly_turns_nothing(sitl: Sitl, unit: str, drift: Vector) -> None:
+    sitl.takeoff(8.0)
+    sitl.inject(unit, "slow", 0, *drift)
+    for place in range(6):
+        sitl.goto(12.0 if place % 2 else -12.0, 6.0 * (place % 3), 8.0, wait=False)
+        sitl.run(4.0)
+    sitl.select(Mode.LAND)
+    sitl.wait_until(lambda: not sitl.armed, within=30.0)
+    assert sitl.said("Landing detected")
+    assert not any(word in text for text in sitl.texts for word in ("mpact", "attitude", "tilted"))
 
 
 @pytest.mark.long
