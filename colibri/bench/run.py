@@ -23,7 +23,7 @@ from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
 from colibri.bench.speed import CONTROL_S, LINKS, PeerSimulator, Report, rate_figures
 from colibri.bench.stages import BLOCKS, stage_figures
 from colibri.common.files import regular
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 
 PROFILE = "flight"
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
@@ -40,6 +40,7 @@ def bench(args: argparse.Namespace, peer: PeerSimulator | None = None) -> int:
         colibri_of(args.against)
     figures: dict[str, Any] = {"settings": _settings(args)}
     with (
+        one_line(EXIT_FAILED),
         _progress(parts(wanted, args.runs, beside=peer is not None, against=args.against is not None)) as report,
         TemporaryDirectory() as folder,
     ):

@@ -18,7 +18,7 @@ from colibri.certification.flights import BorderFlights, FlownErrors, fly
 from colibri.certification.loop import AnyArray
 from colibri.certification.planned_attitude import HELD_RAD, PlannedAttitude
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
@@ -103,12 +103,10 @@ class UncertifiableError(Error):
 
 
 def certify_profile(args: Namespace) -> int:
-    try:
+    with one_line():
         profile = load_profile(args.profile).with_choices(args.controller, None)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
         law = law_of(profile, vehicle, CertifiedConditions(args.moment, args.charge))
-    except Error as error:
-        fail(str(error))
     for stale in (CERTIFICATE, FIGURE):
         (args.out / stale).unlink(missing_ok=True)
     try:

@@ -19,6 +19,7 @@ from colibri.common.process.lifecycle import (
     handle_endings,
     interrupt,
     loading,
+    one_line,
     use_one_thread,
     use_safe_path,
 )
@@ -34,11 +35,9 @@ def main(argv: list[str] | None = None) -> int:
     warnings.formatwarning = lambda message, *_args: f"colibri: {message}\n"
     _check_encoding(given)
     if given and given[0] in PROCESSES:
-        try:
+        with one_line(EXIT_FAILED):
             process_code: int = import_module(f"colibri.{given[0]}.__main__").main(given[1:])
             return process_code
-        except Error as error:
-            fail(str(error), EXIT_FAILED)
     use_one_thread()
     use_safe_path()
     os.environ["MPLBACKEND"] = "agg"  # figures are files

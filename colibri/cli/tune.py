@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from colibri.cli.shared.options import add_engine, add_out
-from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted, loading
+from colibri.common.process.lifecycle import loading, one_line
 
 if TYPE_CHECKING:
     from colibri.tuning.results import TuningResults
@@ -48,21 +47,11 @@ def run(args: Namespace) -> int:
         from colibri.tuning.run import tune
 
     given = {name: value for name, value in vars(args).items() if name in _TABLES}
-    try:
-        with _progress(args.name if "name" in args else args.file.stem, quiet=args.quiet) as watcher:
-            results = tune(
-                args.file,
-                out=args.out,
-                workers=args.workers,
-                executor=args.dask,
-                resume=args.resume,
-                watcher=watcher,
-                **given,
-            )
-    except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; finished trials are in {args.out}: continue with --resume")
-    except Error as error:
-        fail(str(error), EXIT_BAD_INPUT)
+    title = args.name if "name" in args else args.file.stem
+    kept = f"; finished trials are in {args.out}: continue with --resume"
+    with one_line(kept=kept), _progress(title, quiet=args.quiet) as watcher:
+        shared = {"workers": args.workers, "executor": args.dask, "resume": args.resume}
+        results = tune(args.file, out=args.out, **shared, watcher=watcher, **given)
     if not args.quiet:
         _print(results, args.out)
     return 0

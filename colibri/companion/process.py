@@ -16,7 +16,7 @@ from colibri.autopilot.guidance.trajectories.loading import load_track, track_th
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
 from colibri.common.files import regular
-from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen, handle_endings
+from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen, handle_endings, one_line
 from colibri.common.process.status import Silent, Status
 from colibri.common.types import Address
 from colibri.companion.errors import CompanionError
@@ -113,13 +113,11 @@ def _track_name(args: Namespace) -> str:
 
 
 def fly(args: Namespace) -> int:
-    try:
+    with one_line():
         plan = plan_of(args)
         signing, warning = _signing(args.signing_key)
         check_reach([args.vehicle], signed=signing is not None, insecure=args.insecure)
         wire = _Wire(open_ground_link(args.vehicle))
-    except Error as error:
-        fail(str(error))
     stop = Stop()
     try:
         if plan.mission is not None:
@@ -147,8 +145,6 @@ def fly(args: Namespace) -> int:
                 finally:
                     if companion.ended is None:
                         wire.send(companion.last_order())
-        except Error as error:
-            fail(str(error), EXIT_FAILED)
         except OSError as error:
             fail(f"{args.out / LOG}: {error.strerror}", EXIT_FAILED)
         finally:

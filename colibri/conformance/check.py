@@ -8,7 +8,7 @@ from typing import Any
 
 from colibri.analysis.tables import markdown, print_table
 from colibri.common.errors import Error, unknown
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.process.lifecycle import EXIT_FAILED, one_line
 from colibri.conformance.flight_checks import flight_checks, time_checks
 from colibri.conformance.interface_checks import interface_checks
 from colibri.conformance.limit_checks import limit_checks
@@ -111,19 +111,16 @@ def check_by_command(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     console = Console(stderr=True)
-    try:
-        with console.status("") as status:
-            found = check_controller(
-                args.name,
-                profile=args.profile,
-                vehicle=args.vehicle,
-                seed=args.seed,
-                duration=args.duration,
-                only=args.only,
-                progress=lambda area: status.update(f"{args.name}: {area}"),
-            )
-    except Error as error:
-        fail(str(error))
+    with one_line(), console.status("") as status:
+        found = check_controller(
+            args.name,
+            profile=args.profile,
+            vehicle=args.vehicle,
+            seed=args.seed,
+            duration=args.duration,
+            only=args.only,
+            progress=lambda area: status.update(f"{args.name}: {area}"),
+        )
     if not args.quiet:
         print_table(found.title, HEADINGS, [_cells(row) for row in found.rows], names=len(HEADINGS))
     print(found.failures, end="")  # noqa: T201

@@ -12,7 +12,7 @@ import msgspec
 from colibri.common.config import UNREADABLE
 from colibri.common.errors import Error, unknown
 from colibri.common.files import read_bytes
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.flights.folder import make_folder
 from colibri.verification.cases import SitlCase, TrackCase
 from colibri.verification.golden_flights import FLIGHTS
@@ -43,10 +43,8 @@ def verify_golden(args: argparse.Namespace) -> int:
     if not args.renew:
         _check_names(path, known)
     make_folder(args.out)
-    try:
+    with one_line(EXIT_FAILED, f"; logs are in {args.out}"):
         outcomes = [fly_golden(flight, args.out / flight.name, args.link) for flight in flights]
-    except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; logs are in {args.out}")
     found = {outcome.name: outcome._asdict() for outcome in outcomes}
     (args.out / FOUND).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if args.renew:

@@ -5,8 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 from colibri.flights.processes import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
@@ -53,14 +52,11 @@ def verify(args: argparse.Namespace) -> int:
         fail(f"--{'renew' if args.renew else 'only'} goes with --golden alone")
     if args.duration is None:
         args.duration = DEFAULT_DURATION_S
-    try:
-        verdicts = [_verdict(case, args) for case in CASES]
-    except FlightError as error:
-        fail(str(error), error.code)
-    except Error as error:
-        fail(str(error), EXIT_FAILED)
-    except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; logs are in {args.out}")
+    with one_line(EXIT_FAILED, f"; logs are in {args.out}"):
+        try:
+            verdicts = [_verdict(case, args) for case in CASES]
+        except FlightError as error:
+            fail(str(error), error.code)
     if not args.quiet:
         _print(verdicts, args)
     differing = [verdict.name for verdict in verdicts if not verdict.same]

@@ -118,6 +118,19 @@ def fail_interrupted(interrupt: KeyboardInterrupt, kept: str = "") -> NoReturn:
     fail(how + kept, 128 + number)
 
 
+@contextmanager
+def one_line(code: int = EXIT_BAD_INPUT, kept: str = "") -> Iterator[None]:
+    """End with one line on an `Error`, and on an interruption if there is something `kept` to tell."""
+    try:
+        yield
+    except Error as error:
+        fail(str(error), code)
+    except KeyboardInterrupt as ended:
+        if not kept:
+            raise
+        fail_interrupted(ended, kept)
+
+
 def end_with(parent: int) -> None:
     """End this process with its parent. Call it before anything can block; `Stop` then ends it in order."""
 

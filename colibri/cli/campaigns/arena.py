@@ -32,12 +32,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from colibri.arena.run import arena
-    from colibri.common.errors import Error
-    from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted
+    from colibri.common.process.lifecycle import one_line
 
-    try:
+    with one_line(kept=f"; finished flights are in {args.out}: continue with --resume"):
         return arena(args)
-    except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; finished flights are in {args.out}: continue with --resume")
-    except Error as error:
-        fail(str(error), EXIT_BAD_INPUT)

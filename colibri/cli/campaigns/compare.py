@@ -39,18 +39,14 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from colibri.common.errors import Error
-    from colibri.common.process.lifecycle import fail
+    from colibri.common.process.lifecycle import one_line
     from colibri.flights.folder import occupied
 
-    with occupied(args.out):
-        try:
-            if args.seeds:
-                from colibri.studies.seeds import compare_seeds
+    with occupied(args.out), one_line():
+        if args.seeds:
+            from colibri.studies.seeds import compare_seeds
 
-                return compare_seeds(args)
-            from colibri.studies.compare import compare
+            return compare_seeds(args)
+        from colibri.studies.compare import compare
 
-            return compare(args)
-        except Error as error:
-            fail(str(error))
+        return compare(args)

@@ -12,8 +12,7 @@ from colibri.campaigns.factors import CampaignError, first_twice
 from colibri.campaigns.gate import handed_over, with_limits
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
-from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, fail, fail_interrupted
+from colibri.common.process.lifecycle import one_line
 from colibri.common.spec import keywords_of
 from colibri.flights.spec import FlightSpec
 
@@ -22,7 +21,7 @@ _TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
 
 
 def fly(args: Namespace) -> int:
-    try:
+    with one_line(kept=f"; finished flights are in {args.out}: continue with --resume"):
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}
         options = {name: said[name] for name in (*OF_ALL, *keywords_of(FlightSpec)) if name in said}
@@ -34,10 +33,6 @@ def fly(args: Namespace) -> int:
         with closing(FlightBar(planned.name, planned.flights, quiet=args.quiet)) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
             results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
-    except KeyboardInterrupt as ended:
-        fail_interrupted(ended, f"; finished flights are in {args.out}: continue with --resume")
-    except Error as error:
-        fail(str(error), EXIT_BAD_INPUT)
     if not (args.quiet or args.json):
         _print(results, args)
     return handed_over(results, args)

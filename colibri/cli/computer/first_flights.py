@@ -8,8 +8,8 @@ from time import perf_counter
 from typing import Any
 
 from colibri.campaigns.engines.pool import in_order
-from colibri.common.errors import Error, unknown
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.errors import unknown
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, one_line
 
 FLIGHTS: dict[str, dict[str, Any]] = {
     "flight": {},
@@ -30,11 +30,8 @@ def compile_all(names: Sequence[str], *, quiet: bool) -> int:
         if name not in FLIGHTS:
             fail(unknown("flight to compile", name, FLIGHTS))
     jobs = [name for name in FLIGHTS if name in (names or FLIGHTS) for _ in range(_SHARED_BY)]
-    try:
-        with nullcontext() if quiet else _progress():
-            in_order(_fly, jobs, "compiling", quiet=True)
-    except Error as error:
-        fail(str(error), EXIT_FAILED)
+    with one_line(EXIT_FAILED), nullcontext() if quiet else _progress():
+        in_order(_fly, jobs, "compiling", quiet=True)
     if not quiet:
         sys.stdout.write(f"compiled for {', '.join(dict.fromkeys(jobs))} in {perf_counter() - began_s:.0f} s\n")
     return 0

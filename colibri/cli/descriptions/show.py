@@ -3,9 +3,8 @@
 import sys
 from argparse import Namespace
 
-from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.lifecycle import fail, one_line
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -21,15 +20,13 @@ def run(args: Namespace) -> int:
     from colibri.autopilot.control.profile import profile_text
     from colibri.plant.vehicle.description import vehicle_text
 
-    try:
+    with one_line():
         if args.what == "law":
             _show_law(args)
         elif args.name is None:
             fail(f"show {args.what}: a name is required")
         else:
             sys.stdout.write(profile_text(args.name) if args.what == "profile" else vehicle_text(args.name))
-    except Error as error:
-        fail(str(error))
     return 0
 
 

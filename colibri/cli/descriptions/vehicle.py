@@ -6,10 +6,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from colibri.common.errors import Error, unknown
+from colibri.common.errors import unknown
 from colibri.common.files import read_text, write_bytes
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.lifecycle import fail, one_line
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -66,13 +66,11 @@ def run(args: Namespace) -> int:
     from colibri.plant.vehicle.description import load_vehicle
     from colibri.plant.vehicle.parameter_files import FILES
 
-    try:
+    with one_line():
         vehicle = load_vehicle(args.name)
         text = FILES[args.whom](
             vehicle, f"{vehicle.name}, by colibri vehicle {shlex.quote(args.name)} --for {args.whom}"
         )
-    except Error as error:
-        fail(str(error))
     if args.out is None:
         sys.stdout.write(text)
         return 0
@@ -93,10 +91,8 @@ def _new(args: Namespace) -> int:
         fail(f'vehicle new "{args.new_name}": must be a name without folders (a path goes to --out)')
     if out.suffix != ".toml":
         fail(f'--out "{out}": must end in .toml')
-    try:
+    with one_line():
         text, notes = vehicle_file(_sheet(args, name))
-    except Error as error:
-        fail(str(error))
     if out.exists() and not args.force:
         fail(f"{out} exists: choose another name, or --force to overwrite it")
     _write(out, text)

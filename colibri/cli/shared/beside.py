@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from colibri.common.errors import Error
-from colibri.common.process.lifecycle import fail, loading
+from colibri.common.process.lifecycle import fail, loading, one_line
 
 
 def add_view(add: Any) -> None:
@@ -37,9 +36,6 @@ def viewed(args: Namespace, links: list[str]) -> Iterator[None]:
         return
     with loading_viser():
         from colibri.view.run import page_beside
-    try:
-        with page_beside(say) as link:
-            args.gcs = [*links, link]
-            yield
-    except Error as error:
-        fail(str(error))
+    with one_line(), page_beside(say) as link:
+        args.gcs = [*links, link]
+        yield

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from colibri.analysis.limits import exceeded, loss_exceeds
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, fail_interrupted, one_line
 from colibri.common.spec import from_namespace
 from colibri.flights.effects import in_words
 from colibri.flights.fly import fly_plan
@@ -27,10 +27,8 @@ _UPDATES = 500
 
 
 def fly(args: argparse.Namespace) -> int:
-    try:
+    with one_line():
         plan = FlightPlan.of(from_namespace(FlightSpec, args))
-    except Error as error:
-        fail(str(error))
     with occupied(plan.out):
         return _fly(plan, args)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from colibri.cli.shared.beside import loading_viser, say
 from colibri.common.process.arguments import ArgumentParser, natural
-from colibri.common.process.lifecycle import fail
+from colibri.common.process.lifecycle import fail, one_line
 
 _LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:", "serial:")
 
@@ -25,8 +25,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from colibri.common.errors import Error
-
     links = [what for what in args.what if what.startswith(_LINKS)]
     if links and len(args.what) > 1:
         fail("one link, or folders of flights: a live vehicle and others are not shown together")
@@ -40,13 +38,11 @@ def run(args: Namespace) -> int:
             from colibri.view.opening import show_recorded
         else:
             from colibri.view.run import export, show_live
-    try:
+    with one_line():
         if recorded:
             show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=say)
         elif args.export:
             export([Path(what) for what in args.what], args.export)
         else:
             show_live(links[0], args.port, browser=not args.no_browser, say=say)
-    except Error as error:
-        fail(str(error))
     return 0
