@@ -89,10 +89,10 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "arena": CommandEntry(
-            "fly control laws on the tracks and disturbances of a set, beside published values",
+            "fly control laws on a set's tracks and disturbances, beside published values",
             "campaigns",
             """
-            colibri arena race --law agile --law my_law.py:Law    # the 25 cells of SSI-MPC
+            colibri arena race --law agile --law my_law.py:Law    # cells of SSI-MPC
             colibri arena robust policy --starts 1
             """,
         ),
@@ -133,11 +133,11 @@ GROUPS: dict[str, dict[str, CommandEntry]] = {
             """,
         ),
         "gym": CommandEntry(
-            "write the inputs and outputs of a learned policy, so that it flies as a control law",
+            "write a learned policy's inputs and outputs, so that it flies as a control law",
             "laws",
             """
+            colibri gym export policy.onnx    # then: fly --controller policy.onnx
             colibri gym export policy.onnx --env colibri/Hover-v0 --set action=rates
-            colibri fly circle --controller policy.onnx
             """,
         ),
         "certify": CommandEntry(

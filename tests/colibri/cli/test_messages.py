@@ -107,8 +107,8 @@ MESSAGES = [
     ),
     ("sitl --plant-port 0 --identity betaflight", 'argument --identity: unknown value "betaflight" (choose '),
     ("sitl --plant-port 0 --profile fast", 'unknown profile "fast" (choose agile, flight'),
-    ("sitl --plant-port 0 --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),
-    ("sitl --plant-port 0 --plant-vehicle dragonfly", 'unknown vehicle "dragonfly" (choose hummingbird'),
+    ("sitl --plant-port 0 --vehicle dragonfly", 'unknown vehicle "dragonfly" (choose crazyflie'),
+    ("sitl --plant-port 0 --plant-vehicle dragonfly", 'unknown vehicle "dragonfly" (choose crazyflie'),
     ("sitl --plant-port 0 --profile thesis", "vehicle hummingbird-thesis has no ground to stand on"),
     (
         "sitl --plant-port 0 --profile thesis --feedback sensors",
