@@ -51,6 +51,8 @@ _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
 """Resolutions of HIL_GPS: degE7, mm and cm/s."""
 _CLAIM_STEP_M = 0.01
 _IRON_WALK_GAUSS = 1e-5
+_SETTLING_US = 10_000_000
+"""After a start in the air."""
 _UNSURE_PART = 0.3
 """Uncertainty of the position correction after a bias, as a part of it."""
 _UNSURE_TIMES = 3.0
@@ -139,6 +141,7 @@ class Filter:
             x[19] = caught.pressure_height_m - x[2]
         for kind in self.kinds:
             kind.accept(time_us)
+        self.magnetometer.doubt_from_us = time_us + _SETTLING_US
 
     def _reset(self, place_enu_m: Vector) -> None:
         sensors, P = self._sensors, self.P

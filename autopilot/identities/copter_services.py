@@ -1,9 +1,10 @@
 """Services of ArduCopter beside the common ones: texts, version, stream rates, switches of the radio, simulation."""
 
 from collections.abc import Iterable, Sequence
-from math import cos, radians
+from math import radians
 
 from colibri.autopilot.ground.conventions import Served
+from colibri.common.kernels import cos
 from colibri.mavlink.hil.faults import GPS, MOTOR, OFF, OK, WRONG, Fault
 from colibri.mavlink.hil.world_changes import PaceChange, WindChange, WorldChange
 from colibri.mavlink.node.service import Peer, Send, Service, to

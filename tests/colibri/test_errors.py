@@ -21,6 +21,7 @@ PACKAGES = {"autopilot": "AutopilotError", "mavlink": "MavlinkError", "plant": "
 INSIDE = {
     "NoEffectWarning": "a warning, which ends nothing",
     "Refused": "a setpoint that is not flown is counted",
+    "_CompiledElsewhereError": "a kernel is interpreted instead, in the same file",
     "_RefusedError": "a file operation's way out, answered in the same file",
 }
 """Exceptions that are no error for a user."""

@@ -37,7 +37,8 @@ class MagnetometerFusion(FusedInstrument):
 
     A slow drift of this sensor or of the gyroscope passes the test of each sample and turns the attitude. It is seen in
     means. The mean strength, which no error of the attitude changes, convicts the magnetometer. A mean innovation
-    does not tell which of the two drifts: both become less certain, and GPS velocity decides.
+    does not tell which of the two drifts: both become less certain, and GPS velocity decides; not before
+    `doubt_from_us`, as the filter's first attitude may be wrong.
     """
 
     part, name, numbers = "magnetometer", "field", 3
@@ -53,6 +54,7 @@ class MagnetometerFusion(FusedInstrument):
         self._deviation_gauss = 0.0  # mean of the strength's
         self._mean: Vector = (0.0, 0.0, 0.0)  # of the innovations, gauss
         self._mean_us = 0
+        self.doubt_from_us = 0
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return the field, gauss FLU."""
@@ -74,7 +76,7 @@ class MagnetometerFusion(FusedInstrument):
         accepted = take(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
         if self.kind.resets != resets:
             self._deviation_gauss, self._mean = 0.0, (0.0, 0.0, 0.0)
-        elif accepted:
+        elif accepted and time_us >= self.doubt_from_us:
             self._doubt(P, part)
         return None if accepted else Reason.INNOVATION
 
@@ -85,8 +87,7 @@ class MagnetometerFusion(FusedInstrument):
         self._deviation_gauss += part * (strength - self._strength_gauss - self._deviation_gauss)
         if abs(self._deviation_gauss) <= _DRIFT_GAUSS:
             return False
-        along = np.array(own) / strength
-        iron = along @ P[-3:, -3:] @ along
+        iron = sum(own[i] * own[j] * P[i - 3, j - 3] for i in range(3) for j in range(3)) / square(strength)
         return bool(square(self._deviation_gauss) > square(_DRIFT_SIGMAS) * (0.5 * part * self.variance + iron))
 
     def _doubt(self, P: Array, part: float) -> None:

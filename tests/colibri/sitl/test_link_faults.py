@@ -180,8 +180,8 @@ def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
 
 def test_a_process_that_cannot_begin_is_quoted() -> None:
     with (
-        Flights(Setting(vehicle="three", believed="iris"), Launcher(from_scratch=True)) as flights,
-        pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*unknown vehicle"),
+        Flights(Setting(vehicle="iris", believed="three"), Launcher(from_scratch=True)) as flights,
+        pytest.raises(SessionError, match=r"the autopilot ended with exit code 2: .*unknown vehicle"),
     ):
         flights.begin()
 
