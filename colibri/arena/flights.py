@@ -1,7 +1,7 @@
 """The flights of an arena: sets as TOML files, and what each of their rows needs."""
 
 from collections.abc import Iterator
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,9 +9,10 @@ import msgspec
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.registry import track
-from colibri.autopilot.guidance.trajectories.tracks import Track, position
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, position
 from colibri.campaigns.factors import CampaignError
 from colibri.common.config import Positive, Table, read_named, toml_names
+from colibri.common.errors import unknown
 from colibri.plant.spec import Part
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
@@ -49,7 +50,7 @@ class ArenaSet(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
         tracks: Tracks by name; `{speed}` is replaced.
         speeds: Top speeds of tracks, m/s.
         worlds: Disturbances by name, each as factors of a campaign.
-        duration_s: Of the longest flight.
+        duration_s: Of the longest flight; by default tracks without an end last 100 s.
     """
 
     vehicle: str
@@ -61,6 +62,9 @@ class ArenaSet(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     published: tuple[Published, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in self.speeds:
+            if name not in self.tracks:
+                raise ValueError(f"speeds: {unknown('track', name, self.tracks)}")
         for name, text in self.tracks.items():
             if ("{speed}" in text) is not bool(self.speeds.get(name)):
                 raise ValueError(f"tracks.{name}: needs both {{speed}} and speeds.{name}, or neither")
@@ -101,8 +105,7 @@ class Arena:
         text, flown = self._track(row)
         x, y, z = (position(flown, np.zeros(1))[0] + 1e-3 * np.array(_OFFSETS_MM[start])).tolist()
         begin = {"x": x, "y": y, "z": z, "psi": 0.0, "rotors": vehicles["plant_vehicle"].hover_rpm}
-        lasts_s = min(flown.duration_s, self.set.duration_s)
-        found = {"track": text, "duration": lasts_s, "start": begin} | self.set.worlds[row.world]
+        found = {"track": text, "duration": self._duration_s(flown), "start": begin} | self.set.worlds[row.world]
         return found | (
             vehicles if vehicles["vehicle"] != vehicles["plant_vehicle"] else {"vehicle": vehicles["vehicle"]}
         )
@@ -111,12 +114,16 @@ class Arena:
         """Return the largest thrust that a track needs, without drag, in parts of what the rotors have."""
         vehicle = self.vehicle(row, "plant_vehicle")
         flown = self._track(row)[1]
-        times_s = np.arange(0.0, min(flown.duration_s, self.set.duration_s), _INTERVAL_S)
+        times_s = np.arange(0.0, self._duration_s(flown), _INTERVAL_S)
         needed = position(flown, times_s, 2) + np.array([0.0, 0.0, vehicle.gravity_m_s2])
         return float(vehicle.body.mass_kg * np.linalg.norm(needed, axis=1).max() / vehicle.max_wrench()[0])
 
+    def _duration_s(self, flown: Track) -> float:
+        lasts_s = min(flown.duration_s, self.set.duration_s)
+        return lasts_s if isfinite(lasts_s) else DURATION_S
+
     def _track(self, row: Row) -> tuple[str, Track]:
-        text = self.set.tracks[row.track].format(speed=row.speed_m_s)
+        text = self.set.tracks[row.track].replace("{speed}", repr(row.speed_m_s))
         return text, track(text)
 
 

@@ -141,6 +141,7 @@ def test_laws_of_the_examples_hold_a_point(law: str) -> None:
     [
         ("circle = [10, 20]", "", "tracks.circle: needs both {speed} and speeds.circle, or neither"),
         ("[7, 8]", "[7]", "published: theirs: circle needs a value for each of its speeds, and a world"),
+        ("[speeds]", "[speeds]\nround = [3]", 'speeds: unknown track "round" (choose circle)'),
         ('"mine.toml"', "3", "vehicle: Expected `str`, got `int`"),
     ],
 )
