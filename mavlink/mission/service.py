@@ -131,7 +131,7 @@ class MissionService:
             "MISSION_ACK": self._ack,
             "MISSION_CLEAR_ALL": self._clear_all,
             "MISSION_SET_CURRENT": self._set_current,
-            "MISSION_WRITE_PARTIAL_LIST": self._partial,
+            "MISSION_WRITE_PARTIAL_LIST": self._write_part,
             "MISSION_REQUEST_PARTIAL_LIST": self._partial,
         }
         self.handles = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
@@ -310,6 +310,17 @@ class MissionService:
             return self._text.say(WARNING, refusal.reason)
         self._announce()
         return ()
+
+    def _write_part(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Begin to replace some items, of a vehicle whose item 0 is home."""
+        plan, first, last = self._as_sent(fields.mission_type), fields.start_index, fields.end_index
+        if self._vehicle.home is None or fields.mission_type != MISSION:
+            return self._partial(fields, peer, now_us)
+        if not 0 <= first <= last < len(plan.items):
+            why = f"items {first} to {last} are not within 0 to {len(plan.items) - 1}"
+            return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, MISSION, why)
+        count = last - first + 1
+        return self._explained([self._uploads.begin(peer, MISSION, count, now_us, first=first, replaces=plan.items)])
 
     def _partial(self, fields: Any, peer: Peer, _now_us: int) -> Iterable[Send]:
         return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type, "partial lists are not supported")

@@ -53,8 +53,18 @@ class _Answer(NamedTuple):
 
 class _Upload:
     def __init__(
-        self, peer: Peer, plan_type: int, count: int, now_us: int, began_us: int, old_form: bool | None
+        self,
+        peer: Peer,
+        plan_type: int,
+        count: int,
+        now_us: int,
+        began_us: int,
+        old_form: bool | None,
+        first: int = 0,
+        replaces: Sequence[MissionItem] = (),
     ) -> None:
+        """Take `count` items from number `first` on; of a part, `replaces` has the items of the whole plan."""
+        self.first, self.replaces = first, replaces
         self.peer = peer
         self.began_us = began_us  # also of those that the channel began and replaced
         self.plan_type = plan_type
@@ -77,7 +87,17 @@ class _Upload:
         self.asked_in_old_form |= old
         self.due_us = now_us + ASK_EVERY_US
         name = "MISSION_REQUEST" if old else "MISSION_REQUEST_INT"
-        return to(self.peer, name, self.peer.system, self.peer.component, len(self.items), self.plan_type)
+        return to(self.peer, name, self.peer.system, self.peer.component, self.next, self.plan_type)
+
+    @property
+    def next(self) -> int:
+        """Number of the item that is requested."""
+        return self.first + len(self.items)
+
+    @property
+    def whole(self) -> list[MissionItem]:
+        """The plan with the uploaded items in place."""
+        return [*self.replaces[: self.first], *self.items, *self.replaces[self.next :]]
 
     def take(self, item: MissionItem, now_us: int) -> None:
         self.items.append(item)
@@ -112,8 +132,20 @@ class Uploads:
         self._answers: dict[int, _Answer] = {}
         self.due_us = NEVER_US
 
-    def begin(self, peer: Peer, plan_type: int, count: int, now_us: int) -> Send:
-        """Handle a MISSION_COUNT: a repeated one restarts; another station's upload is finished first."""
+    def begin(
+        self,
+        peer: Peer,
+        plan_type: int,
+        count: int,
+        now_us: int,
+        *,
+        first: int = 0,
+        replaces: Sequence[MissionItem] = (),
+    ) -> Send:
+        """Handle a MISSION_COUNT: a repeated one restarts; another station's upload is finished first.
+
+        With `replaces`, the items from `first` on replace those of this plan.
+        """
         other = self._under_way.get(plan_type)
         began_us = other.began_us if other is not None and other.peer.channel == peer.channel else now_us
         if other is not None and other.peer != peer:
@@ -127,7 +159,9 @@ class Uploads:
             return self._refuse(peer, mav.MAV_MISSION_NO_SPACE, plan_type, f"{count} items, more than {maximum}")
         if count == 0:  # "has the same effect as clearing the mission"
             return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)
-        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us, began_us, self._first_form)
+        upload = self._under_way[plan_type] = _Upload(
+            peer, plan_type, count, now_us, began_us, self._first_form, first, replaces
+        )
         return self._asking(upload, now_us)
 
     def expects(self, peer: Peer, plan_type: int) -> bool:
@@ -139,7 +173,7 @@ class Uploads:
         upload = self._under_way.get(fields.mission_type)
         if upload is None or upload.peer != peer:
             return self._answer_again(fields, peer, now_us)
-        expected = len(upload.items)
+        expected = upload.next
         if fields.seq < expected:  # a copy: to ask again would have every later item sent twice
             return None
         if fields.seq > expected:  # "the expected item should be re-requested"
@@ -192,7 +226,7 @@ class Uploads:
                 continue
             del self._under_way[upload.plan_type]
             if not upload.quiet:
-                why = f"item {len(upload.items)} of {upload.count} did not arrive"
+                why = f"item {upload.next} of {upload.first + upload.count} did not arrive"
                 sends.append(self._refuse(upload.peer, mav.MAV_MISSION_OPERATION_CANCELLED, upload.plan_type, why))
         self._schedule()
         return sends
@@ -203,10 +237,11 @@ class Uploads:
         return send
 
     def _complete(self, upload: _Upload, now_us: int) -> Send:
-        result, seq = self._rules[upload.plan_type].check_plan(upload.items)
+        items = upload.whole
+        result, seq = self._rules[upload.plan_type].check_plan(items)
         if result != ACCEPTED:
-            self._blame(upload, seq, fault_of(upload.items[seq], result))
-        plan_id = self._store(upload.plan_type, upload.items).id if result == ACCEPTED else 0
+            self._blame(upload, seq, fault_of(items[seq], result))
+        plan_id = self._store(upload.plan_type, items).id if result == ACCEPTED else 0
         return self._end(upload, result, plan_id, now_us)
 
     def take_reason(self) -> str:
@@ -224,7 +259,7 @@ class Uploads:
     def _end(self, upload: _Upload, result: int, plan_id: int, now_us: int) -> Send:
         self.drop(upload.peer, (upload.plan_type,))
         send = ack(upload.peer, result, upload.plan_type, plan_id)
-        last = max(0, len(upload.items) - 1) if result == ACCEPTED else len(upload.items)
+        last = max(0, upload.next - 1) if result == ACCEPTED else upload.next
         self._answers[upload.plan_type] = _Answer(upload.peer, last, send, now_us)
         return send
 

@@ -8,7 +8,7 @@ from math import degrees, hypot, isfinite
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry import controller, sensors
+from colibri.mavlink.telemetry import controller, sensors, status
 from colibri.mavlink.telemetry.encoder import (
     Encoder,
     boot_ms,
@@ -24,7 +24,7 @@ from colibri.mavlink.telemetry.status import ESTIMATED
 from colibri.mavlink.wire.dialect import mav
 
 GRAVITY_M_S2 = 9.81
-_FREE_BYTES = 2**17
+_STABILIZE, _ALT_HOLD = 0, 2
 _SERVO_MV, _BOARD_MV = 0, 5000
 _NO_RSSI = 255
 _CHANNELS = 18
@@ -44,6 +44,16 @@ def ekf_status_report(s: TelemetrySnapshot) -> Fields:
         report = (report & ~_PLACE & ~2) | _CONSTANT_POSITION
     ratios = (0.05, 0.05, 0.05, 0.05) if s.estimator is None else (*s.estimator.ratios[:3], s.estimator.ratios[3])
     return (report, *(min(ratio, 1.0) if isfinite(ratio) else 0.0 for ratio in ratios), 0.0)
+
+
+def sys_status(s: TelemetrySnapshot) -> Fields:
+    """SYS_STATUS (1), with the controls of height and position enabled by the mode."""
+    present, enabled, *others = status.sys_status(s)
+    if s.custom_mode == _STABILIZE:
+        enabled &= ~mav.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    if s.custom_mode in (_STABILIZE, _ALT_HOLD):
+        enabled &= ~mav.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    return (present, enabled, *others)
 
 
 def ahrs(s: TelemetrySnapshot) -> Fields:
@@ -127,6 +137,7 @@ def _second(s: TelemetrySnapshot) -> Fields:
 
 _ENCODERS = {
     "EKF_STATUS_REPORT": ekf_status_report,
+    "SYS_STATUS": sys_status,
     "AHRS": ahrs,
     "AHRS2": ahrs2,
     "SIMSTATE": simstate,
