@@ -27,7 +27,7 @@ from colibri.autopilot.guidance.attitude_reference import AttitudeReference, att
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.autopilot.identities import CONVENTIONS
+from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Retuning, Tuned, builder
 from colibri.mavlink.node.budget import Budget
@@ -70,7 +70,7 @@ def parts_of(
 ) -> Parts:
     """Return the parts of a vehicle; arguments and errors are those of `copter_autopilot`."""
     numbers = Numbers(profile, vehicle)
-    conventions = CONVENTIONS[settings.identity]
+    conventions = conventions_of(settings.identity)
     parameters = conventions.parameters(definitions(profile, vehicle, settings.system_id), settings.system_id)
     parameters.load(values or {})
     flown, assumed = numbers.applied(parameters.values)

@@ -1,7 +1,11 @@
-"""The identities towards ground stations, one file each; a further one needs a file and a line here."""
+"""The identities towards ground stations, one file each; only the one that is flown is loaded."""
+
+from importlib import import_module
 
 from colibri.autopilot.ground.conventions import Conventions
-from colibri.autopilot.identities.ardupilot import ARDUPILOT
-from colibri.mavlink.services.identity import GENERIC, PX4
 
-CONVENTIONS = {each.wire.name: each for each in (Conventions(wire=PX4), ARDUPILOT, Conventions(wire=GENERIC))}
+
+def conventions_of(name: str) -> Conventions:
+    """Return the conventions of an identity: `CONVENTIONS` in the file of its name."""
+    found: Conventions = import_module(f"{__name__}.{name}").CONVENTIONS
+    return found

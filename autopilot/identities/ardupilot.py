@@ -202,7 +202,7 @@ def _kept_plans(parameters: Parameters) -> Collection[int]:
 
 _BANNER = ("ArduCopter V4.6.0-dev (c0118121)", 4 * "c0118121", "Frame: QUAD/PLUS", "ArduPilot Ready")
 _ALONG_HEADING = LOCAL_FRAMES[mav.MAV_FRAME_BODY_OFFSET_NED]
-ARDUPILOT = Conventions(
+CONVENTIONS = Conventions(
     wire=WIRE,
     modes=MODES,
     commands=lambda parts: _commands(parts),

@@ -15,7 +15,7 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import MAX_SAID, StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.autopilot.guidance.trajectories.loading import load_track
-from colibri.autopilot.identities import CONVENTIONS
+from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
@@ -64,7 +64,7 @@ class GroundService:
             signing_key=spec.signing_key,
             clock=lambda: tick_at(time()),
             params=spec.params,
-            conventions=CONVENTIONS[spec.identity],
+            conventions=conventions_of(spec.identity),
         )
         for warning in self._state.warnings:
             status.say("said", f"warning: {warning}")
@@ -231,7 +231,7 @@ class GroundService:
 
     def _new_autopilot(self, history: History | None) -> Autopilot[Copter]:
         spec = self._spec
-        conventions = CONVENTIONS[spec.identity]
+        conventions = conventions_of(spec.identity)
         self._values = conventions.booted(self._state.parameters())
         self._past_bytes = b"" if history is None else to_bytes(history)
         settings = StationSettings(

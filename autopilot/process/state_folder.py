@@ -7,7 +7,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.ground.conventions import Conventions
-from colibri.autopilot.identities import CONVENTIONS
+from colibri.autopilot.identities.px4 import CONVENTIONS as PX4_CONVENTIONS
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.errors import unknown
 from colibri.common.files import private, read_bytes, read_text, regular
@@ -46,7 +46,7 @@ class StateFolder:
         signing_key: Path | None,
         clock: Callable[[], int],
         params: Mapping[str, float] = {},
-        conventions: Conventions = CONVENTIONS["px4"],
+        conventions: Conventions = PX4_CONVENTIONS,
     ) -> None:
         """Open the folder, or raise FolderInUseError or GroundError.
 

@@ -7,7 +7,7 @@ from math import dist, nan, pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.identities import CONVENTIONS
+from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.autopilot.process.station_events import StationEvents
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
@@ -81,7 +81,7 @@ class Sitl(View, Stepped, Steered):
 
     def __init__(self, setting: Setting, lockstep: LockstepSession, origin: Geodetic) -> None:
         self.setting = setting
-        self._conventions = CONVENTIONS[setting.identity]
+        self._conventions = conventions_of(setting.identity)
         self.origin = origin
         self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
         self.record = Record()

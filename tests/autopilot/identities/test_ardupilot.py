@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.identities import CONVENTIONS
+from colibri.autopilot.identities import conventions_of
 from colibri.autopilot.parameters.definitions import behaviour, definitions
 from colibri.mavlink.client.parameters import ListParameters
 from colibri.mavlink.mission.items import MISSION
@@ -15,7 +15,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl import mission_items as items
 from colibri.sitl.vehicle import Sitl
 
-ARDUPILOT = CONVENTIONS["ardupilot"]
+ARDUPILOT = conventions_of("ardupilot")
 AS_ARDUPILOT = pytest.mark.sitl(identity="ardupilot")
 ACCEPTED, DENIED, FAILED = mav.MAV_RESULT_ACCEPTED, mav.MAV_RESULT_DENIED, mav.MAV_RESULT_FAILED
 GLOBAL, RELATIVE = mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
