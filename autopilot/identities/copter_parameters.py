@@ -95,7 +95,7 @@ def copter_parameters(ours: Iterable[Parameter], system_id: int) -> Parameters:
     own = {"SYSID_THISMAV": system_id}
     theirs = [row.parameter(own.get(row.name, row.default)) for row in rows()]
     defaults = {each.name: each.default for each in theirs}
-    links = Links({each.name: each for each in (*ours, *theirs)})
+    links = ParameterLinks({each.name: each for each in (*ours, *theirs)})
     return Parameters(
         links.definitions.values(), links=links, initial={**_OURS_FROM_THE_START, **links(defaults, defaults)}
     )
@@ -107,7 +107,7 @@ def booted(values: dict[str, Value]) -> dict[str, Value]:
     return {**values, "STAT_BOOTCNT": int(starts) % 32_767 + 1, "STAT_RESET": 1}
 
 
-class Links:
+class ParameterLinks:
     """Changes that follow from others."""
 
     def __init__(self, definitions: Mapping[str, Parameter]) -> None:

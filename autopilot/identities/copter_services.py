@@ -255,7 +255,7 @@ class Switches:
                 self._served.pilot.disarm(force=manual)
 
 
-class Simulation:
+class SimulatedWorld:
     """Changes of the simulated world by SIM_*."""
 
     handles = frozenset[str]()
@@ -318,5 +318,5 @@ _WORLD_AT_REST: dict[str, Fault | WorldChange] = {
 
 
 def copter_services(served: Served) -> Sequence[Service]:
-    kinds = (Greeter, VersionRequests, StreamRates, PreArm, Switches, Simulation)
+    kinds = (Greeter, VersionRequests, StreamRates, PreArm, Switches, SimulatedWorld)
     return [kind(served) for kind in kinds]

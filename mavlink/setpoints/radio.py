@@ -16,7 +16,6 @@ from colibri.mavlink.setpoints.manual_control import (
     MIN_US,
     RELEASED,
     UNCHANGED,
-    VALID_US,
     Channels,
     Controls,
     Manual,
@@ -33,7 +32,7 @@ FAILED, THROTTLE_LOW = 1, 2
 LOW_US = 950
 
 
-class Settings(Protocol):
+class RadioSettings(Protocol):
     """Values by name."""
 
     def __getitem__(self, name: str, /) -> float: ...
@@ -47,7 +46,7 @@ class Radio(Manual):
         system_id: int,
         text: StatusText,
         transmitter: tuple[int, ...],
-        settings: Settings,
+        settings: RadioSettings,
     ) -> None:
         """`transmitter` has the channels without overrides; `settings` are parameters by name."""
         super().__init__(system_id, text)
@@ -65,18 +64,13 @@ class Radio(Manual):
             return controls
         fields = message.fields
         given = [getattr(fields, f"chan{number}_raw", 0) for number in range(1, CHANNELS + 1)]
-        minimum, maximum = VALID_US
         changes: dict[int, int] = {}
         for number, value in enumerate(given, start=1):
             extended = number >= _FIRST_EXTENDED
             if value == UNCHANGED or (extended and value == RELEASED):
                 continue
-            if value == RELEASED or (extended and value == _RELEASED_EXTENDED):
-                changes[number] = RELEASED
-            elif minimum <= value <= maximum:
-                changes[number] = value
-            else:
-                raise Refused("out of range", f"channel {number} {value}")
+            released = value == RELEASED or (extended and value == _RELEASED_EXTENDED)
+            changes[number] = RELEASED if released else value
         self._override(changes, now_us)
         return None
 
