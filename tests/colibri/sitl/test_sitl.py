@@ -22,6 +22,7 @@ DOCS = ROOT / "docs" / "scenarios.md"
 MODULE = "colibri.pytest_plugin"
 KNOWN = ("-W", "ignore::pytest.PytestUnknownMarkWarning")
 """Lets a test have an unregistered mark."""
+CACHES = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
 HOVER = """
     import pytest
 
@@ -39,6 +40,12 @@ def _loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         flights.begin()
         flights.keep(tmp_path_factory.mktemp("loaded"))
+
+
+@pytest.fixture(autouse=True)
+def _kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let processes of a run inside this one find compiled kernels, though it has a home of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", CACHES)
 
 
 def options() -> list[str]:
