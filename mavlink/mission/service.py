@@ -313,9 +313,9 @@ class MissionService:
 
     def _write_part(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         """Begin to replace some items, of a vehicle whose item 0 is home."""
-        plan, first, last = self._as_sent(fields.mission_type), fields.start_index, fields.end_index
         if self._vehicle.home is None or fields.mission_type != MISSION:
             return self._partial(fields, peer, now_us)
+        plan, first, last = self._as_sent(MISSION), fields.start_index, fields.end_index
         if not 0 <= first <= last < len(plan.items):
             why = f"items {first} to {last} are not within 0 to {len(plan.items) - 1}"
             return self._refuse(peer, mav.MAV_MISSION_INVALID_SEQUENCE, MISSION, why)
