@@ -136,8 +136,10 @@ class Hardest(NamedTuple):
 
 def knock(before: Motion, now: Motion, height_m: float) -> str:
     """Return the impact that the vehicle flies on from, `height_m` above the ground, as text; empty without one."""
+    if abs(height_m) > NEAR_GROUND_M:
+        return ""
     speed_m_s = hypot(*before.velocity_enu_m_s)
-    if abs(height_m) > NEAR_GROUND_M or speed_m_s <= HARD_M_S:
+    if speed_m_s <= HARD_M_S:
         return ""
     changed_m_s = dist(before.velocity_enu_m_s, now.velocity_enu_m_s)
     least_m_s = max(_KNOCK_M_S, _KNOCK_M_S2 * 1e-6 * (now.time_us - before.time_us))

@@ -1,12 +1,10 @@
 """Episodes of many vehicles, without gymnasium: draws, resets, steps, snapshots."""
 
-from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 from math import ceil
-from pathlib import Path, PurePath
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -18,14 +16,13 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.sampling import sampled_track
 from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
 from colibri.autopilot.spec import Trajectory
-from colibri.campaigns.factors import CampaignError, Draw, is_number, read_draw
+from colibri.campaigns.factors import is_number
 from colibri.common.errors import shown, unknown
 from colibri.common.jit import packed
-from colibri.common.matrices import norm
 from colibri.common.types import Array
 from colibri.gym import kernels
+from colibri.gym.arguments import gate_points, gates_of, mapping_of, read_draws, wind_of, within
 from colibri.gym.errors import GymError
 from colibri.plant.environment.air import CALM
 from colibri.plant.environment.weather import Wind
@@ -33,7 +30,6 @@ from colibri.plant.physics.integrators import RK4_STEP_S
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import starting_world
-from colibri.plant.texts import wind as read_wind
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 ActionKind = Literal["rotors", "rates", "attitude", "velocity", "position"]
@@ -84,6 +80,19 @@ class EpisodesSnapshot(NamedTuple):
     chances: tuple[Mapping[str, Any] | None, ...]
     flight: Any = None
     """With actions through the autopilot: the environment's flight, and its snapshot."""
+
+
+class Begun(NamedTuple):
+    """The beginning of an episode as drawn; `lost` is a rotor without thrust, or -1."""
+
+    vehicle: Vehicle
+    wind: Wind
+    lost: int
+    x: Array
+    action: Array
+    parameters: Any
+    mixer: Array
+    scale: Array
 
 
 class Episodes:
@@ -152,13 +161,13 @@ class Episodes:
             self.reference = self._sampled("hover" if track is None else track, duration)
             self._first = self.reference[0].copy()
         elif track is None:
-            points = _points(gates)
-            self.reference, self._stride = _gates(points, preview), 1
+            points = gate_points(gates)
+            self.reference, self._stride = gates_of(points, preview), 1
             self._first = np.array((*points[0], 0.0, 0.0, 0.0))
         else:
             raise GymError(f'track must be left out, not "{shown(track)}", in a race through gates')
         drawn = self.near if start == "near" else {**_THROWN, "lost": {"choice": [-1, *range(rotors)]}}
-        self._fixed, self._draws = _read_draws({**drawn, **_mapping(draw)})
+        self._fixed, self._draws = read_draws({**drawn, **mapping_of(draw)})
         for end in (0, -1):  # both ends of every range must fly
             first = self._drawn({**self._fixed, **{key: each.typical[end] for key, each in self._draws.items()}})
         self.x = np.zeros((count, first.x.size))
@@ -181,7 +190,7 @@ class Episodes:
         self.flying[n] = True
         self._observe(n)
 
-    def _begin(self, n: int, begun: "Begun") -> None:
+    def _begin(self, n: int, begun: Begun) -> None:
         self.x[n], self._last[n] = begun.x, begun.action
         self._parameters[n], self._mixers[n], self._scales[n] = begun.parameters[0], begun.mixer, begun.scale
 
@@ -305,7 +314,7 @@ class Episodes:
         times_s = np.arange(self.length + 2 + self.preview * self._stride, dtype=np.float64) * self.interval_s
         return np.ascontiguousarray(np.hstack([position(track.track, times_s, order) for order in (0, 1)]))
 
-    def _drawn(self, values: Mapping[str, Any]) -> "Begun":
+    def _drawn(self, values: Mapping[str, Any]) -> Begun:
         wind, lost = Wind(0.0, 0.0), -1
         start: dict[str, float] = {}
         changes: list[tuple[str, Any]] = []
@@ -352,88 +361,3 @@ class Episodes:
             built = (vehicle, vehicle.hover_rpm, parameters, *scale_of(vehicle, self.max_rates))
             self._last_built = changes, built
         return self._last_built[1]
-
-
-class Begun(NamedTuple):
-    """The beginning of an episode as drawn; `lost` is a rotor without thrust, or -1."""
-
-    vehicle: Vehicle
-    wind: Wind
-    lost: int
-    x: Array
-    action: Array
-    parameters: Any
-    mixer: Array
-    scale: Array
-
-
-def _points(given: Any) -> Array:
-    """Return start and gates, ENU, (n, 3), of a waypoint file or an array."""
-    if isinstance(given, str | PurePath):
-        return read_waypoints(Path(given)).points_enu_m
-    try:
-        points = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        points = np.empty(0)
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2 or not np.isfinite(points).all():
-        raise GymError(f'gates must be a waypoint file, or points (n, 3) in m from the start on, not "{shown(given)}"')
-    if (np.diff(points, axis=0) == 0.0).all(axis=1).any():
-        raise GymError("gates: two points in a row are the same")
-    return points
-
-
-def _gates(points: Array, preview: int) -> Array:
-    """Return the gates of `kernels.judge_race`: each is passed in the direction from the one before to the next."""
-    legs = np.diff(points, axis=0)
-    ways = legs.copy()
-    ways[:-1] += legs[1:]
-    back = (ways == 0.0).all(axis=1)
-    ways[back] = legs[back]
-    lengths = [[norm(leg)] for leg in legs]
-    units = np.array([way / norm(way) for way in ways])
-    gates = np.hstack([points[1:], units, lengths])
-    return np.vstack([gates, np.tile((*points[-1], *units[-1], 0.0), (preview + 1, 1))])
-
-
-def _mapping(draw: Any) -> Mapping[str, Any]:
-    if draw is not None and not isinstance(draw, Mapping):
-        raise GymError(f'draw must be a table of keys, not {type(draw).__name__} "{shown(draw)}"')
-    return draw or {}
-
-
-def _read_draws(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Draw]]:
-    """Return fixed values and distributions by key, in alphabetical order."""
-    known = ("wind", "lost", "vehicle.body.mass_kg", *(f"start.{key}" for key in Start._fields))
-    fixed: dict[str, Any] = {}
-    draws: dict[str, Draw] = {}
-    for key in sorted(map(str, given)):
-        if key not in known and not key.startswith("vehicle."):
-            raise GymError(unknown("key of draw", key, known))
-        value = given[key]
-        try:
-            if isinstance(value, Mapping):
-                draws[key] = read_draw(f"draw: {key}", value)
-            else:
-                fixed[key] = value
-        except CampaignError as error:
-            raise GymError(str(error)) from None
-    starts = [(key, each) for key in draws if key.startswith("start.") for each in draws[key].typical]
-    for key, value in (*starts, *((key, value) for key, value in fixed.items() if key.startswith("start."))):
-        if not is_number(value):
-            raise GymError(f'draw: {key} must be a number, not "{shown(value)}"')
-    return fixed, draws
-
-
-def wind_of(given: Any) -> Wind:
-    try:
-        wind = given if isinstance(given, Wind) else read_wind(str(given))
-    except ArgumentTypeError as error:
-        raise GymError(f"draw: wind: {error}") from None
-    if not isinstance(wind, Wind):
-        raise GymError(f'draw: wind must be constant, "5@270" say, not a file "{shown(given)}"')
-    return wind
-
-
-def within(name: str, given: Any, least: float, most: float, unit: str) -> None:
-    if not is_number(given) or not least <= given <= most:
-        raise GymError(f'{name} must be a number from {least:g} to {most:g} {unit}, not "{shown(given)}"')

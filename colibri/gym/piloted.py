@@ -19,7 +19,8 @@ from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array, Vector
 from colibri.flights.flight import Direct, SteppedFlight
 from colibri.gym import kernels
-from colibri.gym.episodes import Begun, Episodes, EpisodesSnapshot, within
+from colibri.gym.arguments import within
+from colibri.gym.episodes import Begun, Episodes, EpisodesSnapshot
 from colibri.gym.errors import GymError
 from colibri.mavlink.hil.faults import MOTOR, OFF, Fault
 from colibri.mavlink.hil.feedback import Feedback

@@ -165,7 +165,7 @@ class Rotors(Table, frozen=True, kw_only=True):
         return found
 
     def px4_numbering(self) -> Numbering:
-        """Return the numbering; the vehicle's own where PX4 knows none, as it is told the places of all rotors."""
+        """Return PX4's numbering of this frame, or the vehicle file's for a frame that PX4 has no numbers for."""
         return numbering(self.position_m, self.direction) or Numbering("", reverse=False, rotors=(*range(self.count),))
 
 

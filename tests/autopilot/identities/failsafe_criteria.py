@@ -1,0 +1,193 @@
+"""Criteria of ArduPilot's tests of return, fences and failsafes."""
+
+from math import dist, hypot, nan
+
+from colibri.mavlink.wire.dialect import mav
+from colibri.sitl import mission_items as items
+from colibri.sitl.vehicle import Sitl
+from tests.autopilot.identities.copter_words import (
+    ACCEPTED,
+    AUTO,
+    BRAKE,
+    FAILED,
+    GUIDED,
+    LAND,
+    RTL,
+    STABILIZE,
+    ground_speed,
+    heading,
+    height,
+    held,
+    home_and_disarmed,
+    in_auto,
+    in_mode,
+    latest,
+    near_angle,
+    says,
+    shown,
+    steered,
+    upload,
+)
+from tests.autopilot.identities.flight_criteria import velocity
+
+
+def return_facing(sitl: Sitl) -> None:
+    sitl.takeoff(15.0)
+    sitl.goto(30.0, 30.0, 15.0, wait=False)
+    sitl.command(mav.MAV_CMD_CONDITION_YAW, 45.0)
+    sitl.wait_until(lambda: dist(sitl.position, (30.0, 30.0, 15.0)) < 1.0, within=40.0)
+    sitl.select("RTL")
+    sitl.wait_until(lambda: near_angle(heading(sitl), 225.0), within=20.0)
+    sitl.wait_until(lambda: near_angle(heading(sitl), 0.0), within=60.0)
+
+
+def return_at_height(sitl: Sitl) -> None:
+    sitl.takeoff(15.0)
+    sitl.goto(0.0, 100.0, 15.0)
+    sitl.select("RTL")
+    sitl.wait_until(lambda: abs(ground_speed(sitl) - 7.0) < 0.5, within=30.0)
+    held(sitl, lambda: abs(ground_speed(sitl) - 7.0) < 0.5, 3.0, "speed")
+    sitl.wait_until(lambda: dist(sitl.position, (0.0, 0.0, 10.0)) < 1.0, within=80.0)
+    held(sitl, lambda: dist(sitl.position, (0.0, 0.0, 10.0)) < 2.0 and sitl.armed, 20.0, "hover")
+
+
+def return_to_rally(sitl: Sitl) -> None:
+    sitl.upload_rally([items.Item(mav.MAV_CMD_NAV_RALLY_POINT, place=(-25.0, 50.0, 37.0))])
+    sitl.takeoff(10.0)
+    sitl.goto(-20.0, 30.0, 20.0)
+    sitl.select("RTL")
+    sitl.wait_until(lambda: not sitl.armed, within=200.0)
+    assert hypot(sitl.position[0] + 25.0, sitl.position[1] - 50.0) < 2.0
+
+
+def circle_fence(sitl: Sitl) -> None:
+    sitl.set_param("FENCE_ENABLE", 1)
+    sitl.takeoff(10.0)
+    velocity(sitl, 8.0, 0.0, 0.0)
+    while shown(sitl) != RTL:
+        velocity(sitl, 8.0, 0.0, 0.0)
+        sitl.run(1.0)
+        assert sitl.time_us < 120e6
+    assert latest(sitl, "FENCE_STATUS").breach_status
+    home_and_disarmed(sitl)
+
+
+def height_fence(sitl: Sitl) -> None:
+    sitl.set_param("FENCE_ENABLE", 1)
+    sitl.takeoff(10.0)
+    while shown(sitl) != RTL:
+        velocity(sitl, 0.0, 0.0, -2.0)
+        sitl.run(1.0)
+        assert sitl.time_us < 120e6
+    home_and_disarmed(sitl)
+
+
+def floor_fence(sitl: Sitl) -> None:
+    sitl.takeoff(20.0)
+    assert sitl.command(mav.MAV_CMD_DO_FENCE_ENABLE, 1.0) == ACCEPTED
+    sitl.run(1.0)
+    while shown(sitl) != RTL:
+        velocity(sitl, 0.0, 0.0, 1.0)
+        sitl.run(1.0)
+        assert height(sitl) > 7.0
+    home_and_disarmed(sitl)
+
+
+def radio_failsafe(sitl: Sitl) -> None:
+    sitl.select("STABILIZE")
+    sitl.arm()
+    sitl.set_param("SIM_RC_FAIL", 1)
+    sitl.wait_until(lambda: not sitl.armed, within=2.0)
+    sitl.set_param("SIM_RC_FAIL", 0)
+    for action, mode in ((1, RTL), (3, LAND)):
+        sitl.set_param("FS_THR_ENABLE", action)
+        sitl.takeoff(10.0)
+        sitl.set_param("SIM_RC_FAIL", 1)
+        in_mode(sitl, mode)
+        sitl.set_param("SIM_RC_FAIL", 0)
+        sitl.run(2.0)
+        assert shown(sitl) == mode
+        home_and_disarmed(sitl)
+    sitl.set_param("FS_OPTIONS", 4)
+    sitl.takeoff(10.0)
+    sitl.set_param("SIM_RC_FAIL", 1)
+    sitl.run(3.0)
+    assert shown(sitl) == GUIDED
+
+
+def station_failsafe(sitl: Sitl) -> None:
+    for action, mode in ((1, RTL), (5, LAND)):
+        sitl.set_param("FS_GCS_ENABLE", action)
+        sitl.takeoff(10.0)
+        sitl.gcs.silent = True
+        in_mode(sitl, mode, 8.0)
+        sitl.gcs.silent = False
+        says(sitl, "GCS Failsafe Cleared")
+        home_and_disarmed(sitl)
+
+
+def battery_failsafe(sitl: Sitl) -> None:
+    def charge_state() -> int:
+        return int(latest(sitl, "BATTERY_STATUS").charge_state)
+
+    for action, mode in ((2, RTL), (1, LAND), (7, BRAKE)):
+        sitl.set_param("BATT_FS_LOW_ACT", action)
+        sitl.takeoff(10.0)
+        assert charge_state() == mav.MAV_BATTERY_CHARGE_STATE_OK
+        sitl.set_param("SIM_BATT_VOLTAGE", 11.4)
+        in_mode(sitl, mode, 20.0)
+        says(sitl, "Battery 1 is low")
+        assert charge_state() == mav.MAV_BATTERY_CHARGE_STATE_LOW
+        sitl.select("LAND")
+        home_and_disarmed(sitl)
+        sitl.set_param("SIM_BATT_VOLTAGE", 12.5)
+        sitl.run(3.0)
+    sitl.set_param("BATT_FS_LOW_ACT", 0)
+    sitl.set_param("BATT_FS_CRT_ACT", 1)
+    sitl.takeoff(10.0)
+    sitl.set_param("SIM_BATT_VOLTAGE", 10.0)
+    in_mode(sitl, LAND, 20.0)
+    says(sitl, "Battery 1 is critical")
+    assert charge_state() == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
+
+
+def without_receiver(sitl: Sitl) -> None:
+    upload(sitl, items.takeoff(10.0), items.Item(mav.MAV_CMD_NAV_LOITER_TIME, (5.0, 0.0, 0.0, nan), (0.0, 0.0, 10.0)))
+    in_auto(sitl)
+    sitl.wait_until(lambda: height(sitl) > 5.0, within=30.0)
+    sitl.set_param("SIM_RC_FAIL", 1)
+    sitl.run(5.0)
+    assert shown(sitl) == AUTO
+    sitl.run(10.0)
+    assert sitl.command(mav.MAV_CMD_DO_SET_MODE, 1.0, STABILIZE) == FAILED
+    sitl.select("GUIDED")
+    held(sitl, lambda: ground_speed(sitl) <= 0.1, 10.0, "standing")
+    steered(sitl, 1.0, c1=1500, c2=1500, c3=1500, c4=1500)
+    sitl.select("LOITER")
+    steered(sitl, 8.0, c3=1800)
+    assert height(sitl) > 20.0
+
+
+def weak_motor(sitl: Sitl) -> None:
+    sitl.takeoff(20.0)
+    sitl.set_param("SIM_ENGINE_MUL", 0.65)
+    sitl.set_param("SIM_ENGINE_FAIL", 1)
+    sitl.run(3.0)
+    place = (0.0, 0.0, 20.0)
+    held(sitl, lambda: dist(sitl.position[:2], place[:2]) < 10.0 and abs(height(sitl) - 20.0) < 5.0, 30.0, "place")
+
+
+def disarming(sitl: Sitl) -> None:
+    sitl.takeoff(30.0)
+    sitl.select("LOITER")
+    steered(sitl, 4.0, c3=1500, c4=1000)
+    assert sitl.armed
+    sitl.select("GUIDED")
+    assert sitl.command(mav.MAV_CMD_DO_FLIGHTTERMINATION, 1.0) == ACCEPTED
+    sitl.wait_until(lambda: not sitl.armed, within=1.0)
+
+
+def motor_test(sitl: Sitl) -> None:
+    assert sitl.command(mav.MAV_CMD_DO_MOTOR_TEST, 1.0, 1.0, 1300.0, 1.0) == ACCEPTED
+    says(sitl, "starting motor test")
+    says(sitl, "finished motor test")
