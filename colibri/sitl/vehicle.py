@@ -13,10 +13,19 @@ from colibri.autopilot.process.station_events import StationEvents
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import unknown
 from colibri.mavlink.hil.conductor import Parcel
-from colibri.mavlink.hil.faults import SENSORS, TABLE, Equipment, Fault, judged, kind_name, unit_name
+from colibri.mavlink.hil.faults import (
+    SENSORS,
+    TABLE,
+    Equipment,
+    Fault,
+    judged,
+    kind_name,
+    number_of,
+    short_unit_name,
+)
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
-from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem, behind
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
@@ -258,7 +267,7 @@ class Sitl(View, Stepped, Steered):
         """Upload a mission; where item 0 is home, it is put before the plan."""
         wire = on_wire(plan, self.origin)
         if self._conventions.wire.home_first:
-            wire = [*on_wire([items.waypoint(0.0, 0.0, 0.0)], self.origin), *map(_after_home, wire)]
+            wire = [*on_wire([items.waypoint(0.0, 0.0, 0.0)], self.origin), *(behind(item, 1) for item in wire)]
         self.gcs.upload(wire, MISSION)
 
     def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
@@ -310,7 +319,7 @@ class Sitl(View, Stepped, Steered):
             instance: From 1; 0 for all.
             values: Parameters 4 to 7.
         """
-        numbers = (_number("FAILURE_UNIT", unit), _number("FAILURE_TYPE", kind))
+        numbers = (number_of("FAILURE_UNIT", unit), number_of("FAILURE_TYPE", kind))
         params = (*map(float, numbers), float(instance), *values)
         self._injected += self._lockstep.command_to_plant(mav.MAV_CMD_INJECT_FAILURE, *params)
         before = len(self._lockstep.acks)
@@ -323,14 +332,16 @@ class Sitl(View, Stepped, Steered):
     def _why_not(self, fault: Fault, values: Sequence[float]) -> str:
         kinds = [kind_name(kind).lower() for unit, kind in TABLE if unit == fault.unit]
         if not kinds:
-            return f"choose one of {', '.join(dict.fromkeys(_unit(unit) for unit, _ in TABLE))}"
+            return f"choose one of {', '.join(dict.fromkeys(short_unit_name(unit) for unit, _ in TABLE))}"
         if (fault.unit, fault.kind) not in TABLE:
             return f"choose one of {', '.join(kinds)}"
         if fault.unit in SENSORS and self.setting.feedback is not Feedback.SENSORS:
             return f'feedback is "{self.setting.feedback}", and sensors are not used: set feedback="sensors"'
         p4, p5, p6, p7 = (*map(float, values), *(0.0,) * 4)[:4]
         judgement = judged(fault._replace(values=(p4, p5, p6, p7)), tuple(Equipment))
-        return judgement.reason if isinstance(judgement, Refusal) else f"the vehicle has no {_unit(fault.unit)}"
+        return (
+            judgement.reason if isinstance(judgement, Refusal) else f"the vehicle has no {short_unit_name(fault.unit)}"
+        )
 
     @property
     def wind(self) -> str:
@@ -382,28 +393,7 @@ class Sitl(View, Stepped, Steered):
         return station
 
 
-def _after_home(item: MissionItem) -> MissionItem:
-    """Return an item whose jump counts home as item 0."""
-    return item._replace(p1=item.p1 + 1.0) if item.command == mav.MAV_CMD_DO_JUMP else item
-
-
 def _chosen(what: str, name: str, names: Sequence[str]) -> str:
     if name not in names:
         raise ValueError(unknown(what, name, names))
     return name
-
-
-def _number(kind: str, of: str | int) -> int:
-    if isinstance(of, int):
-        return of
-    of = _without_kind(of)
-    numbers = {_without_kind(each.name.removeprefix(f"{kind}_")): number for number, each in mav.enums[kind].items()}
-    return int(numbers[_chosen(f"{kind[8:].lower()} of a failure", of, sorted(numbers.keys() - {"enum_end"}))])
-
-
-def _unit(number: int) -> str:
-    return _without_kind(unit_name(number))
-
-
-def _without_kind(unit: str) -> str:
-    return unit.lower().removeprefix("system_").removeprefix("sensor_")

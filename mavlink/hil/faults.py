@@ -10,6 +10,7 @@ from enum import StrEnum
 from math import isfinite, isnan
 from typing import Any, NamedTuple, TypeAlias
 
+from colibri.common.errors import unknown
 from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED, Codec, mav
 from colibri.mavlink.wire.refusal import Refusal
 
@@ -164,6 +165,28 @@ def unit_name(unit: int) -> str:
 
 def kind_name(kind: int) -> str:
     return str(mav.enums["FAILURE_TYPE"][kind].name).removeprefix("FAILURE_TYPE_")
+
+
+def short_unit_name(unit: int) -> str:
+    return _short(unit_name(unit))
+
+
+def number_of(enum: str, given: str | int) -> int:
+    """Return the number of a FAILURE_UNIT or FAILURE_TYPE given by number or short name; raise `ValueError`."""
+    if isinstance(given, int):
+        return given
+    known = {
+        _short(each.name.removeprefix(f"{enum}_")): number
+        for number, each in mav.enums[enum].items()
+        if not each.name.endswith("_ENUM_END")
+    }
+    if _short(given) not in known:
+        raise ValueError(unknown(f"{enum.removeprefix('FAILURE_').lower()} of a failure", _short(given), sorted(known)))
+    return int(known[_short(given)])
+
+
+def _short(unit: str) -> str:
+    return unit.lower().removeprefix("system_").removeprefix("sensor_")
 
 
 def fault_from(p1: float, p2: float, p3: float, values: FaultValues) -> Fault | None:

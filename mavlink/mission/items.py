@@ -105,3 +105,8 @@ def _whole(value: float, scale: float) -> int | None:
         return None
     whole = round(value * scale)
     return whole if whole in _INT32 else None
+
+
+def behind(item: MissionItem, items: int) -> MissionItem:
+    """Return an item of a plan before which `items` were put, or taken away if negative: a jump's target moves."""
+    return item._replace(p1=item.p1 + items) if item.command == mav.MAV_CMD_DO_JUMP else item

@@ -18,6 +18,7 @@ from colibri.mavlink.mission.items import (
     RALLY,
     MissionItem,
     StoredPlan,
+    behind,
     item_fields,
     plan_name,
     plan_of,
@@ -202,7 +203,7 @@ class MissionService:
     def _store(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
         """Load an uploaded plan, without home and with jumps to items as the vehicle counts them."""
         if plan_type == MISSION and self._offset:
-            items = [_jumping(item, -self._offset) for item in items[self._offset :]]
+            items = [behind(item, -self._offset) for item in items[self._offset :]]
         return self.load(plan_type, items)
 
     def do_set_mission_current(self, command: ReceivedCommand) -> Refusal | None:
@@ -270,7 +271,7 @@ class MissionService:
         plan, home = self.plans[plan_type], self._vehicle.home
         if plan_type != MISSION or home is None or not plan.items:
             return plan
-        return StoredPlan((home(), *(_jumping(item, self._offset) for item in plan.items)), plan.id)
+        return StoredPlan((home(), *(behind(item, self._offset) for item in plan.items)), plan.id)
 
     def _inside(self, seq: int) -> int:
         """Return an item as the vehicle counts."""
@@ -333,8 +334,3 @@ class MissionService:
         reason = self._uploads.take_reason()
         text = self._text.say(WARNING, reason) if reason else ()
         return [*filter(None, sends), *text]
-
-
-def _jumping(item: MissionItem, offset: int) -> MissionItem:
-    """Return an item with a jump's target counted from another first item."""
-    return item._replace(p1=item.p1 + offset) if item.command == mav.MAV_CMD_DO_JUMP else item
