@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from hashlib import sha256
+from math import cos, sin
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -17,7 +18,7 @@ from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, read_toml
 from colibri.common.errors import shown
 from colibri.common.files import read_bytes
-from colibri.common.rotations import earth_from_body
+from colibri.common.rotations import earth_from_body, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -42,9 +43,10 @@ class PolicyInputs(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class PolicyMemory(NamedTuple):
-    """Time of the last action, -1 before the first; the action, and those before it, (h, a)."""
+    """Time of the last action, -1 before the first; yaw at the first; the last, and those before it, (h, a)."""
 
     time_us: int
+    heading_rad: float
     last: Array
     older: Array
 
@@ -79,7 +81,7 @@ class PolicyLaw(ABC):
 
     def initial(self, rotor_speed: float) -> PolicyMemory:
         last = level_action((rotor_speed,) * self._rotors, self._vehicle, rates=self._rates)
-        return PolicyMemory(-1, last, np.tile(last, (self._inputs.history - 1, 1)))
+        return PolicyMemory(-1, 0.0, last, np.tile(last, (self._inputs.history - 1, 1)))
 
     def step(
         self, memory: PolicyMemory, time_us: int, state: VehicleState, references: Horizon
@@ -88,7 +90,8 @@ class PolicyLaw(ABC):
         velocity = earth_from_body((w, -i, -j, -k), state.velocity_enu_m_s)
         x = np.array((*velocity, *state.rate_flu_rad_s, *state.position_enu_m, *state.attitude))
         if memory.time_us < 0 or time_us - memory.time_us >= 1000 * self._inputs.interval_ms:
-            memory = self._chosen(memory, time_us, x, references)
+            heading_rad = state.euler[2] if memory.time_us < 0 else memory.heading_rad
+            memory = self._chosen(memory._replace(time_us=time_us, heading_rad=heading_rad), x, references)
         speeds = np.empty(self._rotors)
         if self._rates:
             aim(x, memory.last, self._mixer, self._scale, speeds)
@@ -96,15 +99,19 @@ class PolicyLaw(ABC):
             turn(memory.last, self._scale, speeds)
         return memory, Decision(speeds, state.euler)
 
-    def _chosen(self, memory: PolicyMemory, time_us: int, x: Array, references: Horizon) -> PolicyMemory:
+    def _chosen(self, memory: PolicyMemory, x: Array, references: Horizon) -> PolicyMemory:
         last, older, seen = memory.last.copy(), memory.older.copy(), self._seen.copy()
-        reference = np.ascontiguousarray(np.hstack([references.position_enu_m, references.velocity_enu_m_s]))
-        observe(x, last, older, reference, 0, 1, seen)
+        c, s = cos(0.5 * memory.heading_rad), -sin(0.5 * memory.heading_rad)  # it has learned to head east
+        east = np.array(rotation_matrix((c, 0.0, 0.0, s)))
+        w, i, j, k = x[9:]
+        x[6:9] = east @ x[6:9]
+        x[9:] = c * w - s * k, c * i - s * j, c * j + s * i, c * k + s * w
+        observe(x, last, older, references.position_enu_m @ east.T, 0, 1, seen)
         given = self.act(seen)
         action = np.asarray(given, dtype=np.float64)
         if action.shape != last.shape or take(action, last, older) < 0.0:
             raise PolicyError(f'an action must be {self._actions} finite numbers, not "{shown(given)}"')
-        return PolicyMemory(time_us, last, older)
+        return memory._replace(last=last, older=older)
 
 
 class OnnxFile(NamedTuple):

@@ -60,6 +60,17 @@ def test_an_exported_policy_flies_as_in_its_environment(policy: Path) -> None:
     assert np.abs(flown).max() < 0.15
 
 
+def test_a_policy_flies_alike_at_any_heading() -> None:
+    distances = []
+    for yaw in (0.0, 130.0):
+        ahead = 0.3 * np.exp(1j * np.radians(yaw))
+        start = {"x": ahead.real, "y": ahead.imag, "z": 2.0, "psi": yaw, "rotors": 4320.0}
+        flight = colibri.fly(f"hover:yaw={yaw}", controller=Linear, duration=2, link="direct", start=start)
+        distances.append(np.hypot(*(np.array(flight.samples[axis]) for axis in "xy")))
+    assert np.abs(distances[1] - distances[0]).max() < 1e-6
+    assert distances[0][-1] < 0.15 < distances[0][0]
+
+
 def test_a_policy_meets_the_requirements_on_laws() -> None:
     assert colibri.check_controller(Linear, only=["interface", "memory"]).passed
 
