@@ -351,9 +351,9 @@ LIMITS: tuple[Rule[FlightFacts], ...] = (
         "overloaded",
         lambda now: now.pace < now.limits.min_pace or now.gap_s > now.limits.max_gap_s,
         lambda now: (
-            f"overloaded: {100 * now.pace:.0f} % of the setpoints in the last second, of at least "
-            f"{100 * now.limits.min_pace:.0f}, and the last {1e3 * now.gap_s:.0f} ms ago, of at most "
-            f"{1e3 * now.limits.max_gap_s:.0f}"
+            f"this computer is too slow for the control law: {100 * now.pace:.0f} % of the setpoints were sent in the "
+            f"last second, of at least {100 * now.limits.min_pace:.0f}, and the last {1e3 * now.gap_s:.0f} ms ago, "
+            f"of at most {1e3 * now.limits.max_gap_s:.0f}"
         ),
     ),
     Rule(
