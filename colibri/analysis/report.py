@@ -1,7 +1,7 @@
 """Quality of a flight: `report.json`, and the table for people."""
 
 import json
-from math import degrees
+from math import degrees, isfinite
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -38,6 +38,7 @@ def report(
     return {
         "track": str(plan.spec.track),
         "track_note": plan.track_note,
+        "track_duration_s": plan.track.duration_s if isfinite(plan.track.duration_s) else None,
         "without_effect": plan.without_effect,
         "profile": plan.profile.name,
         "controller": plan.profile.controller,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from colibri.autopilot.guidance.trajectories.loading import file_of, with_file
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, position
 from colibri.campaigns.factors import CampaignError
@@ -114,9 +115,16 @@ class Arena:
         """Return the largest thrust that a track needs, without drag, in parts of what the rotors have."""
         vehicle = self.vehicle(row, "plant_vehicle")
         flown = self._track(row)[1]
+        if flown.waypoints is not None and flown.waypoints.fastest:
+            return 1.0 - flown.waypoints.margin
         times_s = np.arange(0.0, self._duration_s(flown), _INTERVAL_S)
         needed = position(flown, times_s, 2) + np.array([0.0, 0.0, vehicle.gravity_m_s2])
         return float(vehicle.body.mass_kg * np.linalg.norm(needed, axis=1).max() / vehicle.max_wrench()[0])
+
+    def is_planned(self, row: Row) -> bool:
+        """Return whether each law plans the track itself."""
+        waypoints = self._track(row)[1].waypoints
+        return waypoints is not None and waypoints.fastest
 
     def _duration_s(self, flown: Track) -> float:
         lasts_s = min(flown.duration_s, self.set.duration_s)
@@ -124,8 +132,11 @@ class Arena:
 
     def _track(self, row: Row) -> tuple[str, Track]:
         text = self.set.tracks[row.track].replace("{speed}", repr(row.speed_m_s))
+        beside = self._folder / (file_of(text) or "")
+        if beside.is_file():
+            text = with_file(text, beside)
         return text, track(text)
 
 
 def set_names() -> list[str]:
-    return [name for name in toml_names(_FOLDER) if not name.startswith("rotors-")]
+    return [name for name in toml_names(_FOLDER) if not name.startswith(("rotors-", "foehn-"))]

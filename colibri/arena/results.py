@@ -28,7 +28,8 @@ from colibri.plant.vehicle.description import Vehicle
 
 CAP_M = LOST_M
 """Errors of a lost flight."""
-METRICS = tuple(map(Metric, ("mean_error_m", "rmse_m", "max_error_m", "control_step_us.p50", "max_tilt_deg")))
+_METRICS = ("mean_error_m", "rmse_m", "max_error_m", "control_step_us.p50", "max_tilt_deg", "track_duration_s")
+METRICS = tuple(map(Metric, _METRICS))
 _MM = 1e3
 _MAX_COLUMNS = 3
 _LEAST_MM = 0.1
@@ -46,6 +47,7 @@ class Cell(NamedTuple):
     largest_mm: float
     step_us: float
     tilt_deg: float
+    track_s: float
 
     def __str__(self) -> str:
         mean = format(self.mean_mm, ".2f" if self.mean_mm < 1.0 else ".1f" if self.mean_mm < 100.0 else ".0f")
@@ -74,7 +76,7 @@ class ArenaResults(CampaignResults):
         away = np.array([self.flown[place].verdict is not Verdict.FLOWN for place in places])
         of_flights = values[places]
         of_flights[away, :3] = CAP_M
-        worst = np.nanmax(of_flights, axis=0, initial=0.0) * (_MM, _MM, _MM, 1.0, 1.0)
+        worst = np.nanmax(of_flights, axis=0, initial=0.0) * (_MM, _MM, _MM, 1.0, 1.0, 1.0)
         return Cell(len(places), int(away.sum()), *(round(float(value), 3) for value in worst))
 
     def rows_by_law(self) -> list[dict[str, Any]]:
@@ -93,10 +95,16 @@ class ArenaResults(CampaignResults):
         lines: list[Cells] = []
         for row, thrust in self._thrust.items():
             speed = f"{row.speed_m_s:g}" if row.speed_m_s else ""
-            flown = (str(self.cells.get((law, row), "")) for law in laws)
+            flown = (self._said(law, row) for law in laws)
             said = (f"{published[law, row]:g}" if (law, row) in published else "" for law in others)
             lines.append((row.track, speed, row.world, f"{thrust:.2f}", *flown, *said))
         return ("track", "m/s", "disturbance", "thrust", *laws, *others), lines
+
+    def _said(self, law: str, row: Row) -> str:
+        cell = self.cells.get((law, row))
+        if cell is None or cell.lost or not self.arena.is_planned(row):
+            return str(cell or "")
+        return f"{cell} in {cell.track_s:.2f} s"
 
     def law_table(self) -> tuple[Cells, list[Cells]]:
         """Return for each law its rate and preview, lost flights, and figures over all rows."""

@@ -18,7 +18,7 @@ TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
     "circle[:radius=2,speed=2,height=2,yaw=path|fixed], ramped[:curve=circle,speed=5,acceleration=0.25,radius=5,"
-    "turn=left|right,heading=0], waypoints:FILE[,speed=2|max,margin=0.1], "
+    "turn=left|right,heading=0], waypoints:FILE[,speed=2|max,margin=0.1,tolerance=M], "
     "samples:FILE; m, s, degrees"
 )
 

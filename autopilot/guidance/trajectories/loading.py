@@ -72,7 +72,7 @@ def file_text(name: str | Trajectory) -> str | None:
     """Return the content of a track's file, or its samples, if it has any."""
     if isinstance(name, Trajectory):
         return name.text
-    path = _file(name)
+    path = file_of(name)
     if path is None:
         return None
     try:
@@ -84,11 +84,12 @@ def file_text(name: str | Trajectory) -> str | None:
 
 
 def with_file(name: str, path: Path) -> str:
-    given = _file(name)
+    given = file_of(name)
     return name if given is None else name.replace(given, str(path), 1)
 
 
-def _file(name: str) -> str | None:
+def file_of(name: str) -> str | None:
+    """Return the file of a track, if it has one."""
     base, colon, text = name.partition(":")
     options = read_options(base, OPTIONS[base], text) if colon and base in OPTIONS else None
     return options.file if isinstance(options, FileOptions) else None

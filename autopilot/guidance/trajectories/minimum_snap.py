@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
+from colibri.common.jit import compiled
 from colibri.common.matrices import inverse, matmul, solve
 from colibri.common.types import Array
 
@@ -112,16 +113,36 @@ def balanced(elements: Array, forces: Array) -> Array:
     before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
     coupling = after[:-1, 0, 1:, 1, 1:]
-    free = forces.copy()
+    return _eliminated(curvature, np.ascontiguousarray(coupling), forces.copy())
+
+
+@compiled
+def _eliminated(curvature: Array, coupling: Array, free: Array) -> Array:
     through = np.empty_like(coupling)
-    for k, block in enumerate(coupling):
-        through[k], free[k] = solve(curvature[k], block), solve(curvature[k], free[k])
-        curvature[k + 1] -= matmul(block.T, through[k])
-        free[k + 1] -= matmul(block.T, free[k])
-    free[-1] = solve(curvature[-1], free[-1])
+    for k in range(len(coupling)):
+        block = coupling[k]
+        _put(solve(curvature[k], block), through[k])
+        _put(solve(curvature[k], free[k]), free[k])
+        _reduce(matmul(block.T, through[k]), curvature[k + 1])
+        _reduce(matmul(block.T, free[k]), free[k + 1])
+    _put(solve(curvature[-1], free[-1]), free[-1])
     for k in range(len(coupling) - 1, -1, -1):
-        free[k] -= matmul(through[k], free[k + 1])
+        _reduce(matmul(through[k], free[k + 1]), free[k])
     return free
+
+
+@compiled
+def _put(values: Array, out: Array) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = values[i, j]
+
+
+@compiled
+def _reduce(values: Array, out: Array) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] -= values[i, j]
 
 
 def _horner(coefficients: Array, x: TaylorSeries) -> TaylorSeries:

@@ -56,9 +56,10 @@ class Demand:
         return excess
 
     def beyond(self, margin: float) -> Array:
-        """Return the excess in parts of the range with `margin` reserved, (n,); < 0 if feasible."""
-        too_much = self.limit - self.values if self.falls else self.values - self.limit
-        beyond: Array = too_much / self.span + margin
+        """Return the excess in parts of the range, `margin` of it reserved below a maximum, (n,); < 0 if feasible."""
+        beyond: Array = (
+            (self.limit - self.values) / self.span if self.falls else (self.values - self.limit) / self.span + margin
+        )
         return beyond
 
     def __str__(self) -> str:

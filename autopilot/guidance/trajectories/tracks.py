@@ -230,9 +230,10 @@ class WaypointFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only
 
     speed: Speed | Literal["max"] | None = None
     margin: Annotated[float, msgspec.Meta(ge=0.0, le=0.4)] | None = None
+    tolerance: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)] | None = None
 
     def track_of(self, text: str | None) -> Track:
-        return through(read_waypoints(Path(self.file), self.speed, self.margin, text))
+        return through(read_waypoints(Path(self.file), self.speed, self.margin, text, self.tolerance))
 
 
 class SamplesFile(FileOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFileError, read_table
+from colibri.autopilot.guidance.trajectories.openings import Openings
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
@@ -15,7 +16,7 @@ MARGIN = 0.1
 MIN_LEG_S = 0.05
 
 _REQUIRED = ("x", "y", "z")
-_OPTIONAL = ("t", "yaw")
+_OPTIONAL = ("t", "yaw", *(_WINDOW := ("width", "height", "facing")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,8 @@ class Waypoints:
     Attributes:
         timed: Whether the file prescribes the times.
         margin: Part of each range reserved for the control law.
+        openings: What is flown through at the points, with `fastest`.
+        facing: Directions in which windows are flown through, ENU, (n, 3); 0 where there is none.
     """
 
     path: Path
@@ -34,6 +37,8 @@ class Waypoints:
     timed: bool
     fastest: bool = False
     margin: float = MARGIN
+    openings: Openings | None = None
+    facing: Array | None = None
 
     def stretched(self, factors: Array) -> "Waypoints":
         return self.at(np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
@@ -53,10 +58,12 @@ def read_waypoints(
     speed_m_s: float | Literal["max"] | None = None,
     margin: float | None = None,
     text: str | None = None,
+    tolerance_m: float | None = None,
 ) -> Waypoints:
     """Read columns x, y, z (m, ENU) and optionally t (s) and yaw (degrees), or raise TrackFileError.
 
-    Without t, legs are flown at an average of `speed_m_s`, the first and last at half of it.
+    Without t, legs are flown at an average of `speed_m_s`, the first and last at half of it. With "max", points between
+    the ends are balls of radius `tolerance_m`, or windows by columns width, height (m) and facing (degrees from east).
     """
     table = read_table(path, _REQUIRED, _OPTIONAL, text)
     points, timed = table.matrix(_REQUIRED), "t" in table.values
@@ -66,7 +73,39 @@ def read_waypoints(
     fastest = speed_m_s == "max"
     average_m_s = speed_m_s if isinstance(speed_m_s, float) else DEFAULT_SPEED_M_S
     times_s = table.times(MIN_LEG_S) if timed else _times(table, points, average_m_s)
-    return Waypoints(path, times_s, points, table.yaw_rad, timed, fastest, MARGIN if margin is None else margin)
+    margin = MARGIN if margin is None else margin
+    waypoints = Waypoints(path, times_s, points, table.yaw_rad, timed, fastest, margin)
+    windows = [column for column in _WINDOW if column in table.values]
+    if not fastest and tolerance_m is not None:
+        raise TrackFileError(f"{path}: option tolerance needs speed=max")
+    if windows and (tolerance_m is not None or len(windows) < len(_WINDOW)):
+        raise TrackFileError(f"{path}: line 1: columns {', '.join(_WINDOW)} belong together, without option tolerance")
+    if not fastest or (tolerance_m is None and not windows):
+        return waypoints
+    return _with_windows(waypoints, table) if tolerance_m is None else _with_balls(waypoints, tolerance_m)
+
+
+def _with_balls(waypoints: Waypoints, radius_m: float) -> Waypoints:
+    axes = np.tile((1.0 - waypoints.margin) * radius_m * np.identity(3), (len(waypoints.points_enu_m), 1, 1))
+    return _opened(waypoints, axes, np.ones((3, 3)))
+
+
+def _with_windows(waypoints: Waypoints, table: CsvTable) -> Waypoints:
+    sizes = table.matrix(("width", "height"))
+    for row, column in np.argwhere(sizes < 0.0)[:1]:
+        raise table.error(row, _WINDOW[column], f"must be at least 0 m, not {sizes[row, column]:g}")
+    facing = np.radians(table.values["facing"])
+    ahead = np.stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))], axis=1)
+    axes = np.zeros((len(facing), 3, 3))
+    half = 0.5 * (1.0 - waypoints.margin) * sizes
+    axes[:, 0, 0], axes[:, 1, 0], axes[:, 2, 1] = -half[:, 0] * ahead[:, 1], half[:, 0] * ahead[:, 0], half[:, 1]
+    ahead[~sizes.any(axis=1)] = 0.0
+    return replace(_opened(waypoints, axes, np.identity(3)), facing=ahead)
+
+
+def _opened(waypoints: Waypoints, axes: Array, together: Array) -> Waypoints:
+    axes[[0, -1]] = 0.0
+    return replace(waypoints, openings=Openings(waypoints.points_enu_m, axes, together))
 
 
 def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:

@@ -8,7 +8,7 @@ from colibri.common.process.arguments import ArgumentParser
 
 def add_options(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("sets", nargs="+", metavar="SET", help="race, race-told, robust, policy, or a FILE.toml of your own")
+    add("sets", nargs="+", metavar="SET", help="race, race-told, robust, policy, planning, or a FILE.toml of your own")
     add(
         "--law",
         action="append",

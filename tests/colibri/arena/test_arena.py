@@ -103,7 +103,7 @@ def test_the_worst_start_counts_and_a_lost_one_as_the_cap() -> None:
     planned = planned_of("policy", laws_of(["se3"]), 2)
 
     def flown(flight: int, verdict: Verdict, mean_m: Any) -> FlightResult:
-        return FlightResult(flight, verdict, "", (mean_m, 0.2, 0.3, 10.0, 5.0), "")
+        return FlightResult(flight, verdict, "", (mean_m, 0.2, 0.3, 10.0, 5.0, None), "")
 
     flights = [flown(0, Verdict.FLOWN, 0.1), flown(1, Verdict.FLOWN, 0.2), flown(2, Verdict.FLOWN, 0.1)]
     flights.append(flown(3, Verdict.LOST, 0.3))

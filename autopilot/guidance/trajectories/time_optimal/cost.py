@@ -18,10 +18,11 @@ from colibri.autopilot.guidance.trajectories.minimum_snap import (
     stiffness,
 )
 from colibri.autopilot.guidance.trajectories.reach import Derivatives, Reach
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
 
-_INTERVALS = 16
+_INTERVALS = 8
 """Sampling intervals of a piece."""
 _STEPS = (1e-6, 1e-6, 1e-5, 1e-4)
 """Difference steps of velocity, acceleration, jerk and snap."""
@@ -34,13 +35,14 @@ class FlightCost:
     Attributes:
         weight: Of squared excess in parts of its range (m below the floor), integrated over time.
         charge_ah: Taken before.
+        tightened: Part of each demand's range, (demands,), reserved beyond the margin.
     """
 
-    def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
-        """`given` are waypoints, ENU; each leg has `pieces`; `margin` of each range is reserved for the control law."""
-        self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
-        self._reach, self._given, self._pieces = reach, given, pieces
-        self._margin = margin
+    def __init__(self, reach: Reach, waypoints: Waypoints, pieces: int) -> None:
+        """Each leg has `pieces`; the margin of each range is reserved for the control law."""
+        self.weight, self.charge_ah, self.floor_m, self.tightened = 0.0, 0.0, -inf, np.zeros(1)
+        self._reach, self._pieces = reach, pieces
+        self._given, self._margin, self._openings = waypoints.points_enu_m, waypoints.margin, waypoints.openings
         self._stiffness = stiffness(SNAP)
         self._sampling = _sampling()
         self._share = np.full(_INTERVALS + 1, 1.0 / _INTERVALS)
@@ -49,13 +51,16 @@ class FlightCost:
     def variables(self, legs_s: Array, points: Array) -> Array:
         """Convert leg times, s, and all points, (legs pieces + 1, 3), to unbounded variables."""
         chosen = np.arange(len(points)) % self._pieces > 0
-        return np.concatenate([_root(legs_s), points[chosen].ravel()])
+        places = np.empty(0) if self._openings is None else self._openings.variables(points[~chosen]).ravel()
+        return np.concatenate([_root(legs_s), points[chosen].ravel(), places])
 
     def flight(self, x: Array) -> tuple[Array, Array]:
         legs = len(self._given) - 1
         points = np.empty((legs * self._pieces + 1, 3))
         chosen = np.arange(len(points)) % self._pieces > 0
-        points[~chosen], points[chosen] = self._given, x[legs:].reshape(-1, 3)
+        between, places = np.split(x[legs:].reshape(-1, 3), [chosen.sum()])
+        points[chosen] = between
+        points[~chosen] = self._given if self._openings is None else self._openings.points(places)
         return _duration(x[:legs])[0], points
 
     def __call__(self, x: Array) -> tuple[float, Array]:
@@ -77,7 +82,11 @@ class FlightCost:
         slopes.add(scale * np.moveaxis(forces.reshape(2 * SNAP, len(durations), 3), 0, 1))
         by_legs = slopes.of_durations.reshape(-1, self._pieces).sum(axis=1) / self._pieces
         chosen = np.arange(len(points)) % self._pieces > 0
-        gradient = np.concatenate([by_legs * _duration(x[: len(legs_s)])[1], slopes.of_points[chosen].ravel()])
+        parts = [by_legs * _duration(x[: len(legs_s)])[1], slopes.of_points[chosen].ravel()]
+        if self._openings is not None:
+            places = x[-3 * len(self._given) :].reshape(-1, 3)
+            parts.append(self._openings.slopes(places, slopes.of_points[~chosen]).ravel())
+        gradient = np.concatenate(parts)
         return float((durations * (1.0 + penalty)).sum()), gradient
 
     def _penalty(self, motion: Array) -> tuple[Array, Array]:
@@ -111,7 +120,7 @@ class FlightCost:
     def _beyond(self, states: Array) -> Array:
         """Return the excess over each limit for velocity to snap, (demands, n)."""
         demands = self._reach.demands(Derivatives(*states), self.charge_ah)
-        return np.stack([demand.beyond(self._margin) for demand in demands])
+        return np.stack([demand.beyond(self._margin) for demand in demands]) + self.tightened[:, None]
 
 
 class _Slopes:

@@ -15,7 +15,8 @@ from colibri.common.types import Array
 Function: TypeAlias = Callable[[Array], tuple[float, Array]]
 """x (n,) -> value and gradient (n,)."""
 
-_MEMORY = 20
+_MEMORY, _WINDOW = 50, 20
+"""Pairs of steps, and values compared for a stop."""
 _TRIALS = 30
 _DECREASE, _CURVATURE = 1e-4, 0.9
 """Weak Wolfe conditions."""
@@ -39,7 +40,7 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
     """Return a minimum, (n,); stop at improvements below `tolerance` of the value."""
     point = _Point(x, *function(x))
     pairs: deque[_Pair] = deque(maxlen=_MEMORY)
-    values = deque([point.value], maxlen=_MEMORY)
+    values = deque([point.value], maxlen=_WINDOW)
     for _ in range(iterations):
         length = 1.0 if pairs else 1.0 / max(norm(point.gradient), 1.0)
         found = _searched(function, point, _direction(point.gradient, pairs), length)
@@ -52,7 +53,7 @@ def minimise(function: Function, x: Array, iterations: int, tolerance: float) ->
         point, product = found, dot(step, change)
         if product > 0.0:
             pairs.append(_Pair(step, change, product))
-        if len(values) == _MEMORY and values[0] - point.value < tolerance * abs(point.value):
+        if len(values) == _WINDOW and values[0] - point.value < tolerance * abs(point.value):
             break
         values.append(point.value)
     return point.x

@@ -35,7 +35,7 @@ def test_the_five_of_the_thesis() -> None:
         ("waypoints", "track waypoints needs file: waypoints:file=FILE"),
         ("waypoints:a.csv,file=b.csv", "track waypoints: file is given twice"),
         ("waypoints:a.csv,b.csv", "track waypoints: options are KEY=VALUE[,KEY=VALUE…], not 'a.csv,b.csv': "
-         "choose file, speed, margin"),
+         "choose file, speed, margin, tolerance"),
         ("waypoints:a.csv,speed=fast", "track waypoints: speed=fast: choose max, or a number"),
         ("waypoints:a.csv,speed=0", "track waypoints: speed=0: Expected `float` >= 0.01"),
         ("waypoints:a.csv,speed=max,margin=0.5", "track waypoints: margin=0.5: Expected `float` <= 0.4"),

@@ -39,8 +39,8 @@ def test_times_from_a_speed_halve_it_on_the_end_legs(tmp_path: Path, speed: floa
     [
         ("", "line 1, column x: missing"),
         ("x,y\n", "line 1, column z: missing"),
-        ("x,y,z,w\n", "line 1, column w: unknown: choose x, y, z, t, yaw"),
-        ("x,y,z,x\n", "line 1, column x: twice: choose x, y, z, t, yaw"),
+        ("x,y,z,w\n", "line 1, column w: unknown: choose x, y, z, t, yaw, width, height, facing"),
+        ("x,y,z,x\n", "line 1, column x: twice: choose x, y, z, t, yaw, width, height, facing"),
         ("x,y,z\n1,2,3\n", "line 2: the file ends, and a track needs two rows"),
         ("x,y,z\n1,2,3\n1,up,3\n", "line 3, column y: expected a number from -10000 to 10000, not 'up'"),
         ("x,y,z\n1,2,nan\n1,2,3\n", "line 2, column z: expected a number from -10000 to 10000, not 'nan'"),
@@ -52,6 +52,10 @@ def test_times_from_a_speed_halve_it_on_the_end_legs(tmp_path: Path, speed: floa
         ("x,y,z,t\n1,2,3,0\n1,2,4,-2\n", "line 3, column t: must be at least 0.05 s after the line before"),
         ("x,y,z,t\n1,2,3,0\n1,2,4,3601\n", "line 3, column t: reached after 3601 s, and 3600 s is the longest"),
         ("x,y,z\n1,2,3\n1,2,3\n", "line 3, column x: less than 0.05 s from the line before at 2 m/s"),
+        (
+            "x,y,z,width\n1,2,3,1\n9,2,3,1\n",
+            "line 1: columns width, height, facing belong together, without option tolerance",
+        ),
         ("x,y,z\n1,2,3\n1,9000,3\n", "line 3, column x: reached after 8998 s, and 3600 s is the longest"),
     ],
 )

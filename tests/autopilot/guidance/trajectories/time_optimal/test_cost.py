@@ -2,6 +2,7 @@
 
 from functools import cache
 from math import inf
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.reach import Reach
 from colibri.autopilot.guidance.trajectories.time_optimal.cost import FlightCost
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 
 GIVEN = np.array([[0.0, 0.0, 1.0], [6.0, 1.0, 3.0], [4.0, 7.0, 0.5], [0.0, 3.0, 2.0]])
+WAYPOINTS = Waypoints(Path("points.csv"), np.arange(4.0), GIVEN, None, timed=False)
 
 
 @cache
@@ -20,8 +23,8 @@ def reach() -> Reach:
     return Reach(load_vehicle("hummingbird"), load_profile("flight"), exact_drag=True)
 
 
-def cost(pieces: int, weight: float, floor_m: float = -inf) -> FlightCost:
-    found = FlightCost(reach(), GIVEN, pieces, 0.1)
+def cost(pieces: int, weight: float, floor_m: float = -inf, given: Waypoints = WAYPOINTS) -> FlightCost:
+    found = FlightCost(reach(), given, pieces)
     found.weight, found.floor_m = weight, floor_m
     return found
 
@@ -33,11 +36,23 @@ def points(pieces: int) -> Array:
     return lines + np.where(between[:, None], 0.3 * np.sin(np.arange(lines.size)).reshape(lines.shape), 0.0)
 
 
+WINDOWS = "x,y,z,width,height,facing\n0,0,1,0,0,0\n6,1,3,2,1,40\n4,7,0.5,1,0,120\n0,3,2,0,0,0\n"
+
+
+def opened(text: str | None = None, tolerance_m: float | None = None) -> Waypoints:
+    lines = "x,y,z\n" + "".join(f"{x},{y},{z}\n" for x, y, z in GIVEN)
+    return read_waypoints(Path("points.csv"), "max", text=text or lines, tolerance_m=tolerance_m)
+
+
 @pytest.mark.parametrize("pieces", [1, 2, 4])
 @pytest.mark.parametrize("leg_s", [0.7, 1.4])
-def test_the_gradient_is_that_of_the_value(pieces: int, leg_s: float) -> None:
-    function = cost(pieces, 100.0, 0.8)
+@pytest.mark.parametrize(
+    "given", [WAYPOINTS, opened(tolerance_m=0.5), opened(WINDOWS)], ids=["points", "balls", "windows"]
+)
+def test_the_gradient_is_that_of_the_value(pieces: int, leg_s: float, given: Waypoints) -> None:
+    function = cost(pieces, 100.0, 0.8, given)
     x = function.variables(np.array([leg_s, 1.2 * leg_s, leg_s]), points(pieces))
+    x[-3 * len(GIVEN) :] += 0.0 if given.openings is None else 0.2
     value, gradient = function(x)
     assert value > 4.0 * leg_s, "something is beyond the limits"
     for k in range(0, len(x), 4):

@@ -1,5 +1,6 @@
 """The fastest flights: within the limits, above the floor, through every point, smooth, nearly as fast as can be."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import ROUNDING_M, fit
 from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
 from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion, times
+from colibri.autopilot.guidance.trajectories.registry import TrackError
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
@@ -68,6 +70,36 @@ def test_more_margin_is_slower_and_the_same_is_the_same(tmp_path: Path, monkeypa
     assert beyond(flown[1], 0.3) <= 0.0
     assert flown[1].track.duration_s > 1.1 * flown[0].track.duration_s
     assert (exact_motion(flown[1].track).snap == exact_motion(flown[2].track).snap).all(), "bit for bit"
+
+
+GATES = "x,y,z,width,height,facing\n0,0,3,0,0,0\n8,3,3,{}\n16,0,3,0,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "inside"),
+    [
+        (GATES.format("2,1,0"), "", lambda off: abs(off[0]) < 1e-9 and abs(off[1]) <= 0.9 and abs(off[2]) <= 0.45),
+        ("x,y,z\n0,0,3\n8,3,3\n16,0,3\n", ",tolerance=1", lambda off: 0.8 < np.linalg.norm(off) <= 0.9),
+    ],
+    ids=["window", "ball"],
+)
+def test_a_wide_waypoint_is_passed_where_it_is_fastest(
+    text: str, options: str, inside: Callable[[Array], bool], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 30)
+    narrow = loaded(tmp_path, GATES.format("0,0,0"))
+    wide = loaded(tmp_path, text, options)
+    assert wide.track.waypoints is not None
+    assert inside(wide.track.waypoints.points_enu_m[1] - (8.0, 3.0, 3.0))
+    assert position(wide.track, wide.track.waypoints.times_s) == pytest.approx(wide.track.waypoints.points_enu_m)
+    assert beyond(wide, 0.1) <= 0.0
+    assert wide.track.duration_s < 0.97 * narrow.track.duration_s
+
+
+def test_a_window_from_behind_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 5)
+    with pytest.raises(TrackError, match=r"points\.csv: window 2 would be flown through from behind: add a waypoint"):
+        loaded(tmp_path, GATES.format("2,1,180"))
 
 
 def test_a_waypoint_below_the_floor_is_refused(tmp_path: Path) -> None:
