@@ -15,8 +15,7 @@ NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 UNREADABLE = (msgspec.MsgspecError, ValueError, RecursionError)
 """Raised for content that is not valid: `RecursionError` for nesting, a `ValueError` for text that is not UTF-8."""
 T = TypeVar("T")
-_MOST = 1e12
-"""Products of a few numbers up to there, and quotients, are finite."""
+_MOST = 1e12  # products of a few numbers up to there, and quotients, are finite
 
 
 def plain(value: Any) -> Any:

@@ -22,31 +22,24 @@ QUARTERS_PER_RAD = 2.0 / pi
 _QUARTER_1, _QUARTER_2 = float.fromhex("0x1.921fb54400000p+0"), float.fromhex("0x1.0b4611a600000p-34")
 _QUARTER_3 = 2.022266248795951e-21
 """π/2 = _QUARTER_1 + _QUARTER_2 + _QUARTER_3; the first two have 33 bits, so their multiples are exact."""
-MAX_RAD = 1e6
-"""Larger angles are first reduced modulo the double nearest 2π: as exact as the argument itself."""
+MAX_RAD = 1e6  # larger angles are first reduced modulo the double nearest 2π: as exact as the argument itself
 HALF_PI = 0.5 * pi
 HALF_PI_TAIL = 6.123233995736766e-17
 
 _LN2 = 0.6931471805599453
-_LN2_1, _LN2_2 = float.fromhex("0x1.62e42fee00000p-1"), 1.9082149292705877e-10
-"""The first has 32 bits."""
+_LN2_1, _LN2_2 = float.fromhex("0x1.62e42fee00000p-1"), 1.9082149292705877e-10  # the first has 32 bits
 _MAX_EXPONENT, _MIN_EXPONENT = 709.782712893384, -745.2
 _SMALL_EXP = 0.35
 _HALF_SQRT2 = sqrt(0.5)
 
-_SINE = tuple((-1.0) ** k / factorial(2 * k + 1) for k in range(1, 9))
-"""Of x^3, x^5 … x^17."""
-_COSINE = tuple((-1.0) ** k / factorial(2 * k) for k in range(2, 10))
-"""Of x^4, x^6 … x^18."""
-_EXPONENTIAL = tuple(1.0 / factorial(k) for k in range(2, 14))
-"""Of x^2, x^3 … x^13."""
+_SINE = tuple((-1.0) ** k / factorial(2 * k + 1) for k in range(1, 9))  # of x^3, x^5 … x^17
+_COSINE = tuple((-1.0) ** k / factorial(2 * k) for k in range(2, 10))  # of x^4, x^6 … x^18
+_EXPONENTIAL = tuple(1.0 / factorial(k) for k in range(2, 14))  # of x^2, x^3 … x^13
 _LOGARITHM = tuple(2.0 / (2 * k + 1) for k in range(1, 11))
 """Of s^2, s^4 … s^20 in log((1 + s) / (1 - s)) / s - 2."""
-_ARCTANGENT = tuple((-1.0) ** k / (2 * k + 1) for k in range(1, 6))
-"""Of x^3, x^5 … x^11."""
+_ARCTANGENT = tuple((-1.0) ** k / (2 * k + 1) for k in range(1, 6))  # of x^3, x^5 … x^11
 
-ATAN_STEPS = 16
-"""atan is tabulated at each sixteenth from 0 to 1."""
+ATAN_STEPS = 16  # atan is tabulated at each sixteenth from 0 to 1
 ATAN = (
     (0.0, 0.0),
     (0.06241880999595735, -1.5490756308295046e-18),

@@ -17,8 +17,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 Packed: TypeAlias = NDArray[np.void]
 
-_LINE = 64
-"""Bytes of a cache line."""
+_LINE = 64  # bytes of a cache line
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Tuple = TypeVar("_Tuple", bound=NamedTuple)

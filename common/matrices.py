@@ -14,8 +14,7 @@ from colibri.common.types import Array
 _MATRIX, _VECTOR = "float64[:, :]", "float64[:]"
 _NEW_MATRIX, _NEW_VECTOR = "float64[:, ::1]", "float64[::1]"
 _TAYLOR_TERMS = 15
-_TAYLOR_NORM = 0.5
-"""Larger matrices are halved and squared: 0.5^16 / 16! is far below double precision."""
+_TAYLOR_NORM = 0.5  # larger matrices are halved and squared: 0.5^16 / 16! is far below double precision
 
 
 @compiled

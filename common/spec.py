@@ -19,8 +19,7 @@ import msgspec
 from colibri.common.config import UNREADABLE, plain
 from colibri.common.errors import Error, unknown
 
-ENDLESS = "max"
-"""An infinite number as text."""
+ENDLESS = "max"  # an infinite number as text
 _INFINITE = {ENDLESS: inf, f"-{ENDLESS}": -inf}
 
 S = TypeVar("S")

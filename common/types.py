@@ -7,10 +7,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Vector: TypeAlias = tuple[float, float, float]
-Quaternion: TypeAlias = tuple[float, float, float, float]
-"""w, x, y, z."""
+Quaternion: TypeAlias = tuple[float, float, float, float]  # w, x, y, z
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
-PerRotor: TypeAlias = tuple[float, ...]
-"""One number per rotor, 3 to 8."""
-Address: TypeAlias = tuple[str, int]
-"""Host and port."""
+PerRotor: TypeAlias = tuple[float, ...]  # one number per rotor, 3 to 8
+Address: TypeAlias = tuple[str, int]  # host and port

@@ -7,8 +7,7 @@ _SEA_LEVEL_K = 288.15
 _LAPSE_K_M = 0.0065
 _EXPONENT = 9.80665 / (287.05287 * _LAPSE_K_M)
 _ZERO_CELSIUS_K = 273.15
-METRES_PER_PASCAL = 0.0832
-"""At sea level."""
+METRES_PER_PASCAL = 0.0832  # at sea level
 
 
 def pressure_pa(altitude_m: float) -> float:

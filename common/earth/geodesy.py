@@ -23,8 +23,7 @@ class Geodetic(NamedTuple):
     altitude_m: float
 
 
-DEFAULT_ORIGIN = Geodetic(47.397742, 8.545594, 488.0)
-"""Zurich, Irchel: the usual origin of PX4's simulators."""
+DEFAULT_ORIGIN = Geodetic(47.397742, 8.545594, 488.0)  # Zurich, Irchel: the usual origin of PX4's simulators
 
 
 def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:

@@ -91,10 +91,8 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
     raise SystemExit(code)
 
 
-_PARENT_EVERY = 8
-"""Checks between two looks at the parent; a process checks every frame, or ten times a second."""
-_LAST_S = 5
-"""A process whose parent has died is killed after this time, wherever it hangs."""
+_PARENT_EVERY = 8  # checks between two looks at the parent; a process checks every frame, or ten times a second
+_LAST_S = 5  # a process whose parent has died is killed after this time, wherever it hangs
 _PR_SET_PDEATHSIG = 1
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

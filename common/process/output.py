@@ -10,10 +10,8 @@ from contextlib import suppress
 from select import select
 
 _MOST_BYTES = 1 << 20
-_LOOKS, _LOOK_S = 10, 0.1
-"""Number and duration of the waits for a reader at the end."""
-_PIECE = 512
-"""Bytes that a pipe or terminal takes at once if it takes any."""
+_LOOKS, _LOOK_S = 10, 0.1  # number and duration of the waits for a reader at the end
+_PIECE = 512  # bytes that a pipe or terminal takes at once if it takes any
 _LEFT_OUT = "colibri: {} lines dropped: the output was not read\n"
 
 

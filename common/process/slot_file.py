@@ -12,11 +12,9 @@ from zlib import crc32
 from colibri.common.files import regular
 
 SLOT = 256 << 10
-_HEAD = Struct("<QII")
-"""Number, from 1; length; checksum of both and of the content."""
+_HEAD = Struct("<QII")  # number, from 1; length; checksum of both and of the content
 _COUNTED = Struct("<QI")
-MAX_BYTES = SLOT - _HEAD.size
-"""Capacity of a slot."""
+MAX_BYTES = SLOT - _HEAD.size  # capacity of a slot
 
 
 class Slots:

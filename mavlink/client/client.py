@@ -37,8 +37,7 @@ from colibri.mavlink.wire.dialect import (
 from colibri.mavlink.wire.signing import Signing
 
 HEARTBEAT_EVERY_US = 1_000_000
-LOST_AFTER_US = 3_500_000
-"""Three and a half heartbeats, as in QGroundControl."""
+LOST_AFTER_US = 3_500_000  # three and a half heartbeats, as in QGroundControl
 _MAVLINK_VERSION = 3
 _EVENTS = 1000
 

@@ -12,24 +12,17 @@ from statistics import median
 from typing import NamedTuple
 
 NS_PER_US = 1000
-WINDOW_US = 10_000_000
-"""Older exchanges are discarded."""
+WINDOW_US = 10_000_000  # older exchanges are discarded
 ENOUGH = 5
 _EVERY_US = 100_000
 _RESET_AFTER = 3
 _RESET_US = 10_000
-_DRIFT = 0.002
-"""Uncertainty of the estimated drift, large because of simulators' clocks."""
-_UNEVEN = 0.1
-"""Fraction of a drift that varies with the load on the computer."""
-_LEAST_EXCHANGES = 10
-"""Fewest exchanges to estimate a drift from."""
-_RATED = 10
-"""Answers that give the rate of a clock too fast or too slow for an offset."""
-MAX_DRIFT = 0.2
-"""Largest plausible drift; a larger change of the offset is a restart of the vehicle."""
-_SURE = 4.0
-"""Significance threshold of a drift, in standard deviations."""
+_DRIFT = 0.002  # uncertainty of the estimated drift, large because of simulators' clocks
+_UNEVEN = 0.1  # fraction of a drift that varies with the load on the computer
+_LEAST_EXCHANGES = 10  # fewest exchanges to estimate a drift from
+_RATED = 10  # answers that give the rate of a clock too fast or too slow for an offset
+MAX_DRIFT = 0.2  # largest plausible drift; a larger change of the offset is a restart of the vehicle
+_SURE = 4.0  # significance threshold of a drift, in standard deviations
 
 
 class Exchange(NamedTuple):

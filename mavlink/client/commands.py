@@ -7,8 +7,7 @@ from colibri.mavlink.client.conversation import USUALLY, Conversation, Encoded, 
 from colibri.mavlink.services.command import IN_PROGRESS, NOT_GIVEN
 from colibri.mavlink.wire.dialect import Message, definition_of, mav
 
-PROGRESS_WITHIN_US = 3_000_000
-"""Longest interval of progress reports before the command is repeated."""
+PROGRESS_WITHIN_US = 3_000_000  # longest interval of progress reports before the command is repeated
 _MAX_CONFIRMATION = 255
 _PARAMS, _INT_PARAMS = 7, 4
 

@@ -14,10 +14,8 @@ from colibri.mavlink.client.conversation import OK, USUALLY, Conversation, Encod
 from colibri.mavlink.parameters.store import ParamError, Value
 from colibri.mavlink.wire.dialect import Bits, Message, mav, param_bits
 
-DIFFERS = -2
-"""The result of a change if the vehicle still reports another value."""
-_BELIEVED_AFTER = 3
-"""Requests before a different value counts: it may have been sent before the change."""
+DIFFERS = -2  # the result of a change if the vehicle still reports another value
+_BELIEVED_AFTER = 3  # requests before a different value counts: it may have been sent before the change
 _GAPS_AT_ONCE = 10
 _BY_NAME = -1
 _REAL: int = mav.MAV_PARAM_TYPE_REAL32

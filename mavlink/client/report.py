@@ -7,8 +7,7 @@ from typing import Any
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
 
-_OLDER_FROM = 128
-"""A sequence number this far ahead, of 256, belongs to an older, delayed message."""
+_OLDER_FROM = 128  # a sequence number this far ahead, of 256, belongs to an older, delayed message
 _AIRBORNE = frozenset(
     {mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING},
 )

@@ -9,10 +9,8 @@ from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 _MS = 1000
-_ODOMETRY_STAYS_US = 500_000
-"""Silence of ODOMETRY after which the other messages count."""
-_PAIRED_US = 60_000
-"""Largest difference in time between an attitude and its position."""
+_ODOMETRY_STAYS_US = 500_000  # silence of ODOMETRY after which the other messages count
+_PAIRED_US = 60_000  # largest difference in time between an attitude and its position
 _EARTH: int = mav.MAV_FRAME_LOCAL_NED
 
 HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})

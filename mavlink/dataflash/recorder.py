@@ -26,8 +26,7 @@ from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 EVERY_US = 40_000
 """Interval of attitude, control and motors, as ArduCopter's attitude at its default LOG_BITMASK: 25 Hz."""
-SLOW_EVERY_US = 200_000
-"""Interval of position fixes and the battery."""
+SLOW_EVERY_US = 200_000  # interval of position fixes and the battery
 
 _GPS_EPOCH_US = 315_964_800_000_000 - 18_000_000  # Unix time of 1980-01-06, less the leap seconds since
 _WEEK_MS = 7 * 24 * 3_600_000

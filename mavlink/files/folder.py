@@ -17,8 +17,7 @@ from colibri.mavlink.files.tree import Entry, FileRefusal, Names, OpenFile, Quot
 
 DEFAULT_QUOTA = Quota(64 << 20, 1000)
 
-_SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-"""Follow no link; do not block on a pipe."""
+_SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK  # follow no link; do not block on a pipe
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
 
 _REFUSALS = {

@@ -34,20 +34,17 @@ from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
-PATH_US = 400.0
-"""Work to find a file or folder, or to generate a file."""
+PATH_US = 400.0  # work to find a file or folder, or to generate a file
 MAX_SESSIONS = 32
 MAX_SESSIONS_OF_A_CHANNEL = 8
 SESSION_ENDS_AFTER_US = 20_000_000
-TAKEN_OVER_AFTER_US = 1_000_000
-"""Twice MAVSDK's repeat interval."""
+TAKEN_OVER_AFTER_US = 1_000_000  # twice MAVSDK's repeat interval
 
 REMEMBERED_FOR_US = 3_000_000
 MAX_REMEMBERED = 64
 
 BURST_PACKETS_A_POLL = 8
-MAX_BURST_PACKETS = 1000
-"""Limit of packets to a client that has gone."""
+MAX_BURST_PACKETS = 1000  # limit of packets to a client that has gone
 CHECKSUM_BYTES_A_POLL = 256 << 10
 
 _UINT32_MAX = 0xFFFFFFFF

@@ -49,12 +49,10 @@ class FtpError(IntEnum):
     NOT_FOUND = 10
 
 
-SIZE = Struct("<I")
-"""A file's size, or its checksum, in an answer."""
+SIZE = Struct("<I")  # a file's size, or its checksum, in an answer
 _HEADER = Struct("<HBBBBBxI")
 
-Key: TypeAlias = tuple[Peer, int]
-"""A session: client and number."""
+Key: TypeAlias = tuple[Peer, int]  # a session: client and number
 
 
 class Request(NamedTuple):

@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from typing import NamedTuple, Protocol, TypeAlias
 
-Names: TypeAlias = tuple[str, ...]
-"""A path: the names of the parent folders and its own. The root is ()."""
+Names: TypeAlias = tuple[str, ...]  # a path: the names of the parent folders and its own. The root is ().
 
 MAX_NAME_BYTES = 255
 MAX_DEPTH = 16
-ENTRY_US = 4.0
-"""Work to list an entry of a folder."""
+ENTRY_US = 4.0  # work to list an entry of a folder
 
 
 class FileRefusal(Enum):

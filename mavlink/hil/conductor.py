@@ -8,16 +8,11 @@ from collections.abc import Sequence
 from struct import Struct
 from typing import NamedTuple
 
-_HEAD = Struct("<QIBH")
-"""Simulated time in µs, custom mode, whether armed, number of parcels."""
-_PARCEL = Struct("<HH")
-"""Station, length."""
-_PIECE = Struct("<QBB")
-"""Simulated time in µs, number of the piece, their count."""
-_PIECE_BYTES = 4000
-"""Of a link's largest datagram."""
-MAX_PARCEL_BYTES = 4096
-"""Longer datagrams are cut, as by a link."""
+_HEAD = Struct("<QIBH")  # simulated time in µs, custom mode, whether armed, number of parcels
+_PARCEL = Struct("<HH")  # station, length
+_PIECE = Struct("<QBB")  # simulated time in µs, number of the piece, their count
+_PIECE_BYTES = 4000  # of a link's largest datagram
+MAX_PARCEL_BYTES = 4096  # longer datagrams are cut, as by a link
 
 
 class Parcel(NamedTuple):

@@ -32,21 +32,17 @@ SLOW: int = mav.FAILURE_TYPE_SLOW
 DELAYED: int = mav.FAILURE_TYPE_DELAYED
 
 SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS, RANGEFINDER)
-ALL = 0
-"""The instance for all of a part."""
-MOTORS = 4
-"""Of a vehicle that is not known."""
+ALL = 0  # the instance for all of a part
+MOTORS = 4  # of a vehicle that is not known
 FaultValues: TypeAlias = tuple[float, float, float, float]
-_ROUNDING = 1e-6
-"""Tolerance of limits, for the precision of the wire."""
+_ROUNDING = 1e-6  # tolerance of limits, for the precision of the wire
 _NOT_GIVEN: FaultValues = (0.0, 0.0, 0.0, 0.0)
 
 
 class Equipment(StrEnum):
     ROTORS = "rotors"
     BATTERY = "battery"
-    SENSORS = "sensors"
-    """The autopilot must use them, too: under state feedback a sensor fault has no effect."""
+    SENSORS = "sensors"  # the autopilot must use them, too: under state feedback a sensor fault has no effect
 
 
 class Fault(NamedTuple):

@@ -6,7 +6,5 @@ from enum import StrEnum
 class Feedback(StrEnum):
     """The basis of the autopilot's flight."""
 
-    STATE = "state"
-    """The true state."""
-    SENSORS = "sensors"
-    """Sensor measurements, from which the autopilot estimates its state."""
+    STATE = "state"  # the true state
+    SENSORS = "sensors"  # sensor measurements, from which the autopilot estimates its state

@@ -25,19 +25,15 @@ from colibri.mavlink.hil.sensors import OWN_MESSAGES
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
-RESEND_AFTER_S = 0.02
-"""Wall-clock silence before the plant repeats its frame."""
+RESEND_AFTER_S = 0.02  # wall-clock silence before the plant repeats its frame
 PEER_LOST_AFTER_S = 0.5
 """Wall-clock silence before another autopilot may take over, if the address of the first is free again."""
-PEER_GIVEN_UP_AFTER_S = 10.0
-"""Wall-clock silence before another may take over in any case."""
-CALL_AFTER_S = 1.0
-"""Wall-clock silence before the autopilot calls again, and a new flight may begin."""
+PEER_GIVEN_UP_AFTER_S = 10.0  # wall-clock silence before another may take over in any case
+CALL_AFTER_S = 1.0  # wall-clock silence before the autopilot calls again, and a new flight may begin
 CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 BATTERY_EVERY_US = 500_000
-FREE_RUNNING = 1
-"""HEARTBEAT.custom_mode of a free-running plant."""
+FREE_RUNNING = 1  # HEARTBEAT.custom_mode of a free-running plant
 MIN_FRAME_INTERVAL_US = 1_000
 MAX_FRAME_INTERVAL_US = 1_000_000
 

@@ -21,8 +21,7 @@ from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
-CALL_EVERY_S = 0.5
-"""Wall-clock interval of HEARTBEAT."""
+CALL_EVERY_S = 0.5  # wall-clock interval of HEARTBEAT
 ANSWER_AGAIN_AFTER_S = 1.0
 """Wall-clock silence before the last answer is repeated: a datagram may have been lost."""
 

@@ -23,8 +23,7 @@ from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 _UNKNOWN_COVARIANCE = 255
-_INVALID, _PERFECT = 1, 100
-"""DISTANCE_SENSOR.signal_quality."""
+_INVALID, _PERFECT = 1, 100  # DISTANCE_SENSOR.signal_quality
 _FIELDS = (
     "time_usec xacc yacc zacc xgyro ygyro zgyro xmag ymag zmag "
     "abs_pressure diff_pressure pressure_alt temperature fields_updated"
@@ -35,8 +34,7 @@ _SHORTENED = [FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"]
 _BY_SIZE = {layout.size: layout for layout in (_SENSOR, *_SHORTENED)}
 _SINGLES = Struct("<11f")
 _GPS = FixedFrame("HIL_GPS", "time_usec lat lon alt eph epv vel vn ve vd cog fix_type satellites_visible")
-_altitude_m = lru_cache(maxsize=1)(altitude_m)
-"""Pressure is measured less often than frames are sent."""
+_altitude_m = lru_cache(maxsize=1)(altitude_m)  # pressure is measured less often than frames are sent
 
 
 class Updated:
@@ -45,8 +43,7 @@ class Updated:
     ACCELEROMETER = 0x7
     GYROSCOPE = 0x38
     MAGNETOMETER = 0x1C0
-    BAROMETER = 0x1A00
-    """Without 0x400, differential pressure."""
+    BAROMETER = 0x1A00  # without 0x400, differential pressure
 
 
 class FixType(IntEnum):
@@ -101,8 +98,7 @@ class OwnMessage(NamedTuple):
     passed_on: bool  # to ground stations
 
 
-Frame: TypeAlias = StateFrame | SensorFrame
-"""A frame from plant to autopilot at one instant of simulated time."""
+Frame: TypeAlias = StateFrame | SensorFrame  # a frame from plant to autopilot at one instant of simulated time
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:

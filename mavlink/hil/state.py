@@ -15,10 +15,8 @@ from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Code
 from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
-ROTORS = 4
-"""Of a plant that is not told otherwise."""
-LOCKSTEP_FLAG = 1
-"""HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message."""
+ROTORS = 4  # of a plant that is not told otherwise
+LOCKSTEP_FLAG = 1  # HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message
 
 _UNIT_NORM_TOLERANCE = 1e-3
 _SINGLES = Struct("<13f")

@@ -8,12 +8,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 from colibri.mavlink.wire.dialect import Codec, mav
 
-WIND: int = mav.MAV_CMD_USER_1
-"""param1: m/s; param2: direction of origin, degrees clockwise from north."""
-PAYLOAD: int = mav.MAV_CMD_USER_2
-"""param1: kg added to the vehicle's mass."""
-PACE: int = mav.MAV_CMD_USER_3
-"""param1: pace relative to real time; only a plant that keeps one obeys."""
+WIND: int = mav.MAV_CMD_USER_1  # param1: m/s; param2: direction of origin, degrees clockwise from north
+PAYLOAD: int = mav.MAV_CMD_USER_2  # param1: kg added to the vehicle's mass
+PACE: int = mav.MAV_CMD_USER_3  # param1: pace relative to real time; only a plant that keeps one obeys
 MAX_PACE = 1000.0
 MAX_WIND_M_S, FULL_TURN_DEG, MAX_PAYLOAD_KG = 150.0, 360.0, 100.0
 

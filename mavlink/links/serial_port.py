@@ -19,14 +19,11 @@ if TYPE_CHECKING:
     from serial import Serial
 
 REOPEN_AFTER_S = 1.0
-QUEUE_S = 0.1
-"""Send queue, in time on the line: older telemetry is useless."""
-MIN_QUEUE_BYTES = 1024
-"""Three of the longest frames."""
+QUEUE_S = 0.1  # send queue, in time on the line: older telemetry is useless
+MIN_QUEUE_BYTES = 1024  # three of the longest frames
 _BITS_PER_BYTE = 10
 _CHUNK_BYTES = 4096
-_CHUNKS_AT_ONCE = 16
-"""Limit per call, so that a continuous sender cannot stall the process."""
+_CHUNKS_AT_ONCE = 16  # limit per call, so that a continuous sender cannot stall the process
 _REASONS = {
     errno.ENOENT: "no such device: plug it in, or choose another",
     errno.EACCES: "no permission; join the group that owns it (often dialout), and log in again",

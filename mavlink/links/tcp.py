@@ -13,10 +13,8 @@ from colibri.common.types import Address
 from colibri.mavlink.links.link import Endpoint
 from colibri.mavlink.wire.framing import Framer
 
-OUTPUT_BYTES = 1 << 18
-"""Send queue per connection beyond the system's; more is dropped."""
-CONNECTIONS = 16
-"""Limit of a server's clients."""
+OUTPUT_BYTES = 1 << 18  # send queue per connection beyond the system's; more is dropped
+CONNECTIONS = 16  # limit of a server's clients
 RECONNECT_AFTER_S = 1.0
 IDLE_AFTER_S = 3.5
 """Silence after which a client gives way to another where there are too many; stations send a HEARTBEAT a second."""
@@ -26,8 +24,7 @@ NOTE_EVERY_S = 1.0
 ACCEPT_EVERY_S = 0.1
 """Accept interval of a busy server with clients: each attempt is a system call, each client costs time."""
 _CHUNK_BYTES = 4096
-_CHUNKS_AT_ONCE = 16
-"""Limit per call, so that a continuous sender cannot stall the process."""
+_CHUNKS_AT_ONCE = 16  # limit per call, so that a continuous sender cannot stall the process
 _HTTP = re.compile(
     rb"\s*(?:GET|HEAD|POST|PUT|DELETE|CONNECT|OPTIONS|TRACE|PATCH|PRI) |\s*[!-~]+ +[!-~]+ +HTTP/|HTTP/\d", re.IGNORECASE
 )

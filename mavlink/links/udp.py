@@ -14,11 +14,9 @@ from colibri.common.types import Address
 from colibri.mavlink.links.link import SPIN_S, Endpoint, LinkError, give_way
 
 _MAX_DATAGRAM_BYTES = 4096
-_ATTACH_FILTER, _DETACH_FILTER = 26, 27
-"""Options of Linux's sockets."""
+_ATTACH_FILTER, _DETACH_FILTER = 26, 27  # options of Linux's sockets
 _INSTRUCTION, _PROGRAM = Struct("=HBBI"), Struct("@HP")
-_DATAGRAMS_AT_ONCE = 64
-"""Limit per call, so that a continuous sender cannot stall the process."""
+_DATAGRAMS_AT_ONCE = 64  # limit per call, so that a continuous sender cannot stall the process
 
 
 class UdpLink(Endpoint):

@@ -32,12 +32,10 @@ from colibri.mavlink.wire.places import misplaced, misplaced_height
 from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
-NO_MISSION_TOTAL = 0xFFFF
-"""MISSION_CURRENT.total without a mission."""
+NO_MISSION_TOTAL = 0xFFFF  # MISSION_CURRENT.total without a mission
 GUIDED = 2
 """MISSION_ITEM.current of an immediate destination outside the mission, as DroneKit's simple_goto sends."""
-FORGOTTEN_AFTER_US = 5_000_000
-"""Silence after which a reader gets the newest plan."""
+FORGOTTEN_AFTER_US = 5_000_000  # silence after which a reader gets the newest plan
 MAX_READERS = 32
 
 

@@ -1,7 +1,6 @@
 """The work that a vehicle does for ground stations, limited by its cost."""
 
-SHARE = 0.25
-"""Part of simulated time: the control law needs the rest at real time."""
+SHARE = 0.25  # part of simulated time: the control law needs the rest at real time
 MAX_SAVED_US = 2_000.0
 
 

@@ -4,8 +4,7 @@ from colibri.common.types import Address
 from colibri.mavlink.node.router import SOURCES, Source
 from colibri.mavlink.wire.dialect import Codec, Message, sequence_of
 
-DATAGRAM_BYTES = 1400
-"""Fits a datagram on common networks."""
+DATAGRAM_BYTES = 1400  # fits a datagram on common networks
 _SEQUENCES = 256
 
 

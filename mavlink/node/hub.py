@@ -19,20 +19,16 @@ SILENT_AFTER_US = 3_500_000
 FORGET_AFTER_US = 300_000_000
 """Silence before an unfixed channel is closed: sending to it costs time in every frame."""
 _TIDY_EVERY_US = 1_000_000
-_OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
-"""Messages without a verifiable CRC or signature."""
+_OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})  # messages without a verifiable CRC or signature
 
 
 _HANDLED_US, _ANSWERED_US = 20.0, 8.0
 """Work for a message that a service handles, and for each that is sent in answer to one channel."""
-MAX_WAITING = 1000
-"""Limit of messages of one channel that wait for the budget; more are dropped."""
-_TRIES = 3
-"""Exceptions in `poll` before a service is switched off."""
+MAX_WAITING = 1000  # limit of messages of one channel that wait for the budget; more are dropped
+_TRIES = 3  # exceptions in `poll` before a service is switched off
 Caught: TypeAlias = Callable[[str, Exception, str], None]
 """(service, exception, consequence): reports an exception of a service."""
-WARN_EVERY_US = 10_000_000
-"""Interval of the warning of a refused key or signature."""
+WARN_EVERY_US = 10_000_000  # interval of the warning of a refused key or signature
 FUTURE = "a signature is ahead of this computer's clock by more than 30 s: set the sender's clock"
 KEY_REFUSED = (
     "a signing key is refused: it is taken from the first --gcs only, if that is udpout: or tcp: to this computer; "

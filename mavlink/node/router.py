@@ -4,11 +4,9 @@ A broadcast goes to every channel, a message with a target to channels that have
 channel that has received its source. So messages cannot circulate.
 """
 
-Source = tuple[int, int]
-"""System and component id."""
+Source = tuple[int, int]  # system and component id
 
-SOURCES = 64
-"""Limit of sources remembered per channel; the oldest is forgotten."""
+SOURCES = 64  # limit of sources remembered per channel; the oldest is forgotten
 
 
 class Router:

@@ -14,8 +14,7 @@ from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, 
 
 GENERAL = "general.json"
 PARAMETERS = "parameter.json"
-TYPE_PARAMETER = 1
-"""COMP_METADATA_TYPE_PARAMETER."""
+TYPE_PARAMETER = 1  # COMP_METADATA_TYPE_PARAMETER
 
 _VERSION = 1
 _TYPES = {ParamType.INT: "Int32", ParamType.REAL: "Float"}

@@ -5,11 +5,9 @@ from struct import Struct, pack
 from colibri.mavlink.parameters.store import Parameter, Parameters, ParamType, bits_of
 from colibri.mavlink.wire.dialect import mav
 
-BLOCK_BYTES = 239
-"""Read size of clients: a value must not cross a block boundary."""
+BLOCK_BYTES = 239  # read size of clients: a value must not cross a block boundary
 
-_HEADER = Struct("<HHH")
-"""Magic, parameters in this file, parameters in all."""
+_HEADER = Struct("<HHH")  # magic, parameters in this file, parameters in all
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _TYPES = {ParamType.INT: 3, ParamType.REAL: 4}
 _HAS_DEFAULT = 0x10

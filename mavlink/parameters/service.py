@@ -12,13 +12,10 @@ from colibri.mavlink.node.service import IDLE, Peer, Send, to
 from colibri.mavlink.parameters.store import ParamError, Parameter, Parameters, ParamType, Value, bits_of, value_of
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
-INTERVAL_US = 2_000
-"""Between two parameters of a list: 150 take 0.3 s."""
+INTERVAL_US = 2_000  # between two parameters of a list: 150 take 0.3 s
 MAX_AT_ONCE = 20
-BY_ID = -1
-"""param_index of a request by name."""
-_NOT_EXACT_IN_FLOAT = 2**24
-"""From here on, a float may stand for two integers."""
+BY_ID = -1  # param_index of a request by name
+_NOT_EXACT_IN_FLOAT = 2**24  # from here on, a float may stand for two integers
 
 
 @dataclass(slots=True)

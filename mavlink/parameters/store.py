@@ -11,14 +11,12 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.wire.dialect import mav
 
-Value: TypeAlias = int | float
-"""An int of 32 bits, or a float exact in 32 bits."""
+Value: TypeAlias = int | float  # an int of 32 bits, or a float exact in 32 bits
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 FLOAT32_MAX = 3.4028234663852886e38
 _NAME = "[A-Z][A-Z0-9_]{0,15}"
-_MAX_BATCHES = 8
-"""With more, the last value that was proposed for a name counts."""
+_MAX_BATCHES = 8  # with more, the last value that was proposed for a name counts
 _INT, _REAL, _BITS = Struct("<i"), Struct("<f"), Struct("<I")
 
 

@@ -16,8 +16,7 @@ DENIED: int = mav.MAV_RESULT_DENIED
 UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
-UNSUPPORTED_MAV_FRAME = 9
-"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects."""
+UNSUPPORTED_MAV_FRAME = 9  # MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; missing in pymavlink's dialects
 
 _SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}
 """Others are warnings; of what is not supported ground stations ask by themselves."""
@@ -25,10 +24,8 @@ _SEVERITIES = {FAILED: ERROR, UNSUPPORTED: INFO}
 PENDING = Refusal(result=-1)
 """Result of a command that takes a few frames: its sender gets the answer with `finish`."""
 
-PROGRESS_UNKNOWN = 0xFF
-"""COMMAND_ACK.progress of a pending command."""
-NOT_GIVEN = 2**31 - 1
-"""The integer x and y of a COMMAND_INT for nan in a COMMAND_LONG."""
+PROGRESS_UNKNOWN = 0xFF  # COMMAND_ACK.progress of a pending command
+NOT_GIVEN = 2**31 - 1  # the integer x and y of a COMMAND_INT for nan in a COMMAND_LONG
 DEGREES = 1e-7
 
 GLOBAL_FRAMES: frozenset[int] = frozenset(

@@ -12,16 +12,14 @@ MAX_LINE_BYTES = 200
 MAX_ANSWER_BYTES = 20_000
 MESSAGES_A_POLL = 10
 MAX_PEERS = 16
-_ANSWER_US, _LETTER_US = 20.0, 0.05
-"""Work for an answer, and for each of its letters."""
+_ANSWER_US, _LETTER_US = 20.0, 0.05  # work for an answer, and for each of its letters
 PROMPT = "colibri> "
 
 _SHELL: int = mav.SERIAL_CONTROL_DEV_SHELL
 _REPLY: int = mav.SERIAL_CONTROL_FLAG_REPLY
 _RESPOND: int = mav.SERIAL_CONTROL_FLAG_RESPOND
 
-Command: TypeAlias = Callable[[list[str]], str]
-"""(arguments) -> lines of text."""
+Command: TypeAlias = Callable[[list[str]], str]  # (arguments) -> lines of text
 
 
 class Shell:

@@ -9,8 +9,7 @@ from colibri.mavlink.services.command import FAILED, Handler, ReceivedCommand
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
-NAME_BYTES = 34
-"""Of AVAILABLE_MODES.mode_name without its final zero."""
+NAME_BYTES = 34  # of AVAILABLE_MODES.mode_name without its final zero
 
 
 class ModeInfo(NamedTuple):

@@ -13,8 +13,7 @@ from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
 
-SILENT_AFTER_US = 500_000
-"""Silence that ends a stream; MAVLink requires at least 2 Hz."""
+SILENT_AFTER_US = 500_000  # silence that ends a stream; MAVLink requires at least 2 Hz
 TELL_EVERY_US = 5_000_000
 MAX_CLIENTS = 16
 

@@ -19,8 +19,7 @@ from colibri.mavlink.wire.places import MAX_DISTANCE_M, misplaced
 POSITION_KNOWN = 1
 MAX_SPEED_M_S = 100.0
 MAX_ACCELERATION_M_S2 = 100.0
-SILENT_AFTER_US = 3_000_000
-"""Trackers send a position once a second."""
+SILENT_AFTER_US = 3_000_000  # trackers send a position once a second
 GOES_ON_US = 2_000_000
 """Extrapolation at the last velocity without messages; then the target is assumed to stand."""
 _DEG = 1e-7

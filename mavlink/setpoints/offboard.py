@@ -39,11 +39,9 @@ from colibri.mavlink.wire.refusal import Refusal
 
 MAX_SPEED_M_S = 50.0
 MAX_ACCELERATION_M_S2 = 50.0
-MAX_YAW_RATE_RAD_S = 35.0
-"""Of body rates: 2000 degrees a second, the range of usual gyroscopes."""
+MAX_YAW_RATE_RAD_S = 35.0  # of body rates: 2000 degrees a second, the range of usual gyroscopes
 MAX_YAW_RAD = 1e3
-UNIT_WITHIN = 0.01
-"""Tolerance of a quaternion's length: clients use single precision, some round."""
+UNIT_WITHIN = 0.01  # tolerance of a quaternion's length: clients use single precision, some round
 
 _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
 """First mask bit of each group of three in POSITION_TARGET_TYPEMASK."""

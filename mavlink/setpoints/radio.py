@@ -25,10 +25,8 @@ from colibri.mavlink.setpoints.setpoints import Sticks
 
 CHANNELS = 18
 _FIRST_EXTENDED = 9
-_RELEASED_EXTENDED = 65534
-"""Of channels 9 to 18, whose 0 leaves them."""
-FAILED, THROTTLE_LOW = 1, 2
-"""SIM_RC_FAIL: no signal; all channels centred, and the throttle at `LOW_US`."""
+_RELEASED_EXTENDED = 65534  # of channels 9 to 18, whose 0 leaves them
+FAILED, THROTTLE_LOW = 1, 2  # SIM_RC_FAIL: no signal; all channels centred, and the throttle at `LOW_US`
 LOW_US = 950
 
 

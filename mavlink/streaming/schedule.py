@@ -3,11 +3,9 @@
 from heapq import heapify, heappop, heappush
 from typing import TypeAlias
 
-Key: TypeAlias = tuple[int, str]
-"""Number of a channel, name of a message."""
+Key: TypeAlias = tuple[int, str]  # number of a channel, name of a message
 
-GOLDEN = 0.6180339887498949
-"""The fractional parts of its multiples are evenly spread."""
+GOLDEN = 0.6180339887498949  # the fractional parts of its multiples are evenly spread
 STALE_ALLOWED = 64
 
 

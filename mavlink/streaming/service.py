@@ -20,16 +20,14 @@ Provider: TypeAlias = Callable[[ReceivedCommand], list[Send] | Refusal]
 """Answers or refuses REQUEST_MESSAGE for another service's message, by the command's param2 to param6."""
 
 MIN_INTERVAL_US = 1_000
-MIN_GROUP_INTERVAL_US = 20_000
-"""All groups at frame rate would take computing time from the control law."""
+MIN_GROUP_INTERVAL_US = 20_000  # all groups at frame rate would take computing time from the control law
 MAX_INTERVAL_US = 2**31 - 1
 MAX_STREAMED = 128
 """Limit of streamed messages between two frames of the plant; the others are late, and rates decrease for all."""
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
-MAX_WAITING = 256
-"""Limit of requested messages between two frames of the plant; more are rejected temporarily."""
+MAX_WAITING = 256  # limit of requested messages between two frames of the plant; more are rejected temporarily
 
 _OLD_REQUESTS = {
     "MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES": "AUTOPILOT_VERSION",

@@ -11,10 +11,8 @@ from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, TelemetrySnap
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
-POINTS = 5
-"""Capacity of TRAJECTORY_REPRESENTATION_WAYPOINTS."""
-FLOATS = 58
-"""Capacity of DEBUG_FLOAT_ARRAY."""
+POINTS = 5  # capacity of TRAJECTORY_REPRESENTATION_WAYPOINTS
+FLOATS = 58  # capacity of DEBUG_FLOAT_ARRAY
 ARRAY_NAME = b"lpv_mpc"
 
 

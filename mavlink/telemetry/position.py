@@ -21,8 +21,7 @@ from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_from_enu
 
-SATELLITES = 12
-"""Under open sky, for a vehicle without a receiver: its position is the state itself."""
+SATELLITES = 12  # under open sky, for a vehicle without a receiver: its position is the state itself
 DILUTION_E2 = 70
 RANGE_CM = (0, 10_000)
 PERCENT = 100

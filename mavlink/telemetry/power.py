@@ -9,16 +9,14 @@ from colibri.mavlink.telemetry.encoder import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U
 from colibri.mavlink.telemetry.snapshot import BatteryState, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 
-CELLS = 10
-"""Capacity of BATTERY_STATUS; four more cells go into its extension."""
+CELLS = 10  # capacity of BATTERY_STATUS; four more cells go into its extension
 CELLS_EXTENDED = 4
 HECTOJOULES_PER_WH = 36.0
 RPM = 60.0 / (2.0 * pi)
 LOW_US, SPAN_US = 1000.0, 1000.0
 OUTPUTS = 32
 _SERVOS = 16
-_ESCS = 4
-"""Of one ESC_STATUS or ESC_INFO."""
+_ESCS = 4  # of one ESC_STATUS or ESC_INFO
 ESC_CONNECTION_TYPE_DSHOT = 5
 MIXED_GROUP = 0
 

@@ -11,8 +11,7 @@ from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 
 NOWHERE: Vector = (nan, nan, nan)
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
-CHARGE_OK = 1
-"""MAV_BATTERY_CHARGE_STATE_OK."""
+CHARGE_OK = 1  # MAV_BATTERY_CHARGE_STATE_OK
 
 
 class HomePosition(NamedTuple):

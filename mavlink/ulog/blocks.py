@@ -11,10 +11,8 @@ import numpy as np
 from colibri.common.types import Array, Vector
 from colibri.mavlink.wire.ned import ned_frd_from_enu_flu
 
-BLOCK_ROWS = 16
-"""Of PX4's topics: 0.64 s."""
-EVERY_US = 40_000
-"""Interval of PX4's topics, for viewers: PX4's own or shorter."""
+BLOCK_ROWS = 16  # of PX4's topics: 0.64 s
+EVERY_US = 40_000  # interval of PX4's topics, for viewers: PX4's own or shorter
 
 
 class Thinning:
@@ -28,8 +26,7 @@ class Thinning:
         return time_us % EVERY_US == 0 if before_us is None else time_us // EVERY_US != before_us // EVERY_US
 
 
-Turn: TypeAlias = Callable[[Vector], Vector]
-"""Change of axes: a permutation with signs."""
+Turn: TypeAlias = Callable[[Vector], Vector]  # change of axes: a permutation with signs
 
 
 class Blocks(ABC):

@@ -184,8 +184,7 @@ COMMAND = Topic(
         Columns("armed", "", "1 if armed", "uint8_t"),
     ),
 )
-ROTORS = 4
-"""In `TRUTH` and `COMMAND`."""
+ROTORS = 4  # in `TRUTH` and `COMMAND`
 MORE_TRUTH = Topic(
     "colibri_more_truth",
     107,

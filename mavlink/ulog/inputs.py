@@ -8,22 +8,17 @@ from typing import NamedTuple
 from colibri.mavlink.ulog.messages import DATA
 
 INPUT, INPUT_NUMBER = "colibri_input", 106
-CHUNK_BYTES = 88
-"""Fits a frame of state or sensor feedback."""
+CHUNK_BYTES = 88  # fits a frame of state or sensor feedback
 INPUT_FIELDS = f"uint64_t timestamp;uint8_t what;bool goes_on;uint8_t size;uint8_t[{CHUNK_BYTES}] data;"
 _CHUNK = Struct(f"<HQB?B{CHUNK_BYTES}s")
 _MESSAGE = Struct(f"<HB{_CHUNK.format[1:]}")
-CONTENT_BYTES = _CHUNK.size
-"""Of a message without its head."""
+CONTENT_BYTES = _CHUNK.size  # of a message without its head
 
 
 class RecordKind(IntEnum):
-    SETUP = 1
-    """The autopilot's setup, as JSON."""
-    DATAGRAM = 2
-    """A ground station's datagram, as JSON."""
-    FRAME = 3
-    """A datagram of the plant."""
+    SETUP = 1  # the autopilot's setup, as JSON
+    DATAGRAM = 2  # a ground station's datagram, as JSON
+    FRAME = 3  # a datagram of the plant
 
 
 class InputRecord(NamedTuple):

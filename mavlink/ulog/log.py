@@ -13,12 +13,10 @@ from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.blocks import Blocks
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, Topic
 
-ROWS_AT_ONCE = 4096
-"""Rows read at once: some seconds of a flight."""
+ROWS_AT_ONCE = 4096  # rows read at once: some seconds of a flight
 _QUEUED = 64
 
-RowEncoder: TypeAlias = Topic | Blocks
-"""Encoder of a topic's rows, or of several of PX4's."""
+RowEncoder: TypeAlias = Topic | Blocks  # encoder of a topic's rows, or of several of PX4's
 
 
 class TopicReader(Protocol):

@@ -16,8 +16,7 @@ _TYPES = {int: ("int32_t", Struct("<i")), float: ("float", Struct("<f"))}
 _MAX_TEXT_BYTES = 1000
 
 DATA, FORMAT = ord("D"), ord("F")
-HEADER_BYTES = len(MAGIC) + 1 + 8
-"""Of the file, before its first message."""
+HEADER_BYTES = len(MAGIC) + 1 + 8  # of the file, before its first message
 HEAD_BYTES = _HEAD.size
 
 

@@ -13,12 +13,10 @@ from colibri.mavlink.ulog import messages
 from colibri.mavlink.ulog.flight_topics import FLIGHT_TOPICS, MORE_TRUTH, Topic
 from colibri.mavlink.ulog.inputs import CONTENT_BYTES, INPUT_NUMBER, InputRecord, decode_inputs
 
-FILE = "flight.ulg"
-"""In a flight's folder."""
+FILE = "flight.ulg"  # in a flight's folder
 ROWS_AT_ONCE = 4096
 _BLOCK_ROWS = 128
-_MAPPED_BYTES = 1 << 23
-"""Memory limit, independent of the flight's length."""
+_MAPPED_BYTES = 1 << 23  # memory limit, independent of the flight's length
 _KINDS = frozenset(b"BFIMPASDLCORQ")
 
 

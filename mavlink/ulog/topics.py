@@ -68,10 +68,8 @@ TOPICS: Mapping[str, str] = {
 }
 """Fields by topic."""
 
-PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}
-"""Nested types."""
-NUMBERS = {name: number for number, name in enumerate(TOPICS)}
-"""Topic numbers, for all writers of a file."""
+PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}  # nested types
+NUMBERS = {name: number for number, name in enumerate(TOPICS)}  # topic numbers, for all writers of a file
 _CODES = {
     "uint64_t": "Q",
     "uint32_t": "I",

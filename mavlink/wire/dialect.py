@@ -12,13 +12,11 @@ from pymavlink.dialects.v20 import development
 from colibri.mavlink.wire import missing_messages
 
 missing_messages.add_to(development)
-mav: Any = development
-"""The dialect with its enumerations."""
+mav: Any = development  # the dialect with its enumerations
 
 AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
-TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2
-"""Sends the true state, for programs between plant and autopilot."""
+TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2  # sends the true state, for programs between plant and autopilot
 
 TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
 _TYPES = {3: mav.MAV_TYPE_TRICOPTER, 4: TYPE_QUADROTOR, 6: mav.MAV_TYPE_HEXAROTOR, 8: mav.MAV_TYPE_OCTOROTOR}
@@ -38,13 +36,10 @@ RESULT_TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED
 RESULT_DENIED: int = mav.MAV_RESULT_DENIED
 RESULT_UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 
-MARKER = 0xFD
-"""First byte of a MAVLink 2 frame."""
-SIGNED = 0x01
-"""Incompatibility flag of a signed frame, https://mavlink.io/en/guide/serialization.html."""
+MARKER = 0xFD  # first byte of a MAVLink 2 frame
+SIGNED = 0x01  # incompatibility flag of a signed frame, https://mavlink.io/en/guide/serialization.html
 SIGNATURE_BYTES: int = mav.MAVLINK_SIGNATURE_BLOCK_LEN
-UNKNOWN = "UNKNOWN"
-"""Name of messages outside the dialect."""
+UNKNOWN = "UNKNOWN"  # name of messages outside the dialect
 
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""

@@ -6,8 +6,7 @@ from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED, intact
 
 _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_V1 = 0xFE
-_PREFIX_BYTES = 3
-"""Determine a frame's length: marker, payload length, incompatibility flags (of MAVLink 2)."""
+_PREFIX_BYTES = 3  # determine a frame's length: marker, payload length, incompatibility flags (of MAVLink 2)
 _OTHER_BYTES_V1 = 8
 _OTHER_BYTES = 12
 

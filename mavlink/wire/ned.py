@@ -5,8 +5,7 @@ from typing import TypeVar
 
 from colibri.common.types import Array
 
-_Number = TypeVar("_Number", float, Array)
-"""One vector, or a column of many per component."""
+_Number = TypeVar("_Number", float, Array)  # one vector, or a column of many per component
 _HALF_SQRT2 = sqrt(0.5)
 
 

@@ -12,10 +12,8 @@ from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
-MAX_DISTANCE_M = 100_000.0
-"""From the origin: a place beyond is refused."""
-FAR_M = 10_000.0
-"""From home: a place beyond is accepted with a warning, as in PX4 (MIS_DIST_1WP)."""
+MAX_DISTANCE_M = 100_000.0  # from the origin: a place beyond is refused
+FAR_M = 10_000.0  # from home: a place beyond is accepted with a warning, as in PX4 (MIS_DIST_1WP)
 MAX_HEIGHT_M = 10_000.0
 
 ABOVE_SEA: frozenset[int] = frozenset((mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT))

@@ -14,13 +14,10 @@ from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED
 
 KEY_BYTES = 32
-TICK_US = 10
-"""Unit of timestamps, since `EPOCH_S`."""
-EPOCH_S = 1_420_070_400
-"""1 January 2015, Unix time."""
+TICK_US = 10  # unit of timestamps, since `EPOCH_S`
+EPOCH_S = 1_420_070_400  # 1 January 2015, Unix time
 LAST_TICK = (1 << 48) - 1
-NEW_STREAM_TICKS = 6_000_000
-"""One minute: greatest lag of a new stream behind the own timestamp."""
+NEW_STREAM_TICKS = 6_000_000  # one minute: greatest lag of a new stream behind the own timestamp
 AHEAD_TICKS = 3_000_000
 """Half a minute: greatest lead before the own clock. It is less, so that no accepted stamp keeps out a right clock."""
 TOO_EARLY = "signed in the future"
@@ -30,8 +27,7 @@ _TIMESTAMP_BYTES = 6
 _DIGEST_BYTES = 6
 _FLAGS_AT, _SYSTEM_AT, _COMPONENT_AT = 2, 5, 6
 _NO_KEY = bytes(KEY_BYTES)
-_NEVER_SIGNED = frozenset({"RADIO_STATUS"})
-"""Sent by radios without a key: "always accepted without signing"."""
+_NEVER_SIGNED = frozenset({"RADIO_STATUS"})  # sent by radios without a key: "always accepted without signing"
 
 
 class SigningError(MavlinkError):

@@ -11,8 +11,7 @@ from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.framing import frame_length
 
 STAMP = struct.Struct(">Q")
-TRAFFIC = "flight.tlog"
-"""Its name in the folder of a flight."""
+TRAFFIC = "flight.tlog"  # its name in the folder of a flight
 
 
 class Logged(NamedTuple):
