@@ -10,14 +10,7 @@ from colibri.common.kernels import atan2
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.dataflash.messages import Value, beginning, message
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.telemetry.encoder import (
-    STANDARD_GRAVITY_M_S2,
-    compass_cdeg,
-    height_above_home_m,
-    in_body_frd,
-    place_of,
-    rate_frd,
-)
+from colibri.mavlink.telemetry.encoder import STANDARD_GRAVITY_M_S2, compass_cdeg, in_body_frd
 from colibri.mavlink.telemetry.position import DILUTION_E2, SATELLITES
 from colibri.mavlink.telemetry.power import actuator_control_target
 from colibri.mavlink.telemetry.snapshot import CHARGE_OK, TelemetrySnapshot
@@ -89,7 +82,7 @@ class DataFlashRecorder:
             place = s.origin
             self._add("ORGN", now_us, _EKF_ORIGIN, place.latitude_deg, place.longitude_deg, place.altitude_m)
         if s.home is not None and changed(lambda each: each.home, None):
-            place = place_of(s._replace(position_enu_m=s.home.position_enu_m))
+            place = s._replace(position_enu_m=s.home.position_enu_m).place
             self._add("ORGN", now_us, _HOME, place.latitude_deg, place.longitude_deg, place.altitude_m)
         if changed(lambda each: each.custom_mode, None):
             self._add("MODE", now_us, s.custom_mode & 0xFF, s.custom_mode & 0xFF, 0)
@@ -110,9 +103,7 @@ class DataFlashRecorder:
         if not s.gps_ok:
             return (0, mav.GPS_FIX_TYPE_NO_FIX, week_ms, week, 0, 99.99, *(0.0,) * 7, False)
         fix = s.fix
-        place, (east, north, up) = (
-            (place_of(s), s.velocity_enu_m_s) if fix is None else (fix.place, fix.velocity_enu_m_s)
-        )
+        place, (east, north, up) = (s.place, s.velocity_enu_m_s) if fix is None else (fix.place, fix.velocity_enu_m_s)
         kind, seen = (mav.GPS_FIX_TYPE_3D_FIX, SATELLITES) if fix is None else (fix.fix_type, fix.satellites)
         course = compass_cdeg(atan2(north, east)) / 100.0
         where = (place.latitude_deg, place.longitude_deg, place.altitude_m)
@@ -153,7 +144,7 @@ def _angles_deg(attitude: Quaternion) -> Vector:
 
 
 def _rates(s: TelemetrySnapshot) -> tuple[Value, ...]:
-    wanted, actual = frd_from_flu(s.setpoint.rate_flu_rad_s), rate_frd(s)
+    wanted, actual = frd_from_flu(s.setpoint.rate_flu_rad_s), s.rate_frd
     *_, mixed = actuator_control_target(s)
     axes = [(degrees(wanted[axis]), degrees(actual[axis]), mixed[axis]) for axis in range(3)]
     climb = (s.setpoint.acceleration_enu_m_s2[2], s.acceleration_enu_m_s2[2], mixed[3])
@@ -184,9 +175,9 @@ def _position(axis: int) -> _Row:
 
 
 def _place(s: TelemetrySnapshot) -> tuple[Value, ...]:
-    place = place_of(s)
+    place = s.place
     where = (place.latitude_deg, place.longitude_deg, place.altitude_m)
-    return (*where, height_above_home_m(s), s.position_enu_m[2])
+    return (*where, s.height_above_home_m, s.position_enu_m[2])
 
 
 def _battery(s: TelemetrySnapshot) -> tuple[Value, ...]:
@@ -206,7 +197,7 @@ def _inertial(s: TelemetrySnapshot) -> tuple[Value, ...]:
     """Return a row of IMU: measured, or of the state under state feedback."""
     if s.sensed is None:
         east, north, up = s.acceleration_enu_m_s2
-        force, rate = in_body_frd(s.attitude, (east, north, up + STANDARD_GRAVITY_M_S2)), rate_frd(s)
+        force, rate = in_body_frd(s.attitude, (east, north, up + STANDARD_GRAVITY_M_S2)), s.rate_frd
     else:
         force, rate = frd_from_flu(s.sensed.specific_force_flu_m_s2), frd_from_flu(s.sensed.rate_flu_rad_s)
     hertz = round(1e6 / EVERY_US)

@@ -1,12 +1,12 @@
 """Messages of the control law: setpoint, plan and solver."""
 
-from math import degrees, hypot, isnan
+from math import degrees, hypot, isnan, nan
 
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms, minus, yaw_ned
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, minus, yaw_ned
 from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
@@ -23,14 +23,14 @@ def attitude_target(s: TelemetrySnapshot) -> Fields:
     ignore = sum(1 << bit for bit, rate in enumerate(rates) if isnan(rate))
     if any(map(isnan, setpoint.attitude)):
         ignore |= mav.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
-    return (boot_ms(s), ignore, ned_frd_from_enu_flu(setpoint.attitude), *rates, setpoint.thrust)
+    return (s.boot_ms, ignore, ned_frd_from_enu_flu(setpoint.attitude), *rates, setpoint.thrust)
 
 
 def position_target_local_ned(s: TelemetrySnapshot) -> Fields:
     """POSITION_TARGET_LOCAL_NED (85): m, m/s, m/s², rad; unused fields are NaN and masked."""
     position = ned_from_enu(s.setpoint.position_enu_m)
     moving = _moving_ned(s.setpoint)
-    return (boot_ms(s), mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
+    return (s.boot_ms, mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
 
 
 def position_target_global_int(s: TelemetrySnapshot) -> Fields:
@@ -43,7 +43,7 @@ def position_target_global_int(s: TelemetrySnapshot) -> Fields:
     else:
         latitude, longitude, _ = geodetic_of((east, north, 0.0), s.origin)
         place = (1e7 * latitude, 1e7 * longitude)
-    return (boot_ms(s), mav.MAV_FRAME_GLOBAL, mask, *place, up + s.origin.altitude_m, *moving)
+    return (s.boot_ms, mav.MAV_FRAME_GLOBAL, mask, *place, up + s.origin.altitude_m, *moving)
 
 
 def nav_controller_output(s: TelemetrySnapshot) -> Fields:
@@ -63,7 +63,7 @@ def trajectory_representation_waypoints(s: TelemetrySnapshot) -> Fields | None:
     points = _spread(s.solver.horizon)
     if not points:
         return None
-    rows = [_row(point) for point in points] + [NOT_A_POINT] * (POINTS - len(points))
+    rows = [_row(point) for point in points] + [(nan,) * 11] * (POINTS - len(points))
     columns = tuple(zip(*rows, strict=True))
     return (s.time_us, len(points), *columns, (UNKNOWN_U16,) * POINTS)
 
@@ -102,10 +102,7 @@ def named_value_float(s: TelemetrySnapshot) -> list[Fields]:
         figures[b"mass_kg"] = solver.mass_kg
     if not isnan(solver.path_lag_s):
         figures[b"path_lag_s"] = solver.path_lag_s
-    return [(boot_ms(s), name, float(value)) for name, value in figures.items()]
-
-
-NOT_A_POINT = (float("nan"),) * 11
+    return [(s.boot_ms, name, float(value)) for name, value in figures.items()]
 
 
 def _row(point: Forecast) -> tuple[float, ...]:
@@ -120,12 +117,8 @@ def _spread(horizon: tuple[Forecast, ...]) -> list[Forecast]:
 
 def _moving_ned(setpoint: Setpoint) -> tuple[float, ...]:
     velocity, acceleration = setpoint.velocity_enu_m_s, setpoint.acceleration_enu_m_s2
-    return (
-        *ned_from_enu(velocity),
-        *ned_from_enu(acceleration),
-        yaw_ned(setpoint.yaw_rad),
-        -setpoint.yaw_rate_rad_s,
-    )
+    yaw = (yaw_ned(setpoint.yaw_rad), -setpoint.yaw_rate_rad_s)
+    return (*ned_from_enu(velocity), *ned_from_enu(acceleration), *yaw)
 
 
 def _ignored(values: tuple[float, ...]) -> int:

@@ -5,25 +5,15 @@ Source: ArduPilot's GCS_Common.cpp and ardupilotmega.xml. Numbers of its own fil
 
 from math import degrees, hypot, isfinite
 
-from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.kernels import atan2
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry import controller, sensors, status
-from colibri.mavlink.telemetry.encoder import (
-    Encoder,
-    boot_ms,
-    degrees_e7,
-    fitted,
-    in_body_frd,
-    place_of,
-    rate_frd,
-    yaw_ned,
-)
+from colibri.mavlink.telemetry.attitude import angles_frd
+from colibri.mavlink.telemetry.encoder import Encoder, degrees_e7, fitted
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.telemetry.status import ESTIMATED
 from colibri.mavlink.wire.dialect import mav
 
-GRAVITY_M_S2 = 9.81
 _STABILIZE, _ALT_HOLD = 0, 2
 _SERVO_MV, _BOARD_MV = 0, 5000
 _NO_RSSI = 255
@@ -42,7 +32,7 @@ def ekf_status_report(s: TelemetrySnapshot) -> Fields:
     report = sum(bits for flag, bits in _ESTIMATOR.items() if flags & flag)
     if not s.gps_ok or not report & 16:
         report = (report & ~_PLACE & ~2) | _CONSTANT_POSITION
-    ratios = (0.05, 0.05, 0.05, 0.05) if s.estimator is None else (*s.estimator.ratios[:3], s.estimator.ratios[3])
+    ratios = (0.05,) * 4 if s.estimator is None else s.estimator.ratios[:4]
     return (report, *(min(ratio, 1.0) if isfinite(ratio) else 0.0 for ratio in ratios), 0.0)
 
 
@@ -56,36 +46,14 @@ def sys_status(s: TelemetrySnapshot) -> Fields:
     return (present, enabled, *others)
 
 
-def ahrs(s: TelemetrySnapshot) -> Fields:
-    """AHRS (163)."""
-    del s
-    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.002, 0.002)
-
-
 def ahrs2(s: TelemetrySnapshot) -> Fields:
     """AHRS2 (178): a second attitude and place, here the first; rad, m above the sea, degE7."""
-    roll, pitch, yaw = _angles_frd(s)
-    place = place_of(s)
-    return (roll, pitch, yaw, place.altitude_m, *degrees_e7(place))
+    return (*angles_frd(s), s.place.altitude_m, *degrees_e7(s.place))
 
 
 def simstate(s: TelemetrySnapshot) -> Fields:
     """SIMSTATE (164): attitude, specific force, rates and place; rad, m/s2, rad/s, degE7."""
-    east, north, up = s.acceleration_enu_m_s2
-    force = in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2))
-    return (*_angles_frd(s), *force, *rate_frd(s), *degrees_e7(place_of(s)))
-
-
-def meminfo(s: TelemetrySnapshot) -> Fields:
-    """MEMINFO (152)."""
-    del s
-    return (0, 2**16 - 1)
-
-
-def power_status(s: TelemetrySnapshot) -> Fields:
-    """POWER_STATUS (125): mV of board and servo rail."""
-    del s
-    return (_BOARD_MV, _SERVO_MV, 0)
+    return (*angles_frd(s), *sensors.specific_force_frd(s), *s.rate_frd, *degrees_e7(s.place))
 
 
 def wind(s: TelemetrySnapshot) -> Fields | None:
@@ -107,13 +75,12 @@ def fence_status(s: TelemetrySnapshot) -> Fields | None:
 
 def rc_channels(s: TelemetrySnapshot) -> Fields:
     """RC_CHANNELS (65): the radio's channels, us."""
-    channels = s.channels
-    return (boot_ms(s), len(channels), *channels, *(0,) * (_CHANNELS - len(channels)), _NO_RSSI)
+    return (s.boot_ms, len(s.channels), *s.channels, *(0,) * (_CHANNELS - len(s.channels)), _NO_RSSI)
 
 
 def rc_channels_raw(s: TelemetrySnapshot) -> Fields:
     """RC_CHANNELS_RAW (35): the first eight channels, us."""
-    return (boot_ms(s), 0, *(*s.channels, *(0,) * 8)[:8], _NO_RSSI)
+    return (s.boot_ms, 0, *(*s.channels, *(0,) * 8)[:8], _NO_RSSI)
 
 
 def position_target_local_ned(s: TelemetrySnapshot) -> Fields | None:
@@ -126,31 +93,22 @@ def position_target_global_int(s: TelemetrySnapshot) -> Fields:
     return controller.position_target_global_int(s if s.requested is None else s._replace(setpoint=s.requested))
 
 
-def _angles_frd(s: TelemetrySnapshot) -> tuple[float, float, float]:
-    roll, pitch, yaw = euler_from_quaternion(s.attitude)
-    return (roll, -pitch, yaw_ned(yaw))
-
-
-def _second(s: TelemetrySnapshot) -> Fields:
-    return sensors.scaled_imu(s)
-
-
-_ENCODERS = {
+_ENCODERS: dict[str, Encoder] = {
     "EKF_STATUS_REPORT": ekf_status_report,
     "SYS_STATUS": sys_status,
-    "AHRS": ahrs,
+    "AHRS": lambda _: (0.0, 0.0, 0.0, 0.0, 0.0, 0.002, 0.002),
     "AHRS2": ahrs2,
     "SIMSTATE": simstate,
-    "MEMINFO": meminfo,
-    "POWER_STATUS": power_status,
+    "MEMINFO": lambda _: (0, 2**16 - 1),
+    "POWER_STATUS": lambda _: (_BOARD_MV, _SERVO_MV, 0),
     "WIND": wind,
     "FENCE_STATUS": fence_status,
     "RC_CHANNELS": rc_channels,
     "RC_CHANNELS_RAW": rc_channels_raw,
     "POSITION_TARGET_LOCAL_NED": position_target_local_ned,
     "POSITION_TARGET_GLOBAL_INT": position_target_global_int,
-    "SCALED_IMU2": _second,
-    "SCALED_IMU3": _second,
+    "SCALED_IMU2": sensors.scaled_imu,
+    "SCALED_IMU3": sensors.scaled_imu,
 }
 
 

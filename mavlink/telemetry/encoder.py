@@ -1,16 +1,16 @@
 """Conversion of numbers to message fields, and quantities common to several messages."""
 
 from collections.abc import Callable, Sequence
-from math import degrees, hypot, isfinite, pi
+from math import degrees, isfinite, pi
 from typing import Any, TypeAlias
 
-from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.earth.geodesy import Geodetic
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.snapshot import HomePosition, TelemetrySnapshot
-from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
+from colibri.mavlink.wire.dialect import definition_of
+from colibri.mavlink.wire.ned import frd_from_flu
 
 Encoder: TypeAlias = Callable[[TelemetrySnapshot], Fields | list[Fields] | None]
 """Returns a message's fields, a list for several messages, or `None` if there is nothing to send."""
@@ -26,7 +26,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 def fitted(name: str, encoder: Encoder) -> Encoder:
     """Return `encoder` with numbers clamped to the fields' types; messages with invalid ones are omitted."""
-    kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
+    kinds = definition_of(name).fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
 
     def fit(fields: Fields) -> Fields:
@@ -73,34 +73,13 @@ for _bits in (8, 16, 32, 64):
     _CONVERTERS[f"int{_bits}_t"] = _integer(-(2 ** (_bits - 1)), 2 ** (_bits - 1) - 1)
 
 
-def boot_ms(s: TelemetrySnapshot) -> int:
-    return s.time_us // 1000 % 2**32
-
-
-def place_of(s: TelemetrySnapshot) -> Geodetic:
-    return geodetic_of(s.position_enu_m, s.origin)
-
-
 def degrees_e7(place: Geodetic) -> tuple[float, float]:
     return (place.latitude_deg * 1e7, place.longitude_deg * 1e7)
-
-
-def velocity_ned_cm_s(s: TelemetrySnapshot) -> Vector:
-    return times(100.0, ned_from_enu(s.velocity_enu_m_s))
-
-
-def rate_frd(s: TelemetrySnapshot) -> Vector:
-    return frd_from_flu(s.rate_flu_rad_s)
 
 
 def in_body_frd(q: Quaternion, vector_enu: Vector) -> Vector:
     w, x, y, z = q
     return frd_from_flu(earth_from_body((w, -x, -y, -z), vector_enu))
-
-
-def height_above_home_m(s: TelemetrySnapshot) -> float:
-    home: HomePosition | None = s.home
-    return s.position_enu_m[2] - (home.position_enu_m[2] if home else 0.0)
 
 
 def yaw_ned(yaw_enu_rad: float) -> float:
@@ -112,11 +91,6 @@ def yaw_ned(yaw_enu_rad: float) -> float:
 def compass_cdeg(angle_rad: float) -> int:
     """Return the compass direction, centidegrees, of an angle counter-clockwise from east."""
     return round(100.0 * degrees(pi / 2 - angle_rad)) % FULL_TURN_CDEG
-
-
-def airspeed_m_s(s: TelemetrySnapshot) -> float:
-    wind = s.wind_enu_m_s if all(map(isfinite, s.wind_enu_m_s)) else (0.0, 0.0, 0.0)
-    return hypot(*minus(s.velocity_enu_m_s, wind))
 
 
 def times(factor: float, vector: Sequence[float]) -> Vector:

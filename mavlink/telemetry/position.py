@@ -6,17 +6,7 @@ from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.kernels import atan2, cos, sin
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import (
-    UNKNOWN_U16,
-    airspeed_m_s,
-    boot_ms,
-    compass_cdeg,
-    degrees_e7,
-    height_above_home_m,
-    place_of,
-    velocity_ned_cm_s,
-    yaw_ned,
-)
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, compass_cdeg, degrees_e7, yaw_ned
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_from_enu
@@ -29,14 +19,14 @@ PERCENT = 100
 
 def global_position_int(s: TelemetrySnapshot) -> Fields:
     """GLOBAL_POSITION_INT (33): degE7, mm, cm/s NED, centidegrees."""
-    place = place_of(s)
-    altitudes_mm = (1e3 * place.altitude_m, 1e3 * height_above_home_m(s))
-    return (boot_ms(s), *degrees_e7(place), *altitudes_mm, *velocity_ned_cm_s(s), heading_cdeg(s))
+    place = s.place
+    altitudes_mm = (1e3 * place.altitude_m, 1e3 * s.height_above_home_m)
+    return (s.boot_ms, *degrees_e7(place), *altitudes_mm, *s.velocity_ned_cm_s, heading_cdeg(s))
 
 
 def local_position_ned(s: TelemetrySnapshot) -> Fields:
     """LOCAL_POSITION_NED (32): m and m/s."""
-    return (boot_ms(s), *ned_from_enu(s.position_enu_m), *ned_from_enu(s.velocity_enu_m_s))
+    return (s.boot_ms, *ned_from_enu(s.position_enu_m), *ned_from_enu(s.velocity_enu_m_s))
 
 
 def home_position(s: TelemetrySnapshot) -> Fields | None:
@@ -63,7 +53,7 @@ def gps_raw_int(s: TelemetrySnapshot) -> Fields:
     if s.fix is not None:
         place, (east, north, _), kind, seen = s.fix.place, s.fix.velocity_enu_m_s, s.fix.fix_type, s.fix.satellites
     else:
-        place, (east, north, _), kind, seen = place_of(s), s.velocity_enu_m_s, mav.GPS_FIX_TYPE_3D_FIX, SATELLITES
+        place, (east, north, _), kind, seen = s.place, s.velocity_enu_m_s, mav.GPS_FIX_TYPE_3D_FIX, SATELLITES
     speed = hypot(east, north)
     course = compass_cdeg(atan2(north, east)) if speed > 0.1 else UNKNOWN_U16
     fix = (kind, *degrees_e7(place), 1e3 * place.altitude_m, DILUTION_E2, DILUTION_E2)
@@ -76,7 +66,7 @@ def altitude(s: TelemetrySnapshot) -> Fields:
     above_sea, above_ground = above_origin + s.origin.altitude_m, above_origin - s.ground_m
     clearance = max(0.0, above_ground) if isfinite(above_ground) else -1.0
     terrain = above_ground if isfinite(above_ground) else -1001.0  # below -1000 is unknown
-    return (s.time_us, above_sea, above_sea, above_origin, height_above_home_m(s), terrain, clearance)
+    return (s.time_us, above_sea, above_sea, above_origin, s.height_above_home_m, terrain, clearance)
 
 
 def vfr_hud(s: TelemetrySnapshot) -> Fields:
@@ -85,14 +75,14 @@ def vfr_hud(s: TelemetrySnapshot) -> Fields:
     throttle = PERCENT * sum(s.controls) / len(s.controls)
     altitude_m = s.position_enu_m[2] + s.origin.altitude_m
     _, _, yaw = euler_from_quaternion(s.attitude)
-    return (airspeed_m_s(s), hypot(east, north), compass_cdeg(yaw) / 100, throttle, altitude_m, up)
+    return (s.airspeed_m_s, hypot(east, north), compass_cdeg(yaw) / 100, throttle, altitude_m, up)
 
 
 def distance_sensor(s: TelemetrySnapshot) -> Fields:
     """DISTANCE_SENSOR (132): height above ground, cm, of a downward sensor."""
     height_cm = max(0.0, 100.0 * (s.position_enu_m[2] - s.ground_m))
     sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, 0)
-    return (boot_ms(s), *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
+    return (s.boot_ms, *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
 
 
 def wind_cov(s: TelemetrySnapshot) -> Fields | None:

@@ -74,12 +74,11 @@ def actuator_control_target(s: TelemetrySnapshot) -> Fields:
 
 def rc_channels(s: TelemetrySnapshot) -> Fields:
     """RC_CHANNELS (65): MANUAL_CONTROL as roll, pitch, throttle and yaw, 1000 to 2000 µs."""
-    from_boot_ms = s.time_us // 1000 % 2**32
     if s.sticks is None:
-        return (from_boot_ms, 0, *(UNKNOWN_U16,) * 18, UNKNOWN_U8)
+        return (s.boot_ms, 0, *(UNKNOWN_U16,) * 18, UNKNOWN_U8)
     pitch, roll, thrust, yaw = s.sticks
     sticks = (_stick_us(roll), _stick_us(pitch), LOW_US + SPAN_US * thrust, _stick_us(yaw))
-    return (from_boot_ms, len(sticks), *sticks, *(UNKNOWN_U16,) * 14, UNKNOWN_U8)
+    return (s.boot_ms, len(sticks), *sticks, *(UNKNOWN_U16,) * 14, UNKNOWN_U8)
 
 
 def _all(rotors: int) -> int:

@@ -4,7 +4,7 @@ from colibri.common.earth.atmosphere import pressure_pa, temperature_c
 from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import MILLI_G, boot_ms, in_body_frd, times
+from colibri.mavlink.telemetry.encoder import MILLI_G, in_body_frd, times
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import bits
 from colibri.mavlink.wire.ned import frd_from_flu
@@ -32,7 +32,7 @@ def highres_imu(s: TelemetrySnapshot) -> Fields:
 def scaled_imu(s: TelemetrySnapshot) -> Fields:
     """SCALED_IMU (26): mG, mrad/s, mgauss, centidegrees Celsius."""
     m = _measured(s)
-    return (boot_ms(s), *_thousandths(m), _temperature_cdeg(m))
+    return (s.boot_ms, *_thousandths(m), _temperature_cdeg(m))
 
 
 def raw_imu(s: TelemetrySnapshot) -> Fields:
@@ -44,7 +44,7 @@ def raw_imu(s: TelemetrySnapshot) -> Fields:
 def scaled_pressure(s: TelemetrySnapshot) -> Fields:
     """SCALED_PRESSURE (29): hPa, centidegrees Celsius."""
     m = _measured(s)
-    return (boot_ms(s), m.pressure_pa / 100.0, 0.0, _temperature_cdeg(m), 0)
+    return (s.boot_ms, m.pressure_pa / 100.0, 0.0, _temperature_cdeg(m), 0)
 
 
 def vibration(s: TelemetrySnapshot) -> Fields:
@@ -52,11 +52,15 @@ def vibration(s: TelemetrySnapshot) -> Fields:
     return (s.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
+def specific_force_frd(s: TelemetrySnapshot) -> Vector:
+    east, north, up = s.acceleration_enu_m_s2
+    return in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2))
+
+
 def _measured(s: TelemetrySnapshot) -> SensorFrame:
     if s.sensed is not None:
         return s.sensed
-    east, north, up = s.acceleration_enu_m_s2
-    force = frd_from_flu(in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2)))
+    force = frd_from_flu(specific_force_frd(s))
     north, east, down = EARTH_FIELD_NED_GAUSS
     field = frd_from_flu(in_body_frd(s.attitude, (east, north, -down)))
     altitude_m = _altitude_amsl_m(s)

@@ -1,13 +1,14 @@
 """The vehicle's state for telemetry at one instant, in SI, ENU and FLU."""
 
 from collections.abc import Mapping
-from math import nan
+from math import hypot, isfinite, nan
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from colibri.common.types import PerRotor, Quaternion, Vector
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
+from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 NOWHERE: Vector = (nan, nan, nan)
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -133,3 +134,29 @@ class TelemetrySnapshot(NamedTuple):
     fix: GpsFix | None = None
     latest: Mapping[str, Any] = MappingProxyType({})  # last values of own-message sensors, by field of `SensorFrame`
     estimator: EstimatorState | None = None  # None under state feedback
+
+    @property
+    def boot_ms(self) -> int:
+        return self.time_us // 1000 % 2**32
+
+    @property
+    def place(self) -> Geodetic:
+        return geodetic_of(self.position_enu_m, self.origin)
+
+    @property
+    def height_above_home_m(self) -> float:
+        return self.position_enu_m[2] - (self.home.position_enu_m[2] if self.home else 0.0)
+
+    @property
+    def velocity_ned_cm_s(self) -> Vector:
+        north, east, down = ned_from_enu(self.velocity_enu_m_s)
+        return (100.0 * north, 100.0 * east, 100.0 * down)
+
+    @property
+    def rate_frd(self) -> Vector:
+        return frd_from_flu(self.rate_flu_rad_s)
+
+    @property
+    def airspeed_m_s(self) -> float:
+        wind = self.wind_enu_m_s if all(map(isfinite, self.wind_enu_m_s)) else (0.0, 0.0, 0.0)
+        return hypot(*(own - air for own, air in zip(self.velocity_enu_m_s, wind, strict=True)))

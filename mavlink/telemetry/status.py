@@ -3,7 +3,7 @@
 from math import isfinite
 
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16
 from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import bits, mav
 
@@ -58,25 +58,19 @@ def current_mode(s: TelemetrySnapshot) -> Fields:
 
 def system_time(s: TelemetrySnapshot, boot_unix_us: int = 0) -> Fields:
     """SYSTEM_TIME (2): Unix time µs, 0 if unknown; ms since the start."""
-    return (boot_unix_us + s.time_us if boot_unix_us else 0, boot_ms(s))
+    return (boot_unix_us + s.time_us if boot_unix_us else 0, s.boot_ms)
 
 
 def flight_information(s: TelemetrySnapshot) -> Fields:
     """FLIGHT_INFORMATION (264): times since the start, µs (despite their names) and ms; flight number."""
-    return (boot_ms(s), s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
+    return (s.boot_ms, s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
 
 
 def estimator_status(s: TelemetrySnapshot) -> Fields:
     """ESTIMATOR_STATUS (230). Under state feedback all flags are set and test ratios 0."""
     if s.estimator is not None:
         e = s.estimator
-        return (
-            s.time_us,
-            e.flags,
-            *e.ratios,
-            e.horizontal_accuracy_m,
-            e.vertical_accuracy_m,
-        )
+        return (s.time_us, e.flags, *e.ratios, e.horizontal_accuracy_m, e.vertical_accuracy_m)
     finite = all(map(isfinite, (*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude)))
     return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
 
