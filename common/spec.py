@@ -221,20 +221,14 @@ def from_namespace(spec: type[S], args: Namespace, **others: Any) -> S:
 
 
 def from_values(
-    spec: type[S],
-    values: Mapping[str, Any],
-    error: type[Error] = SpecError,
-    only: Collection[str] | None = None,
+    spec: type[S], values: Mapping[str, Any], error: type[Error] = SpecError, only: Collection[str] | None = None
 ) -> S:
     """Return the specification of Python values or texts; raise `error` on an unknown or invalid option."""
     return spec(**read_values(spec, values, error, only))
 
 
 def read_values(
-    spec: type,
-    values: Mapping[str, Any],
-    error: type[Error] = SpecError,
-    only: Collection[str] | None = None,
+    spec: type, values: Mapping[str, Any], error: type[Error] = SpecError, only: Collection[str] | None = None
 ) -> dict[str, Any]:
     known = fields_of(spec)
     for name in values:

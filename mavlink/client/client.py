@@ -26,14 +26,7 @@ from collections.abc import Hashable
 from typing import NamedTuple, TypeAlias, TypeVar
 
 from colibri.mavlink.client.conversation import Conversation
-from colibri.mavlink.wire.dialect import (
-    AUTOPILOT_COMPONENT,
-    AUTOPILOT_INVALID,
-    STATE_ACTIVE,
-    Codec,
-    Message,
-    mav,
-)
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, AUTOPILOT_INVALID, STATE_ACTIVE, Codec, Message, mav
 from colibri.mavlink.wire.signing import Signing
 
 HEARTBEAT_EVERY_US = 1_000_000

@@ -8,9 +8,7 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
 
 _OLDER_FROM = 128  # a sequence number this far ahead, of 256, belongs to an older, delayed message
-_AIRBORNE = frozenset(
-    {mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING},
-)
+_AIRBORNE = frozenset({mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING})
 _ESTIMATES = bits("ESTIMATOR_", "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT")
 _PLACES = bits("ESTIMATOR_", "POS_HORIZ_REL POS_HORIZ_ABS")
 _HEIGHTS = bits("ESTIMATOR_", "POS_VERT_ABS POS_VERT_AGL")

@@ -44,12 +44,7 @@ def position_target(
 
 
 def attitude_target(
-    target: Target,
-    attitude: Quaternion | None = None,
-    rates: Vector | None = None,
-    *,
-    thrust: float,
-    time_us: int = 0,
+    target: Target, attitude: Quaternion | None = None, rates: Vector | None = None, *, thrust: float, time_us: int = 0
 ) -> Encoded:
     """Return an attitude (FLU to ENU) or body rates (FLU, rad/s) with a thrust of 0..1; missing ones are masked."""
     mask = _NO_ATTITUDE * (attitude is None) | _NO_RATES * (rates is None)

@@ -17,12 +17,7 @@ from colibri.mavlink.hil.lockstep import (
 )
 from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_delay, decode_result
 from colibri.mavlink.hil.sensors import Frame, decode_sensors, read_sensors
-from colibri.mavlink.hil.state import (
-    ActuatorCommand,
-    decode_state,
-    encode_actuators,
-    read_state,
-)
+from colibri.mavlink.hil.state import ActuatorCommand, decode_state, encode_actuators, read_state
 from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message

@@ -39,13 +39,7 @@ class RadioSettings(Protocol):
 class Radio(Manual):
     """Keeps the channels of one radio; `fails` is SIM_RC_FAIL."""
 
-    def __init__(
-        self,
-        system_id: int,
-        text: StatusText,
-        transmitter: tuple[int, ...],
-        settings: RadioSettings,
-    ) -> None:
+    def __init__(self, system_id: int, text: StatusText, transmitter: tuple[int, ...], settings: RadioSettings) -> None:
         """`transmitter` has the channels without overrides; `settings` are parameters by name."""
         super().__init__(system_id, text)
         self._transmitter, self._settings = transmitter, settings

@@ -8,8 +8,7 @@ from colibri.mavlink.telemetry.snapshot import TelemetrySnapshot
 from colibri.mavlink.wire.dialect import bits, mav
 
 SENSORS = bits(
-    "MAV_SYS_STATUS_",
-    "SENSOR_3D_GYRO SENSOR_3D_ACCEL SENSOR_3D_MAG SENSOR_ABSOLUTE_PRESSURE SENSOR_GPS AHRS LOGGING",
+    "MAV_SYS_STATUS_", "SENSOR_3D_GYRO SENSOR_3D_ACCEL SENSOR_3D_MAG SENSOR_ABSOLUTE_PRESSURE SENSOR_GPS AHRS LOGGING"
 )
 CONTROLS = bits(
     "MAV_SYS_STATUS_SENSOR_",

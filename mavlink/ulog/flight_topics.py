@@ -120,10 +120,7 @@ DECISION = Topic(
         Columns("cost", "", "cost of the plan"),
         Columns("slack", "parts", "largest planned excess of a soft limit, relative"),
         Columns(
-            "active_rotors active_increments active_angles active_rates",
-            "",
-            "active constraints by kind",
-            "uint16_t",
+            "active_rotors active_increments active_angles active_rates", "", "active constraints by kind", "uint16_t"
         ),
         Columns("delay_us", "µs", "compensated delay from frame to effect of its command", "float"),
         Columns("mass_kg", "kg", "mass estimated by the control law, or `nan`"),
@@ -167,11 +164,7 @@ FILTER = Topic(
             "",
             "sum of normalised innovations squared since the start, by measurement",
         ),
-        Columns(
-            " ".join(f"believed_{kind}" for kind in MEASURED),
-            "",
-            "accepted measurements since the start",
-        ),
+        Columns(" ".join(f"believed_{kind}" for kind in MEASURED), "", "accepted measurements since the start"),
     ),
 )
 COMMAND = Topic(

@@ -21,9 +21,7 @@ def frd_from_flu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Nu
     return (x, -y, -z)
 
 
-def ned_frd_from_enu_flu(
-    q: tuple[_Number, _Number, _Number, _Number],
-) -> tuple[_Number, _Number, _Number, _Number]:
+def ned_frd_from_enu_flu(q: tuple[_Number, _Number, _Number, _Number]) -> tuple[_Number, _Number, _Number, _Number]:
     """Convert an attitude from ENU/FLU to NED/FRD, or back: pitch changes its sign, yaw becomes pi/2 - yaw."""
     w, x, y, z = q
     return (_HALF_SQRT2 * (w + z), _HALF_SQRT2 * (x + y), _HALF_SQRT2 * (x - y), _HALF_SQRT2 * (w - z))
