@@ -76,63 +76,40 @@ def _scalar(name: str, unit: str, minimum: float, maximum: float, usual: float) 
     return Value(name, unit, minimum, maximum, usual, usual)
 
 
-def _vector(name: str, unit: str, axes: str, maximum: float, usual: tuple[float, float, float]) -> tuple[Value, ...]:
-    return tuple(
-        Value(f"{name} {axis}", unit, -maximum, maximum, it, 0.0) for axis, it in zip(axes, usual, strict=True)
-    )
+def _errors(name: str, unit: str, maximum: float, usual: float, axis: str) -> tuple[Value, ...]:
+    if not axis:
+        return (Value(name, unit, -maximum, maximum, usual, usual),)
+    return tuple(Value(f"{name} {each}", unit, -maximum, maximum, usual * (each == axis), 0.0) for each in "xyz")
 
 
-def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value) -> tuple[FaultRow, ...]:
-    late = _scalar("late by", "s", 0.001, 10.0, 0.2)
+def _sensor(
+    unit: int,
+    wrong: tuple[str, str, float, float],
+    drift: tuple[str, float, float],
+    noise: tuple[float, float, float],
+    axis: str = "",
+) -> tuple[FaultRow, ...]:
+    """Return a sensor's faults: name, unit, limit and usual value of its errors along an axis, limits of its noise."""
+    deviation, late = _scalar("standard deviation", wrong[1], *noise), _scalar("late by", "s", 0.001, 10.0, 0.2)
     part = Equipment.SENSORS
     return (
         FaultRow(unit, OK, part, "normal again"),
         FaultRow(unit, OFF, part, "no new measurements"),
         FaultRow(unit, STUCK, part, "repeats its last value as new"),
-        FaultRow(unit, GARBAGE, part, "adds white Gaussian noise", (noise,)),
-        FaultRow(unit, WRONG, part, "adds a constant error", wrong),
-        FaultRow(unit, SLOW, part, "adds an error that grows from zero", drift),
+        FaultRow(unit, GARBAGE, part, "adds white Gaussian noise", (deviation,)),
+        FaultRow(unit, WRONG, part, "adds a constant error", _errors(*wrong, axis)),
+        FaultRow(unit, SLOW, part, "adds an error that grows from zero", _errors("drift", *drift, axis)),
         FaultRow(unit, DELAYED, part, "delays measurements", (late,)),
     )
 
 
 ROWS: tuple[FaultRow, ...] = (
-    *_sensor(
-        GYROSCOPE,
-        _vector("bias", "rad/s", "xyz", 20.0, (0.1, 0.0, 0.0)),
-        _vector("drift", "rad/s²", "xyz", 1.0, (0.01, 0.0, 0.0)),
-        _scalar("standard deviation", "rad/s", 1e-4, 20.0, 0.5),
-    ),
-    *_sensor(
-        ACCELEROMETER,
-        _vector("bias", "m/s²", "xyz", 100.0, (0.0, 0.0, 2.0)),
-        _vector("drift", "m/s³", "xyz", 10.0, (0.0, 0.0, 0.1)),
-        _scalar("standard deviation", "m/s²", 1e-3, 100.0, 5.0),
-    ),
-    *_sensor(
-        MAGNETOMETER,
-        _vector("bias", "gauss", "xyz", 10.0, (0.2, 0.0, 0.0)),
-        _vector("drift", "gauss/s", "xyz", 1.0, (0.01, 0.0, 0.0)),
-        _scalar("standard deviation", "gauss", 1e-4, 10.0, 0.3),
-    ),
-    *_sensor(
-        BAROMETER,
-        (_scalar("bias", "Pa", -20000.0, 20000.0, 100.0),),
-        (_scalar("drift", "Pa/s", -1000.0, 1000.0, 5.0),),
-        _scalar("standard deviation", "Pa", 0.1, 20000.0, 200.0),
-    ),
-    *_sensor(
-        GPS,
-        _vector("jump", "m", "xyz", 10000.0, (10.0, 0.0, 0.0)),
-        _vector("drift", "m/s", "xyz", 100.0, (0.5, 0.0, 0.0)),
-        _scalar("standard deviation", "m", 0.01, 1000.0, 10.0),
-    ),
-    *_sensor(
-        RANGEFINDER,
-        (_scalar("bias", "m", -100.0, 100.0, 1.0),),
-        (_scalar("drift", "m/s", -10.0, 10.0, 0.05),),
-        _scalar("standard deviation", "m", 0.001, 100.0, 0.5),
-    ),
+    *_sensor(GYROSCOPE, ("bias", "rad/s", 20.0, 0.1), ("rad/s²", 1.0, 0.01), (1e-4, 20.0, 0.5), "x"),
+    *_sensor(ACCELEROMETER, ("bias", "m/s²", 100.0, 2.0), ("m/s³", 10.0, 0.1), (1e-3, 100.0, 5.0), "z"),
+    *_sensor(MAGNETOMETER, ("bias", "gauss", 10.0, 0.2), ("gauss/s", 1.0, 0.01), (1e-4, 10.0, 0.3), "x"),
+    *_sensor(BAROMETER, ("bias", "Pa", 20000.0, 100.0), ("Pa/s", 1000.0, 5.0), (0.1, 20000.0, 200.0)),
+    *_sensor(GPS, ("jump", "m", 10000.0, 10.0), ("m/s", 100.0, 0.5), (0.01, 1000.0, 10.0), "x"),
+    *_sensor(RANGEFINDER, ("bias", "m", 100.0, 1.0), ("m/s", 10.0, 0.05), (0.001, 100.0, 0.5)),
     FaultRow(BATTERY, OK, Equipment.BATTERY, "normal again, with the charge that the fault removed"),
     FaultRow(BATTERY, OFF, Equipment.BATTERY, "empty: voltage at zero charge"),
     FaultRow(
