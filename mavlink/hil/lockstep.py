@@ -17,6 +17,7 @@ A free-running plant (`FREE_RUNNING` in its HEARTBEAT) sends each frame once and
 continues from the newest frame. In lockstep a new flight begins at time 0 only.
 """
 
+from collections import Counter
 from collections.abc import Callable
 
 from colibri.common.types import Address
@@ -34,8 +35,7 @@ CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 BATTERY_EVERY_US = 500_000
 FREE_RUNNING = 1  # HEARTBEAT.custom_mode of a free-running plant
-MIN_FRAME_INTERVAL_US = 1_000
-MAX_FRAME_INTERVAL_US = 1_000_000
+FRAME_INTERVALS_US = range(1_000, 1_000_001, 1_000)
 
 ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: dialect.MSG_HIL_SENSOR}
 """The message for which an autopilot sets the interval."""
@@ -58,3 +58,32 @@ def is_another(
     if peer is None or sender == peer or silence_s >= PEER_GIVEN_UP_AFTER_S:
         return False
     return silence_s < PEER_LOST_AFTER_S or is_there(peer)
+
+
+class AnsweringEnd:
+    """What the autopilot's ends of all protocols share: it remembers the last answer."""
+
+    def __init__(self, system_id: int, received_s: float, call_at_s: float) -> None:
+        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        self.refused: int | None = None  # MAV_RESULT of the requested frames
+        self.repeated = 0  # frames
+        self.dropped: Counter[str] = self._codec.dropped
+        self._time_us: int | None = None
+        self._answer: bytes | None = None
+        self._received_s, self._call_at_s = received_s, call_at_s
+        self._outbox: list[bytes] = []
+
+    def silence_s(self, now_s: float) -> float:
+        return now_s - self._received_s
+
+    def take_outbox(self) -> list[bytes]:
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _answer_again(self) -> None:
+        self.repeated += 1
+        if self._answer is not None:
+            self._outbox.append(self._answer)
+
+    def _heartbeat(self, armed: bool) -> bytes:
+        return encode_heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, armed)

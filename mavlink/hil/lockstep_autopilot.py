@@ -1,55 +1,36 @@
 """The autopilot's end of the lockstep protocol."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 
+from colibri.mavlink.hil import lockstep
 from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
 from colibri.mavlink.hil.faults import Fault, encode_fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import (
-    ASKED_BY,
-    CALL_AFTER_S,
-    CALL_EVERY_S,
-    FREE_RUNNING,
-    HEARTBEAT_EVERY_US,
-    MADE_OF,
-    encode_heartbeat,
-)
+from colibri.mavlink.hil.lockstep import CALL_AFTER_S, FREE_RUNNING, AnsweringEnd
 from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_delay, decode_result
 from colibri.mavlink.hil.sensors import Frame, decode_sensors, read_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, decode_state, encode_actuators, read_state
 from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire import dialect
-from colibri.mavlink.wire.dialect import Codec, Message
+from colibri.mavlink.wire.dialect import Message
 
 _READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
-class AutopilotEnd:
+class AutopilotEnd(AnsweringEnd):
     """The autopilot's end: calls the plant, returns each new frame once, remembers the last answer."""
 
     def __init__(
         self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
     ) -> None:
-        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        super().__init__(system_id, now_s - CALL_AFTER_S, now_s)
         self._plant = (system_id, dialect.PLANT_COMPONENT)
         self._plant_bytes = bytes(self._plant)
         self._frame_interval_us = frame_interval_us
         self._feedback = feedback
-        self._made_of = MADE_OF[feedback]
+        self._made_of = lockstep.MADE_OF[feedback]
         self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._runs_freely: bool | None = None
-        self.refused: int | None = None  # MAV_RESULT of the requested frames
-        self.repeated = 0  # frames
-        self.dropped: Counter[str] = self._codec.dropped
-        self._time_us: int | None = None
-        self._answer: bytes | None = None
-        self._received_s = now_s - CALL_AFTER_S
-        self._call_at_s = now_s
-        self._outbox: list[bytes] = []
-
-    def silence_s(self, now_s: float) -> float:
-        return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Return the datagram's frame if it is the next one to compute."""
@@ -104,7 +85,7 @@ class AutopilotEnd:
         for fault in faults:
             encode = encode_fault if isinstance(fault, Fault) else encode_change
             answer += encode(self._codec, fault, self._plant)  # type: ignore[arg-type]
-        if command.time_us % HEARTBEAT_EVERY_US == 0:
+        if command.time_us % lockstep.HEARTBEAT_EVERY_US == 0:
             answer += self._heartbeat(command.armed)
         self._answer = answer
         self._outbox.append(answer)
@@ -113,13 +94,9 @@ class AutopilotEnd:
         if self.silence_s(now_s) < CALL_AFTER_S:
             return self._received_s + CALL_AFTER_S
         if now_s >= self._call_at_s:
-            self._call_at_s = now_s + CALL_EVERY_S
+            self._call_at_s = now_s + lockstep.CALL_EVERY_S
             self._outbox.append(self._call())
         return self._call_at_s
-
-    def take_outbox(self) -> list[bytes]:
-        outbox, self._outbox = self._outbox, []
-        return outbox
 
     def _decoded(self, parts: dict[str, Message]) -> Frame | None:
         first, *others = (parts.get(name) for name in self._made_of)
@@ -133,9 +110,7 @@ class AutopilotEnd:
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
         if frame.time_us == self._time_us:
             self._received_s = now_s
-            self.repeated += 1
-            if self._answer is not None:
-                self._outbox.append(self._answer)
+            self._answer_again()
             return None
         if self._time_us is not None and not self._follows(frame.time_us, self._time_us):
             lost = self.silence_s(now_s) >= CALL_AFTER_S
@@ -151,16 +126,6 @@ class AutopilotEnd:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
 
     def _call(self) -> bytes:
-        request = self._codec.encode(
-            "COMMAND_LONG",
-            *self._plant,
-            dialect.CMD_SET_MESSAGE_INTERVAL,
-            0,
-            ASKED_BY[self._feedback],
-            self._frame_interval_us,
-            *[0.0] * 5,
-        )
+        asked = (lockstep.ASKED_BY[self._feedback], self._frame_interval_us, *(0.0,) * 5)
+        request = self._codec.encode("COMMAND_LONG", *self._plant, dialect.CMD_SET_MESSAGE_INTERVAL, 0, *asked)
         return request + self._heartbeat(armed=False)
-
-    def _heartbeat(self, armed: bool) -> bytes:
-        return encode_heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, armed)

@@ -5,39 +5,13 @@ from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 from colibri.common.types import Address
+from colibri.mavlink.hil import lockstep, plant_status, state
 from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
 from colibri.mavlink.hil.faults import Fault, decode_fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import (
-    ASKS_FOR,
-    BATTERY_EVERY_US,
-    FREE_RUNNING,
-    HEARTBEAT_EVERY_US,
-    MAX_FRAME_INTERVAL_US,
-    MIN_FRAME_INTERVAL_US,
-    PEER_GIVEN_UP_AFTER_S,
-    RESEND_AFTER_S,
-    encode_heartbeat,
-    is_another,
-)
-from colibri.mavlink.hil.plant_status import (
-    NOTHING,
-    PlantBattery,
-    PlantStatus,
-    encode_battery,
-    encode_delay,
-    encode_results,
-)
+from colibri.mavlink.hil.plant_status import NOTHING, PlantBattery, PlantStatus
 from colibri.mavlink.hil.sensors import Frame, SensorFrame, encode_sensors
-from colibri.mavlink.hil.state import (
-    ROTORS,
-    STATE_MESSAGES,
-    ActuatorCommand,
-    StateFrame,
-    decode_actuators,
-    encode_state,
-    read_actuators,
-)
+from colibri.mavlink.hil.state import ROTORS, ActuatorCommand, StateFrame
 from colibri.mavlink.hil.world_changes import PACE, PAYLOAD, WIND, WorldChange, decode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
@@ -95,38 +69,36 @@ class PlantEnd:
 
     def accepts_another(self, now_s: float) -> bool:
         """Whether the peer is lost, so that another autopilot may take over."""
-        return not is_another(None, self.peer, now_s - self._peer_received_s, self._is_there)
+        return not lockstep.is_another(None, self.peer, now_s - self._peer_received_s, self._is_there)
 
     def sends_battery(self, time_us: int) -> bool:
-        return time_us % BATTERY_EVERY_US == 0
+        return time_us % lockstep.BATTERY_EVERY_US == 0
 
-    def offer(
-        self, frame: Frame, now_s: float, plant_status: PlantStatus = NOTHING, truth: StateFrame | None = None
-    ) -> None:
+    def offer(self, frame: Frame, now_s: float, beside: PlantStatus = NOTHING, truth: StateFrame | None = None) -> None:
         """Send `frame`, status and `truth`, as another component's; await the command."""
         if isinstance(frame, StateFrame):
-            frames = encode_state(self._codec, frame)
+            frames = state.encode_state(self._codec, frame)
         else:
             frames = encode_sensors(self._codec, frame)
-        if frame.time_us % HEARTBEAT_EVERY_US == 0:
+        if frame.time_us % lockstep.HEARTBEAT_EVERY_US == 0:
             frames.append(self._heartbeat())
-        if plant_status.results:
-            frames += encode_results(self._codec, plant_status.results, self._autopilot)
-        if plant_status.battery is not None:
-            self._battery = plant_status.battery
+        if beside.results:
+            frames += plant_status.encode_results(self._codec, beside.results, self._autopilot)
+        if beside.battery is not None:
+            self._battery = beside.battery
             if self.sends_battery(frame.time_us):
-                frames.append(encode_battery(self._codec, plant_status.battery))
-        if plant_status.delay_us is not None:
-            frames.append(encode_delay(self._codec, frame.time_us, plant_status.delay_us))
+                frames.append(plant_status.encode_battery(self._codec, beside.battery))
+        if beside.delay_us is not None:
+            frames.append(plant_status.encode_delay(self._codec, frame.time_us, beside.delay_us))
         if truth is not None:
-            frames += encode_state(self._truth_codec, truth)
+            frames += state.encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)
         self._begun = True
         self._awaited_us = frame.time_us
         self._send_frame(now_s)
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
-        command = read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else None
+        command = state.read_actuators(datagram, self._autopilot_bytes, self._rotors) if sender == self.peer else None
         if command is None:
             return self._receive_any(datagram, sender, now_s)
         self._note(datagram, now_s)
@@ -146,7 +118,7 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender, now_s)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
-                command = self._accept(decode_actuators(message, self._rotors)) or command
+                command = self._accept(state.decode_actuators(message, self._rotors)) or command
             else:
                 self.dropped["unexpected"] += 1
                 continue
@@ -158,7 +130,7 @@ class PlantEnd:
 
     def skip(self) -> None:
         """Count a frame that was not encoded, so that later ones are numbered as if it had been."""
-        self._codec.skip(STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
+        self._codec.skip(state.STATE_MESSAGES if self.feedback is Feedback.STATE else 1)
 
     def encoded(self, frame: SensorFrame) -> bytes:
         """Return the datagram of a frame for records alone."""
@@ -171,7 +143,7 @@ class PlantEnd:
 
     def poll(self, now_s: float) -> float:
         if self._awaited_us is None or not self.waits:
-            return now_s + RESEND_AFTER_S
+            return now_s + lockstep.RESEND_AFTER_S
         if now_s >= self._resend_at_s:
             self.resent += 1
             self._send_frame(now_s)
@@ -182,35 +154,33 @@ class PlantEnd:
         return outbox
 
     def _send_frame(self, now_s: float) -> None:
-        self._resend_at_s = now_s + RESEND_AFTER_S
+        self._resend_at_s = now_s + lockstep.RESEND_AFTER_S
         if self.peer is not None:
             self._outbox.append(PlantDatagram(self._frames, self.peer))
 
     def _receive_heartbeat(self, sender: Address, now_s: float) -> None:
-        if sender == self.peer:
-            return
-        if self._is_another(sender, now_s):
+        if sender == self.peer or self._is_another(sender, now_s):
             return
         self.peer = sender
         if self._awaited_us is not None:
             if self._battery is not None:
-                self._frames += (encode_battery(self._codec, self._battery),)
+                self._frames += (plant_status.encode_battery(self._codec, self._battery),)
             if not self.waits:
                 self._frames += (self._heartbeat(),)
             self._send_frame(now_s)
 
     def _is_another(self, sender: Address, now_s: float) -> bool:
-        if not is_another(sender, self.peer, now_s - self._peer_received_s, self._is_there):
+        if not lockstep.is_another(sender, self.peer, now_s - self._peer_received_s, self._is_there):
             return False
         self.dropped["second autopilot"] += 1
         if now_s >= self._note_at_s:
-            self._note_at_s = now_s + PEER_GIVEN_UP_AFTER_S
+            self._note_at_s = now_s + lockstep.PEER_GIVEN_UP_AFTER_S
             self.notes.append(f"a second autopilot calls from port {sender[1]}: refused, as the first is there")
         return True
 
     def _heartbeat(self) -> bytes:
-        mode = 0 if self.waits else FREE_RUNNING
-        return encode_heartbeat(
+        mode = 0 if self.waits else lockstep.FREE_RUNNING
+        return lockstep.encode_heartbeat(
             self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False, custom_mode=mode
         )
 
@@ -233,15 +203,14 @@ class PlantEnd:
         if self._is_another(sender, now_s):
             return
         result: int = dialect.RESULT_UNSUPPORTED
-        feedback = ASKS_FOR.get(fields.param1) if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL else None
+        feedback = lockstep.ASKS_FOR.get(fields.param1) if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL else None
         if feedback in self._serves:
             result = self._set_frames(feedback, fields.param2)
         ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)
         self._outbox.append(PlantDatagram((ack,), sender))
 
     def _set_frames(self, feedback: Feedback, interval_us: float) -> int:
-        whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0
-        if not whole_ms:
+        if interval_us not in lockstep.FRAME_INTERVALS_US:
             return dialect.RESULT_DENIED
         if self._begun and (feedback, interval_us) != (self.feedback, self.frame_interval_us):
             return dialect.RESULT_TEMPORARILY_REJECTED

@@ -7,19 +7,16 @@ Quirks of jMAVSim: its HIL_GPS follows the HIL_SENSOR of the same time and belon
 `fields_updated` empty, which counts as all new.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from colibri.common.types import PerRotor
 from colibri.mavlink.hil.faults import Fault
-from colibri.mavlink.hil.lockstep import encode_heartbeat
+from colibri.mavlink.hil.lockstep import AnsweringEnd
 from colibri.mavlink.hil.plant_status import ReceivedFrame
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
 from colibri.mavlink.hil.world_changes import WorldChange
-from colibri.mavlink.wire import dialect
-from colibri.mavlink.wire.dialect import Codec
 
 CALL_EVERY_S = 0.5  # wall-clock interval of HEARTBEAT
 ANSWER_AGAIN_AFTER_S = 1.0
@@ -28,26 +25,16 @@ ANSWER_AGAIN_AFTER_S = 1.0
 _EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER | Updated.BAROMETER
 
 
-class FlierEnd:
+class FlierEnd(AnsweringEnd):
     """The autopilot's end: returns each new frame once, remembers the last answer."""
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[PerRotor], PerRotor]) -> None:
-        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        super().__init__(system_id, now_s - ANSWER_AGAIN_AFTER_S, now_s)
         self._to_motors = to_motors
-        self.refused: int | None = None  # always None
-        self.repeated = 0  # frames
-        self.dropped: Counter[str] = self._codec.dropped
         self._zero_us: int | None = None
-        self._time_us: int | None = None
         self._fix: GpsFix | None = None
-        self._answer: bytes | None = None
         self._armed = False
-        self._received_s = now_s - ANSWER_AGAIN_AFTER_S
-        self._call_at_s = self._again_at_s = now_s
-        self._outbox: list[bytes] = []
-
-    def silence_s(self, now_s: float) -> float:
-        return now_s - self._received_s
+        self._again_at_s = now_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         frame = None
@@ -72,7 +59,7 @@ class FlierEnd:
     def poll(self, now_s: float) -> float:
         if now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
-            self._outbox.append(self._heartbeat())
+            self._outbox.append(self._heartbeat(self._armed))
         if self._answer is None:
             return self._call_at_s
         if now_s >= self._again_at_s:
@@ -80,28 +67,15 @@ class FlierEnd:
             self._outbox.append(self._answer)
         return min(self._call_at_s, self._again_at_s)
 
-    def take_outbox(self) -> list[bytes]:
-        outbox, self._outbox = self._outbox, []
-        return outbox
-
     def _next(self, frame: SensorFrame, now_s: float) -> SensorFrame | None:
         self._received_s, self._again_at_s = now_s, now_s + ANSWER_AGAIN_AFTER_S
         if frame.time_us == self._time_us:
-            self.repeated += 1
-            if self._answer is not None:
-                self._outbox.append(self._answer)
+            self._answer_again()
             return None
         if self._zero_us is None or (self._time_us is not None and frame.time_us < self._time_us):
             self._zero_us, self._fix = frame.time_us, None
         self._time_us, self._answer = frame.time_us, None
         time_us = frame.time_us - self._zero_us
         fix, self._fix = self._fix, None
-        groups = frame.updated & _EVERYTHING
-        return frame._replace(
-            time_us=time_us,
-            updated=groups or int(_EVERYTHING),
-            gps=None if fix is None else replace(fix, time_us=time_us),
-        )
-
-    def _heartbeat(self) -> bytes:
-        return encode_heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, self._armed)
+        gps = None if fix is None else replace(fix, time_us=time_us)
+        return frame._replace(time_us=time_us, updated=frame.updated & _EVERYTHING or _EVERYTHING, gps=gps)
