@@ -4,7 +4,7 @@ Projection and radius are PX4's and its ground stations'. Altitude is not projec
 """
 
 from collections.abc import Callable
-from math import degrees, hypot, isfinite, radians
+from math import degrees, hypot, radians
 from typing import NamedTuple
 
 from colibri.common.elementary import acos, asin, atan2, cos, sin
@@ -27,12 +27,7 @@ DEFAULT_ORIGIN = Geodetic(47.397742, 8.545594, 488.0)  # Zurich, Irchel: the usu
 
 
 def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
-    return (
-        isfinite(latitude_deg)
-        and isfinite(longitude_deg)
-        and abs(latitude_deg) <= MAX_LATITUDE_DEG
-        and abs(longitude_deg) <= MAX_LONGITUDE_DEG
-    )
+    return abs(latitude_deg) <= MAX_LATITUDE_DEG and abs(longitude_deg) <= MAX_LONGITUDE_DEG
 
 
 def offset_m(

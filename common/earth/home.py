@@ -1,7 +1,6 @@
 """Home of a vehicle: LAT,LON,ALT,YAW of the command line."""
 
 from argparse import ArgumentTypeError
-from math import isfinite
 from typing import NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, is_on_earth
@@ -40,10 +39,6 @@ def home(text: str) -> HomePlace:
         raise ArgumentTypeError(f"expected LAT,LON,ALT,YAW in degrees and metres, not {text}") from None
     if not is_on_earth(place.latitude_deg, place.longitude_deg):
         raise ArgumentTypeError(f"not a latitude of -90 to 90 and a longitude of -180 to 180: {text}")
-    if (
-        not _MIN_HEIGHT_M <= place.altitude_m <= _MAX_HEIGHT_M
-        or not isfinite(place.yaw_deg)
-        or abs(place.yaw_deg) > 360.0
-    ):
+    if not (_MIN_HEIGHT_M <= place.altitude_m <= _MAX_HEIGHT_M and abs(place.yaw_deg) <= 360.0):
         raise ArgumentTypeError(f"not an altitude of -500 to 10000 m and a yaw of -360 to 360 degrees: {text}")
     return place

@@ -26,6 +26,7 @@ from collections.abc import Hashable
 from typing import NamedTuple, TypeAlias, TypeVar
 
 from colibri.mavlink.client.conversation import Conversation
+from colibri.mavlink.node.router import target_of
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, AUTOPILOT_INVALID, STATE_ACTIVE, Codec, Message, mav
 from colibri.mavlink.wire.signing import Signing
 
@@ -133,8 +134,7 @@ class Client:
                     continue
             if is_autopilot and message.name in ("HEARTBEAT", "AUTOPILOT_VERSION"):
                 self._identify(message, now_us)
-            if self._lanes:
-                self._converse(message, now_us)
+            self._converse(message, now_us)
             messages.append(message)
         return messages
 
@@ -152,8 +152,6 @@ class Client:
         return datagrams
 
     def poll_requests(self, now_us: int) -> list[bytes]:
-        if not self._lanes:
-            return []
         datagrams = []
         for conversation in [lane[0] for lane in self._lanes.values()]:
             datagrams += [self._codec.encode(name, *fields) for name, fields in conversation.poll(now_us)]
@@ -182,19 +180,14 @@ class Client:
 
     def _converse(self, message: Message, now_us: int) -> None:
         for conversation in [lane[0] for lane in self._lanes.values()]:
-            if (
-                message.name in conversation.answers
-                and message.source == conversation.target
-                and self._is_addressed(message)
-            ):
+            answers = message.name in conversation.answers and message.source == conversation.target
+            if answers and self._is_addressed(message):
                 conversation.receive(message, now_us)
                 self._retire(conversation)
 
     def _is_addressed(self, message: Message) -> bool:
-        system, component = self.source
-        to_system = getattr(message.fields, "target_system", 0)
-        to_component = getattr(message.fields, "target_component", 0)
-        return to_system in (0, system) and to_component in (0, component)
+        target = target_of(message.fields)
+        return all(wanted in (0, own) for wanted, own in zip(target, self.source, strict=True))
 
     def _retire(self, conversation: Conversation) -> None:
         if conversation.result is not None:

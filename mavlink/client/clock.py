@@ -40,13 +40,9 @@ class VehicleClock:
         self._outliers: list[Exchange] = []
         self._best: Exchange | None = None
         self._drift = 0.0
-        self._known = False
+        self.known = False
         self.answered_us: int | None = None
         self._answers: deque[tuple[int, int]] = deque(maxlen=_RATED)
-
-    @property
-    def known(self) -> bool:
-        return self._known
 
     @property
     def round_trip_us(self) -> int:
@@ -93,7 +89,7 @@ class VehicleClock:
         self._outliers.clear()
         while self._exchanges[0].received_us < now_us - WINDOW_US:
             self._exchanges.popleft()
-        self._known = self._known or len(self._exchanges) >= ENOUGH
+        self.known = self.known or len(self._exchanges) >= ENOUGH
         self._drift = drift_of(self._exchanges)
         unsure = _DRIFT + _UNEVEN * abs(self._drift)
         self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + unsure * (now_us - it.received_us))

@@ -16,19 +16,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 from zlib import crc32
 
-from colibri.mavlink.files.ftp_wire import (
-    DATA_BYTES,
-    SIZE,
-    FtpError,
-    Key,
-    Nak,
-    Opcode,
-    Request,
-    answer,
-    line_of,
-    path_in,
-    request_of,
-)
+from colibri.mavlink.files.ftp_wire import DATA_BYTES, SIZE, FtpError, Key, Nak, Opcode, Request, line_of
 from colibri.mavlink.files.tree import ENTRY_US, FileRefusal, Files, Names, OpenFile
 from colibri.mavlink.node.budget import Budget
 from colibri.mavlink.node.service import IDLE, Peer, Send
@@ -113,7 +101,7 @@ class Ftp:
         }
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        request = request_of(bytes(message.fields.payload), peer, now_us)
+        request = Request.received(bytes(message.fields.payload), peer, now_us)
         if request.opcode in (Opcode.ACK, Opcode.NAK):  # of another server, and to answer it would begin a quarrel
             return ()
         self._forget(now_us)
@@ -124,7 +112,7 @@ class Ftp:
             return (self._changed(request),)
         elif request.opcode in self._obey:
             outcome = self._obey[request.opcode](request)
-        return () if outcome is None else (answer(request, outcome),)
+        return () if outcome is None else (request.answer(outcome),)
 
     def poll(self, _now_us: int) -> Iterable[Send]:
         if not self._bursts and not self._checksums:
@@ -141,7 +129,7 @@ class Ftp:
             if outcome is None:
                 self._checksums[key] = checksum
             else:
-                sends.append(answer(checksum.request, outcome))
+                sends.append(checksum.request.answer(outcome))
         return sends
 
     def _changed(self, request: Request) -> Send:
@@ -151,7 +139,7 @@ class Ftp:
             return self._remembered[asked][1]
         outcome = self._change[request.opcode](request)
         assert outcome is not None, "changes are made at once"
-        done = answer(request, outcome)
+        done = request.answer(outcome)
         if isinstance(outcome, bytes):
             if len(self._remembered) >= MAX_REMEMBERED:
                 del self._remembered[next(iter(self._remembered))]
@@ -283,14 +271,14 @@ class Ftp:
         data = burst.reading.read(burst.request.offset, wanted)
         if isinstance(data, FileRefusal) or not data:  # removed, or cut, since it was opened
             burst.packets_left = 0
-            yield answer(burst.request, data or Nak(FtpError.END_OF_FILE))
+            yield burst.request.answer(data or Nak(FtpError.END_OF_FILE))
             return
         for start in range(0, len(data), size):
             request, part = burst.request, data[start : start + size]
             end = request.offset + len(part)
             at_end = end >= burst.reading.size or len(part) < size
             burst.packets_left = 0 if at_end else burst.packets_left - 1
-            yield answer(request, part, last=burst.packets_left == 0)
+            yield request.answer(part, last=burst.packets_left == 0)
             burst.request = request._replace(sequence=request.sequence + 1, offset=end)
             if burst.packets_left == 0:
                 return
@@ -312,8 +300,7 @@ class Ftp:
         return self._files.truncate(names, request.offset) or b""
 
     def _rename(self, request: Request, old: Names) -> Outcome:
-        _, _, rest = request.data.partition(b"\0")
-        new = path_in(rest)
+        _, new, *_ = (*request.paths(), ())
         if isinstance(new, FileRefusal):
             return new
         if not new:
@@ -340,7 +327,7 @@ class Ftp:
 def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], Outcome]:
 
     def obey_request(request: Request) -> Outcome:
-        names = path_in(request.data)
+        names = request.paths()[0]
         return names if isinstance(names, FileRefusal) else obey(request, names)
 
     return obey_request

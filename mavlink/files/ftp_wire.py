@@ -66,9 +66,37 @@ class Request(NamedTuple):
     offset: int  # in a file, or among the entries of a folder
     data: bytes
 
+    @classmethod
+    def received(cls, payload: bytes, peer: Peer, now_us: int) -> "Request":
+        payload = payload.ljust(PAYLOAD_BYTES, b"\0")
+        sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
+        return cls(peer, now_us, payload, sequence, session, opcode, size, offset, payload[_HEADER.size :][:size])
+
     @property
     def key(self) -> Key:
         return self.peer, self.session
+
+    def paths(self) -> list[Names | FileRefusal]:
+        return [_path_in(text) for text in self.data.split(b"\0")]
+
+    def answer(self, outcome: "bytes | Nak | FileRefusal", *, last: bool = False) -> Send:
+        opcode, peer = Opcode.ACK, self.peer
+        if isinstance(outcome, FileRefusal):
+            outcome = _NAKS[outcome]
+        if isinstance(outcome, Nak):
+            opcode = Opcode.NAK
+            outcome = bytes(outcome) if outcome.errno else bytes(outcome[:1])
+        sequence = (self.sequence + 1) % 0x10000
+        header = _HEADER.pack(sequence, self.session, opcode, len(outcome), self.opcode, last, self.offset)
+        payload = (header + outcome).ljust(PAYLOAD_BYTES, b"\0")
+        return to(peer, "FILE_TRANSFER_PROTOCOL", 0, peer.system, peer.component, payload)
+
+
+def _path_in(text: bytes) -> Names | FileRefusal:
+    try:
+        return names_of(text.decode())
+    except UnicodeDecodeError:
+        return FileRefusal.NOT_FOUND
 
 
 class Nak(NamedTuple):
@@ -89,34 +117,6 @@ _NAKS = {
     FileRefusal.BAD_NAME: Nak(FtpError.FAIL_ERRNO, EINVAL),
     FileRefusal.FAILED: Nak(FtpError.FAIL_ERRNO, EIO),
 }
-
-
-def request_of(payload: bytes, peer: Peer, now_us: int) -> Request:
-    payload = payload.ljust(PAYLOAD_BYTES, b"\0")
-    sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
-    data = payload[_HEADER.size :][:size]
-    return Request(peer, now_us, payload, sequence, session, opcode, size, offset, data)
-
-
-def answer(request: Request, outcome: bytes | Nak | FileRefusal, *, last: bool = False) -> Send:
-    opcode = Opcode.ACK
-    if isinstance(outcome, FileRefusal):
-        outcome = _NAKS[outcome]
-    if isinstance(outcome, Nak):
-        opcode = Opcode.NAK
-        outcome = bytes(outcome) if outcome.errno else bytes(outcome[:1])
-    sequence = (request.sequence + 1) % 0x10000
-    header = _HEADER.pack(sequence, request.session, opcode, len(outcome), request.opcode, last, request.offset)
-    peer = request.peer
-    payload = (header + outcome).ljust(PAYLOAD_BYTES, b"\0")
-    return to(peer, "FILE_TRANSFER_PROTOCOL", 0, peer.system, peer.component, payload)
-
-
-def path_in(data: bytes) -> Names | FileRefusal:
-    try:
-        return names_of(data.split(b"\0", 1)[0].decode())
-    except UnicodeDecodeError:
-        return FileRefusal.NOT_FOUND
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:

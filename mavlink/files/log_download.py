@@ -113,23 +113,15 @@ class Logs:
         last = min(listing.last, len(logs) - 1)
         until = min(last + 1, listing.next + at_most)
         for number in range(listing.next, until):
-            log = logs[number]
-            facts = (
-                len(logs),
-                len(logs) - 1 + self._first_id,
-                log.modified_s & _UINT32_MAX,
-                min(log.size, _UINT32_MAX),
-            )
+            log, last_id = logs[number], len(logs) - 1 + self._first_id
+            facts = (len(logs), last_id, log.modified_s & _UINT32_MAX, min(log.size, _UINT32_MAX))
             yield to(listing.peer, "LOG_ENTRY", number + self._first_id, *facts)
         listing.next = until
         if until > last:
             self._listings.pop(listing.peer, None)
 
     def _look(self, peer: Peer) -> list[Entry]:
-        found = self._files.list(self._folder)
-        logs = () if isinstance(found, FileRefusal) else found
-        self._budget.spend(ENTRY_US * len(logs))
-        logs = [entry for entry in logs if self._is_log(entry) and entry.name not in self._erasing]
+        logs = [entry for entry in self._logs() if entry.name not in self._erasing]
         self._shown.pop(peer, None)
         if len(self._shown) >= MAX_PEERS:
             forgotten = first_to_go(self._shown)
@@ -150,26 +142,25 @@ class Logs:
         # A client that asks for another log has turned away from the one before.
         self._transfers = deque(known for known in self._transfers if known.peer != peer or known.id == number)
         of_peer = [known for known in self._transfers if known.peer == peer]
-        asked_again = any(
-            (known.id, known.end) == (number, transfer.end) and known.offset <= offset for known in of_peer
-        )
+        asked = (number, transfer.end)
+        asked_again = any((known.id, known.end) == asked and known.offset <= offset for known in of_peer)
         if not asked_again and len(of_peer) < MAX_TRANSFERS_OF_A_PEER:
             self._transfers.append(transfer)
         return ()
 
-    def _is_log(self, entry: Entry) -> bool:
-        return not entry.is_folder and entry.name.endswith(self._suffix)
+    def _logs(self) -> list[Entry]:
+        found = self._files.list(self._folder)
+        entries = [] if isinstance(found, FileRefusal) else found
+        self._budget.spend(ENTRY_US * len(entries))
+        return [entry for entry in entries if not entry.is_folder and entry.name.endswith(self._suffix)]
 
     def _stop(self, peer: Peer) -> None:
         self._listings.pop(peer, None)
         self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
 
     def _erase(self) -> None:
-        found = self._files.list(self._folder)
         kept = self._being_written()
-        logs = () if isinstance(found, FileRefusal) else found
-        self._budget.spend(ENTRY_US * len(logs))
-        self._erasing = {entry.name: None for entry in logs if self._is_log(entry) and entry.name != kept}
+        self._erasing = {entry.name: None for entry in self._logs() if entry.name != kept}
         self._shown.clear()
         self._listings.clear()
         self._transfers.clear()

@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Address, PerRotor, Vector
 from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US, encode_heartbeat
-from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors
+from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors, in_i16, place_e7_mm
 from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame, actuator_frame
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
-from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 RESEND_AFTER_S = 1.0
 """Wall-clock silence before a frame is repeated: PX4 may have restarted, or a datagram been lost."""
@@ -31,7 +31,7 @@ GIVEN_UP_AFTER_S = 30.0
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _G_M_S2 = 9.80665
-_INT16_MAX, _UINT16_MAX = 32767, 65535
+_UINT16_MAX = 65535
 _TRUTH = FixedFrame(
     "HIL_STATE_QUATERNION",
     "time_usec attitude_quaternion rollspeed pitchspeed yawspeed lat lon alt vx vy vz "
@@ -180,28 +180,8 @@ class SimulatorEnd:
         assert self._truth_every_us is not None, "it is sent on request"
         self._truth_at_us = state.time_us + self._truth_every_us
         airspeed = min(round(truth.airspeed_m_s * 1e2), _UINT16_MAX)
-        east, north, up = state.velocity_enu_m_s
-        ahead_east, ahead_north, ahead_up = truth.acceleration_enu_m_s2
-        return _TRUTH.encode(
-            self._codec,
-            (
-                state.time_us,
-                *ned_frd_from_enu_flu(state.attitude),
-                *frd_from_flu(state.rate_flu_rad_s),
-                round(place.latitude_deg * 1e7),
-                round(place.longitude_deg * 1e7),
-                round(place.altitude_m * 1e3),
-                _signed(north * 1e2),
-                _signed(east * 1e2),
-                _signed(-up * 1e2),
-                airspeed,
-                airspeed,
-                _signed(ahead_north / _G_M_S2 * 1e3),
-                _signed(ahead_east / _G_M_S2 * 1e3),
-                _signed(-ahead_up / _G_M_S2 * 1e3),
-            ),
-        )
-
-
-def _signed(value: float) -> int:
-    return max(-_INT16_MAX, min(_INT16_MAX, round(value)))
+        velocity = [in_i16(each * 1e2) for each in ned_from_enu(state.velocity_enu_m_s)]
+        acceleration = [in_i16(each / _G_M_S2 * 1e3) for each in ned_from_enu(truth.acceleration_enu_m_s2)]
+        turning = (*ned_frd_from_enu_flu(state.attitude), *frd_from_flu(state.rate_flu_rad_s))
+        where = (*place_e7_mm(place), *velocity)
+        return _TRUTH.encode(self._codec, (state.time_us, *turning, *where, airspeed, airspeed, *acceleration))

@@ -147,36 +147,18 @@ def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
 
 def _measured(numbers: Sequence[Any], gps: GpsFix | None = None, distance: Distance | None = None) -> SensorFrame:
     time_us, xacc, yacc, zacc, xgyro, ygyro, zgyro, xmag, ymag, zmag, hpa, _, _, temperature_c, updated = numbers
-    return SensorFrame(
-        time_us,
-        updated,
-        frd_from_flu((xacc, yacc, zacc)),
-        frd_from_flu((xgyro, ygyro, zgyro)),
-        frd_from_flu((xmag, ymag, zmag)),
-        hpa * 100.0,
-        temperature_c,
-        gps,
-        distance,
-    )
+    force, rate = frd_from_flu((xacc, yacc, zacc)), frd_from_flu((xgyro, ygyro, zgyro))
+    field = frd_from_flu((xmag, ymag, zmag))
+    return SensorFrame(time_us, updated, force, rate, field, hpa * 100.0, temperature_c, gps, distance)
 
 
 def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
-    east, north, up = fix.velocity_enu_m_s
-    return (
-        fix.time_us,
-        fix.fix_type,
-        round(fix.place.latitude_deg * 1e7),
-        round(fix.place.longitude_deg * 1e7),
-        round(fix.place.altitude_m * 1e3),
-        _in(fix.horizontal_accuracy_m, 1e2, 65534),
-        _in(fix.vertical_accuracy_m, 1e2, 65534),
-        _in(hypot(east, north), 1e2, 65534),
-        _signed_in(north),
-        _signed_in(east),
-        _signed_in(-up),
-        round(degrees(atan2(east, north)) % 360.0 * 1e2) % 36000,
-        fix.satellites,
-    )
+    east, north, _ = fix.velocity_enu_m_s
+    accuracies = (_in(fix.horizontal_accuracy_m, 1e2, 65534), _in(fix.vertical_accuracy_m, 1e2, 65534))
+    velocity = (in_i16(each * 1e2) for each in ned_from_enu(fix.velocity_enu_m_s))
+    course = round(degrees(atan2(east, north)) % 360.0 * 1e2) % 36000
+    where = (*place_e7_mm(fix.place), *accuracies, _in(hypot(east, north), 1e2, 65534), *velocity, course)
+    return (fix.time_us, fix.fix_type, *where, fix.satellites)
 
 
 def decode_gps(message: Message) -> GpsFix:
@@ -200,8 +182,12 @@ def _in(value: float, scale: float, maximum: int) -> int:
     return min(round(value * scale), maximum)
 
 
-def _signed_in(speed_m_s: float) -> int:
-    return max(-32767, min(32767, round(speed_m_s * 1e2)))
+def in_i16(value: float) -> int:
+    return max(-32767, min(32767, round(value)))
+
+
+def place_e7_mm(place: Geodetic) -> tuple[int, int, int]:
+    return round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7), round(place.altitude_m * 1e3)
 
 
 def _accuracy_m(cm: int) -> float:

@@ -11,11 +11,9 @@ from colibri.common.earth.geodesy import MAX_LATITUDE_DEG
 from colibri.mavlink.mission.items import (
     ACCEPTED,
     ALL,
-    FENCE,
     MISSION,
     NO_PLAN,
     PLAN_TYPES,
-    RALLY,
     MissionItem,
     StoredPlan,
     behind,
@@ -37,6 +35,7 @@ GUIDED = 2
 """MISSION_ITEM.current of an immediate destination outside the mission, as DroneKit's simple_goto sends."""
 FORGOTTEN_AFTER_US = 5_000_000  # silence after which a reader gets the newest plan
 MAX_READERS = 32
+_OF_A_PLAN = frozenset({"MISSION_COUNT", "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_REQUEST"})
 
 
 class _Reading(NamedTuple):
@@ -136,7 +135,9 @@ class MissionService:
         self.handles = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        receiver = self._receivers.get(message.name)
+        receiver, plan_type = self._receivers.get(message.name), getattr(message.fields, "mission_type", MISSION)
+        if plan_type not in PLAN_TYPES and message.name in _OF_A_PLAN:
+            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)
         sends = self._item(message, peer, now_us) if receiver is None else receiver(message.fields, peer, now_us)
         self._due_us = min(self._stream_us, self._uploads.due_us)
         return sends
@@ -179,21 +180,18 @@ class MissionService:
     def current(self) -> Fields:
         progress = self._progress()
         total = len(self.plans[MISSION].items) or NO_MISSION_TOTAL
-        ids = (self.plans[plan_type].id for plan_type in (MISSION, FENCE, RALLY))
-        return (self._seq(), total, progress.state, progress.mode, *ids)
+        return (self._seq(), total, progress.state, progress.mode, *self.ids)
 
     @property
     def ids(self) -> tuple[int, ...]:
-        mission, fence, rally = self.plans.values()
-        return mission.id, fence.id, rally.id
+        return tuple(self.plans[plan_type].id for plan_type in PLAN_TYPES)
 
     def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
         """Hold plans kept over a restart, without loading them into the vehicle."""
         self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
 
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> StoredPlan:
-        plan = plan_of(items)
-        self.plans[plan_type] = plan
+        self.plans[plan_type] = plan = plan_of(items)
         self._vehicle.load(plan_type, plan)
         self._announce()
         return plan
@@ -223,8 +221,6 @@ class MissionService:
         self._stream_us = self._due_us = 0
 
     def _count(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        if fields.mission_type not in PLAN_TYPES:
-            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)
         return self._explained([self._uploads.begin(peer, fields.mission_type, fields.count, now_us)])
 
     def _item(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
@@ -258,8 +254,6 @@ class MissionService:
         return (ACCEPTED, "") if refusal is None else (mav.MAV_MISSION_DENIED, refusal.reason)
 
     def _request_list(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        if fields.mission_type not in PLAN_TYPES:
-            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)
         self._uploads.hush(peer)
         plan_type = fields.mission_type
         return [self._downloads.begin(peer, plan_type, self._as_sent(plan_type), now_us)]
@@ -276,10 +270,8 @@ class MissionService:
         return max(seq - self._offset, 0) if self._offset else seq
 
     def _request(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
-        plan_type = fields.mission_type
-        if plan_type not in PLAN_TYPES:
-            return self._refuse(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)
-        current, home = self._seq() if plan_type == MISSION else -1, self._vehicle.home
+        plan_type, home = fields.mission_type, self._vehicle.home
+        current = self._seq() if plan_type == MISSION else -1
         if home is not None and plan_type == MISSION and fields.seq == 0:
             return [to(peer, "MISSION_ITEM_INT", *item_fields(peer, 0, home(), current == 0, plan_type))]
         plan = self._as_sent(plan_type)

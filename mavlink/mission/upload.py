@@ -11,16 +11,7 @@ Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from colibri.mavlink.mission.items import (
-    ACCEPTED,
-    MISSION,
-    PLAN_TYPES,
-    MissionItem,
-    StoredPlan,
-    fault_of,
-    item_of,
-    plan_name,
-)
+from colibri.mavlink.mission.items import ACCEPTED, MISSION, MissionItem, StoredPlan, fault_of, item_of, plan_name
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.services.command import command_name
 from colibri.mavlink.wire.dialect import Message, mav
@@ -71,15 +62,14 @@ class _Upload:
         self.items: list[MissionItem] = []
         self.received_us = self.due_us = now_us
         self.quiet = False
-        self.asked_in_old_form = bool(old_form)
-        self._old_form = old_form
+        self.old_form, self.asked_in_old_form = old_form, bool(old_form)
         self._asked = 0
         self._last_form = False
 
     def ask(self, now_us: int) -> Send:
         """Request the next item, first in the new form: some nack MISSION_REQUEST (MAVSDK), some require it."""
-        old = bool(self._old_form)
-        if self._old_form is None and self._asked >= OLD_FORM_AFTER:
+        old = bool(self.old_form)
+        if self.old_form is None and self._asked >= OLD_FORM_AFTER:
             old = self._asked % 2 == 0
         self._asked += 1
         self._last_form = old
@@ -104,12 +94,9 @@ class _Upload:
         self.quiet = False
         self._asked = 0
         if not self.asked_in_old_form:
-            self._old_form = False
-        elif self._old_form is None and self._last_form:
-            self._old_form = True
-
-    def nacked(self) -> None:
-        self._old_form = False
+            self.old_form = False
+        elif self.old_form is None and self._last_form:
+            self.old_form = True
 
 
 class Uploads:
@@ -151,7 +138,7 @@ class Uploads:
             if now_us - other.began_us < GIVES_WAY_AFTER_US:
                 return self._refuse(peer, mav.MAV_MISSION_DENIED, plan_type, "another station is uploading")
             self.drop(other.peer, (plan_type,))
-        self.drop(peer, PLAN_TYPES)
+        self.drop(peer, tuple(self._under_way))
         self._answers.pop(plan_type, None)
         maximum = self._rules[plan_type].maximum
         if count > maximum:
@@ -178,14 +165,11 @@ class Uploads:
         if fields.seq > expected:  # "the expected item should be re-requested"
             return self._asking(upload, now_us)
         item = item_of(message.name, fields)
-        unchecked = self._unchecked_first and not expected and upload.plan_type == MISSION
-        if isinstance(item, int):
-            result = item
-        else:
-            result = ACCEPTED if unchecked else self._rules[upload.plan_type].check_item(item)
         if isinstance(item, int):
             self._blame(upload, expected, f"{command_name(fields.command)} at {fields.x:g}, {fields.y:g}")
             return self._end(upload, item, 0, now_us)
+        unchecked = self._unchecked_first and not expected and upload.plan_type == MISSION
+        result = ACCEPTED if unchecked else self._rules[upload.plan_type].check_item(item)
         if result != ACCEPTED:
             self._blame(upload, expected, fault_of(item, result))
             return self._end(upload, result, 0, now_us)
@@ -199,7 +183,7 @@ class Uploads:
         if upload is None or upload.peer != peer or result == ACCEPTED:  # a late one of a download accepts
             return None
         if result == mav.MAV_MISSION_UNSUPPORTED and upload.asked_in_old_form:
-            upload.nacked()
+            upload.old_form = False
             return self._asking(upload, now_us)
         self.drop(peer, (plan_type,))
         return None

@@ -31,33 +31,20 @@ COPTER_CAPABILITIES = (CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """An identity on the wire.
-
-    Attributes:
-        autopilot: MAV_AUTOPILOT.
-        product: Name of the emulated program in texts; empty without one.
-        speaks: Release of the emulated interface.
-        commit: Eight hexadecimal digits, which some clients parse, as AUTOPILOT_VERSION.flight_custom_version.
-        stands_by: Whether an armed vehicle on the ground is in MAV_STATE_STANDBY, and every failsafe CRITICAL.
-        acknowledges_mode: Whether SET_MODE is answered by COMMAND_ACK.
-        numbers_as_floats: Whether PARAM_VALUE has every number as a float, and unknown names are not answered.
-        home_first: Whether item 0 of a mission is home.
-        streams_current: Whether MISSION_CURRENT is sent unasked.
-        old_form_first: Whether items are requested by MISSION_REQUEST first.
-    """
+    """An identity on the wire."""
 
     name: str
-    autopilot: int
-    product: str = ""
-    speaks: Triple | None = None
+    autopilot: int  # MAV_AUTOPILOT
+    product: str = ""  # name of the emulated program in texts; empty without one
+    speaks: Triple | None = None  # release of the emulated interface
     capabilities: int = CAPABILITIES
-    commit: bytes | None = None
-    stands_by: bool = False
-    acknowledges_mode: bool = False
-    numbers_as_floats: bool = False
-    home_first: bool = False
-    streams_current: bool = True
-    old_form_first: bool = False
+    commit: bytes | None = None  # AUTOPILOT_VERSION.flight_custom_version: eight hexadecimal digits, as clients parse
+    stands_by: bool = False  # armed on the ground is MAV_STATE_STANDBY, and every failsafe CRITICAL
+    acknowledges_mode: bool = False  # SET_MODE is answered by COMMAND_ACK
+    numbers_as_floats: bool = False  # PARAM_VALUE has every number as a float; unknown names are not answered
+    home_first: bool = False  # item 0 of a mission is home
+    streams_current: bool = True  # MISSION_CURRENT is sent unasked
+    old_form_first: bool = False  # items are requested by MISSION_REQUEST first
 
 
 PX4 = Identity("px4", mav.MAV_AUTOPILOT_PX4, "PX4", speaks=(1, 15, 0))

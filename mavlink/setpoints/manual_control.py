@@ -4,6 +4,7 @@ Specification: https://mavlink.io/en/services/manual_control.html and common.xml
 PX4 and its clients, although the message's text is counter-clockwise. Buttons are ignored.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from colibri.mavlink.node.service import Peer
@@ -32,18 +33,14 @@ class Controls(NamedTuple):
 
 
 class Manual(StreamedService[Controls]):
-    """Keeps each client's latest sticks.
-
-    Attributes:
-        held: Channels of a radio, us; empty without one.
-    """
+    """Keeps each client's latest sticks."""
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
     def __init__(self, system_id: int, text: StatusText | None = None) -> None:
         super().__init__(text=text)
         self._system_id = system_id
-        self.held: tuple[int, ...] = ()
+        self.held: tuple[int, ...] = ()  # channels of a radio, us; empty without one
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
         controls = self._latest(now_us, timeout_us)
@@ -79,10 +76,10 @@ class Manual(StreamedService[Controls]):
         return None
 
 
-def sticks_of(channels: Channels, now_us: int) -> Sticks:
-    """Return the sticks of four channels, µs; a released one is centred, a low elevator is the stick forward."""
+def sticks_of(channels: Sequence[int], now_us: int) -> Sticks:
+    """Return the sticks of the first four channels, µs; released is centred, a low elevator is the stick forward."""
     roll, pitch, thrust, yaw = (
         0.0 if value == RELEASED else (min(max(value, MIN_US), MAX_US) - MIDDLE_US) / (MAX_US - MIDDLE_US)
-        for value in channels
+        for value in channels[:4]
     )
     return Sticks(-pitch, roll, 0.5 + 0.5 * thrust, yaw, now_us)

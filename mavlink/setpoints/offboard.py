@@ -11,7 +11,7 @@ Choices left open by the specification:
 - One masked horizontal axis of a group in a body frame means: keep this position, zero velocity, zero acceleration.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import hypot, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -23,14 +23,7 @@ from colibri.mavlink.node.service import Peer
 from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
-from colibri.mavlink.setpoints.setpoints import (
-    NOWHERE,
-    STILL,
-    AttitudeSetpoint,
-    OffboardSetpoint,
-    PositionSetpoint,
-    turned,
-)
+from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import HomePosition
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
@@ -107,14 +100,11 @@ def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoi
         raise Refused("frame", f"frame {fields.coordinate_frame} is not global")
     velocity, acceleration = _derivatives(fields, body=False, up=False)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
-    return _checked(
-        PositionSetpoint(
-            _position_of(fields, here), velocity, acceleration, yaw_rad, yaw_rate_rad_s, body=False, time_us=now_us
-        )
-    )
+    position = _position_of(fields, here)
+    return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, time_us=now_us))
 
 
-def decode_attitude(fields: Any, _here: Whereabouts, now_us: int) -> AttitudeSetpoint:
+def decode_attitude(fields: Any, now_us: int) -> AttitudeSetpoint:
     mask = fields.type_mask
     masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
     wire = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
@@ -161,7 +151,7 @@ def _position_of(fields: Any, here: Whereabouts) -> Vector:
     if here.home is None and frame not in ABOVE_SEA and not isnan(altitude_m):
         raise Refused("no home", f"altitude {altitude_m:g} above home")
     home_up_m = here.home.position_enu_m[2] if here.home else 0.0
-    place = read_place(latitude, longitude, altitude_m, frame, home_up_m=home_up_m, origin=here.origin, here=STILL)
+    place = read_place(latitude, longitude, altitude_m, frame, home_up_m=home_up_m, origin=here.origin)
     if isinstance(place, Refusal):
         raise Refused("out of range", place.reason)
     east, north, up = place
@@ -233,29 +223,16 @@ def _attitude(q: Any) -> Quaternion:
 
 
 def _checked(setpoint: PositionSetpoint) -> PositionSetpoint:
-    asked = (
-        *setpoint.position_enu_m,
-        *setpoint.velocity_m_s,
-        *setpoint.acceleration_m_s2,
-        setpoint.yaw_rad,
-        setpoint.yaw_rate_rad_s,
-    )
-    if all(map(isnan, asked)):
+    position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, *_ = setpoint
+    if all(map(isnan, (*position, *velocity, *acceleration, yaw_rad, yaw_rate_rad_s))):
         raise Refused("empty", "nothing in it is given")
     return setpoint
-
-
-_DECODERS: dict[str, Callable[[Any, Whereabouts, int], OffboardSetpoint]] = {
-    "SET_POSITION_TARGET_LOCAL_NED": decode_local,
-    "SET_POSITION_TARGET_GLOBAL_INT": decode_global,
-    "SET_ATTITUDE_TARGET": decode_attitude,
-}
 
 
 class Offboard(StreamedService[OffboardSetpoint]):
     """Keeps each client's latest offboard setpoint."""
 
-    handles = frozenset(_DECODERS)
+    handles = frozenset({"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET"})
 
     def __init__(self, text: StatusText | None = None, frames: Mapping[int, Frame] = LOCAL_FRAMES) -> None:
         super().__init__(text=text)
@@ -270,4 +247,6 @@ class Offboard(StreamedService[OffboardSetpoint]):
     def _decode(self, message: Message, _peer: Peer, now_us: int) -> OffboardSetpoint:
         if message.name == "SET_POSITION_TARGET_LOCAL_NED":
             return decode_local(message.fields, self._here, now_us, self._frames)
-        return _DECODERS[message.name](message.fields, self._here, now_us)
+        if message.name == "SET_POSITION_TARGET_GLOBAL_INT":
+            return decode_global(message.fields, self._here, now_us)
+        return decode_attitude(message.fields, now_us)

@@ -96,16 +96,10 @@ class Radio(Manual):
         self.held = channels = self.channels(now_us)
         if not channels or self.throttle_failed(channels):
             return None
-        return sticks_of(_first(channels), now_us)
+        return sticks_of(channels, now_us)
 
     def throttle_failed(self, channels: tuple[int, ...]) -> bool:
-        settings = self._settings
-        return bool(settings["FS_THR_ENABLE"]) and channels[2] < settings["FS_THR_VALUE"]
-
-
-def _first(channels: tuple[int, ...]) -> Channels:
-    c1, c2, c3, c4, *_ = channels
-    return c1, c2, c3, c4
+        return bool(self._settings["FS_THR_ENABLE"]) and channels[2] < self._settings["FS_THR_VALUE"]
 
 
 def _pulses(sticks: Sticks) -> Channels:

@@ -82,23 +82,14 @@ controller, position, extra 1 to 3. MAV_DATA_STREAM_ALL (0) means all groups.
 
 
 class Streams(NamedTuple):
-    """The messages of an identity.
+    """The messages of an identity."""
 
-    Attributes:
-        groups: Messages of each MAV_DATA_STREAM.
-        defaults: Interval of each message, us, by the kind of channel.
-        names: All messages that are sent; empty: every one.
-        encoders: Of messages that only this identity sends.
-        unsent: MAV_RESULT of a request for another message.
-        unstreamed: MAV_RESULT of an interval for a known message that is not streamed, and for any other.
-    """
-
-    groups: Mapping[int, tuple[str, ...]]
-    defaults: Mapping[str, Mapping[str, int]]
-    names: frozenset[str] = frozenset()
-    encoders: Mapping[str, Encoder] = {}
-    unsent: int = UNSUPPORTED
-    unstreamed: tuple[int, int] = (DENIED, UNSUPPORTED)
+    groups: Mapping[int, tuple[str, ...]]  # messages of each MAV_DATA_STREAM
+    defaults: Mapping[str, Mapping[str, int]]  # interval of each message, us, by the kind of channel
+    names: frozenset[str] = frozenset()  # all messages that are sent; empty: every one
+    encoders: Mapping[str, Encoder] = {}  # of messages that only this identity sends
+    unsent: int = UNSUPPORTED  # MAV_RESULT of a request for another message
+    unstreamed: tuple[int, int] = (DENIED, UNSUPPORTED)  # of an interval for a known message, and for any other
 
     def chosen(self, encoders: Mapping[str, Encoder]) -> dict[str, Encoder]:
         """Return the encoders of this identity's messages."""

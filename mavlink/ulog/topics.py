@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from colibri.mavlink.ulog import messages
+from colibri.mavlink.wire.missing_messages import CODES
 
 _ATTITUDE = "uint64_t timestamp;uint64_t timestamp_sample;float[4] q;"
 _RATES = "uint64_t timestamp;uint64_t timestamp_sample;float[3] xyz;"
@@ -70,18 +71,7 @@ TOPICS: Mapping[str, str] = {
 
 PARTS = {"esc_report": "uint64_t timestamp;int32_t esc_rpm;"}  # nested types
 NUMBERS = {name: number for number, name in enumerate(TOPICS)}  # topic numbers, for all writers of a file
-_CODES = {
-    "uint64_t": "Q",
-    "uint32_t": "I",
-    "uint16_t": "H",
-    "uint8_t": "B",
-    "int32_t": "i",
-    "int8_t": "b",
-    "double": "d",
-    "float": "f",
-    "bool": "?",
-}
-"""Types as in `struct` and NumPy."""
+_CODES = {**CODES, "bool": "?"}  # types as in `struct` and NumPy
 
 
 def record(topic: str, *numbers: float) -> bytes:

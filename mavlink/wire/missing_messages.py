@@ -9,8 +9,8 @@ from re import findall
 from struct import Struct, calcsize
 from typing import Any, NamedTuple
 
-_CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i"}
-_CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d", "char": "s"}
+CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i"}
+CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d", "char": "s"}
 
 
 class MessageField(NamedTuple):
@@ -87,8 +87,8 @@ def _class_of(definition: Definition, dialect: Any) -> Any:
     fields = definition.fields
     names = [field.name for field in fields]
     # The wire has the largest types first, those of a size in the order of the definition.
-    ordered = sorted(fields, key=lambda field: -calcsize(_CODES[field.kind]))
-    packing = Struct("<" + "".join(f"{field.length or ''}{_CODES[field.kind]}" for field in ordered))
+    ordered = sorted(fields, key=lambda field: -calcsize(CODES[field.kind]))
+    packing = Struct("<" + "".join(f"{field.length or ''}{CODES[field.kind]}" for field in ordered))
 
     def initialize(self: Any, *values: Any) -> None:
         dialect.MAVLink_message.__init__(self, definition.id, definition.name)

@@ -61,7 +61,7 @@ def read_place(
     *,
     home_up_m: float,
     origin: Geodetic,
-    here: Vector,
+    here: Vector = (0.0, 0.0, 0.0),
     enu: Callable[[Geodetic, Geodetic], Vector] = enu_of,
 ) -> Vector | Refusal:
     """Return a place in ENU, m; what is nan is that of `here`."""
