@@ -49,11 +49,7 @@ def draw(
 
 
 def _draw_place(axes: "Axes", flown: Columns, failed_s: float) -> None:
-    for name, label, width_pt in (
-        ("x", "east", 4.0),
-        ("y", "north", 2.4),
-        ("z", "up", 1.2),
-    ):
+    for name, label, width_pt in (("x", "east", 4.0), ("y", "north", 2.4), ("z", "up", 1.2)):
         axes.plot(flown["t"], flown[name], label=label, linewidth=width_pt)
     axes.set_ylabel("position, m")
     bottom, top = axes.get_ylim()

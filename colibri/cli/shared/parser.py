@@ -4,7 +4,7 @@ from argparse import Action, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Generator, Sequence
 from importlib import import_module
 from shutil import get_terminal_size
-from textwrap import dedent, indent, wrap
+from textwrap import indent, wrap
 from typing import NoReturn, Protocol, cast
 
 from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
@@ -54,14 +54,9 @@ def parser_of(*whole: str) -> ArgumentParser:
     parser.add_argument("--version", action=Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of those below")
     for name, command in COMMANDS.items():
-        examples = f"examples:\n{indent(dedent(command.examples).strip(), '  ')}"
-        options = commands.add_parser(
-            name,
-            help=command.does,
-            description=command.does,
-            epilog=examples,
-            formatter_class=RawDescriptionHelpFormatter,
-        )
+        texts = {"help": command.does, "description": command.does}
+        texts["epilog"] = f"examples:\n{indent(command.examples, '  ')}"
+        options = commands.add_parser(name, **texts, formatter_class=RawDescriptionHelpFormatter)
         if name in whole:
             subcommand(name).add_options(options)
     for name, does in PROCESSES.items():
@@ -80,5 +75,4 @@ def _listed() -> str:
 
 
 def subcommand(name: str) -> Subcommand:
-    room = ".".join(filter(None, ("colibri.cli", COMMANDS[name].room, name.replace("-", "_"))))
-    return cast(Subcommand, import_module(room))
+    return cast(Subcommand, import_module(COMMANDS[name].module))

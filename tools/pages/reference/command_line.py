@@ -3,7 +3,6 @@
 import re
 from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
 from collections.abc import Iterator
-from textwrap import dedent
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.cli.shared.commands import COMMANDS, GROUPS, PROCESSES
@@ -67,7 +66,7 @@ def _section(name: str, parser: ArgumentParser, told: dict[str, tuple[str, str]]
     yield f"## colibri {name}\n"
     yield f"{does[0].upper()}{does[1:]}.\n"
     if name in COMMANDS:
-        yield f"```sh\n{dedent(COMMANDS[name].examples).strip()}\n```\n"
+        yield f"```sh\n{COMMANDS[name].examples}\n```\n"
     shared: dict[str, list[str]] = {}
     for option, row in _rows(parser):
         plain, default = _split(row)
